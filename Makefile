@@ -1,0 +1,61 @@
+# Every target sets up what it needs, in a virtual environment of its own. A second call is
+# instant; a change of pyproject.toml or constraints.txt installs again.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# One worker a core; beyond 8, starting them costs more than they save.
+TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-all lint bench figures clean
+
+help:  ## show this list
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
+
+demo: $(VENV)/.installed  ## the tour: DIM beside a fixed-time signal, table, plot and animation
+	$(BIN)/minisim demo --out out
+
+test: $(VENV)/.installed-dev  ## the tests, without the slow ones
+	$(TEST) -m "not slow"
+
+test-all: $(VENV)/.installed-dev  ## all tests, properties on more examples
+	$(TEST) --hypothesis-profile thorough
+
+lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.installed-sumo  ## speed, as ratios to SUMO in the same run
+	$(BIN)/python tests/bench/bench.py
+
+figures: $(VENV)/.installed  ## junction and harmony graph of a decision, as in the paper
+	mkdir -p out
+	$(BIN)/minisim decide three-way a1 b1 c1 --plot out/decision_three_way.png
+	$(BIN)/minisim decide four-way a1 b2 c2 d2 --plot out/decision_four_way.png
+	$(BIN)/minisim decide five-way a1 b2 c2 d2 e2 --plot out/decision_five_way.png
+
+clean:  ## remove the environment, caches and results
+	rm -rf $(VENV) out build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The stamps form a chain, so that `make -j` never installs twice at the same time.
+$(VENV)/.created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "minisim needs Python 3.11 or newer: make PYTHON=…")'
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.created pyproject.toml constraints.txt
+	$(PIP) -e .
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(PIP) -e '.[dev]'
+	@touch $@
+
+$(VENV)/.installed-sumo: $(VENV)/.installed-dev
+	$(PIP) -e '.[dev,sumo]'
+	@touch $@

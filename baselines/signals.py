@@ -1,0 +1,207 @@
+"""What signal controllers share: phases, programmes and signal heads that cannot let collide.
+
+A head turns green only when nobody who crosses the junction conflicts with its lane, so safety
+does not hang on the length of an amber. At the end of a green, those who can no longer stop
+comfortably keep their right of way; everybody else stops.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from itertools import accumulate, count
+
+import numpy as np
+
+from minisim.control import (
+    COMMIT_MARGIN,
+    Close,
+    Command,
+    Go,
+    Observed,
+    Open,
+    Site,
+    View,
+    can_stop,
+    stopping_distance,
+)
+from minisim.errors import InputError, instance, number, numbers
+
+#: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
+FASTEST_DRIVER = 2.0
+#: Room for the last steps before a vehicle is seen [m].
+SIGHT_MARGIN = 5.0
+
+
+class Colour(Enum):
+    """Of a signal head."""
+
+    RED = "red"
+    AMBER = "amber"
+    GREEN = "green"
+
+
+#: What the heads of a phase show one after the other.
+_STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Lanes that are green together, for how long, and what follows.
+
+    Attributes:
+        lanes: indices of the lanes.
+        green: [s].
+        amber: [s].
+        all_red: after the amber [s].
+    """
+
+    lanes: tuple[int, ...]
+    green: float
+    amber: float = 2.0
+    all_red: float = 0.0
+
+    def __post_init__(self) -> None:
+        lanes = numbers("lanes of a phase", self.lanes)
+        if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
+            raise InputError(f"lanes of a phase must be indices of lanes, got {self.lanes!r}")
+        object.__setattr__(self, "lanes", tuple(int(lane) for lane in lanes))
+        number("green [s]", self.green, low=0.5, high=3600)
+        number("amber [s]", self.amber, low=0, high=60)
+        number("all_red [s]", self.all_red, low=0, high=60)
+
+    @property
+    def duration(self) -> float:
+        """Green, amber and all-red together [s]."""
+        return self.green + self.amber + self.all_red
+
+
+@dataclass(frozen=True)
+class Program:
+    """Phases in a fixed order and time, over and over; the first turns green at time 0.
+
+    A program remembers nothing: what it shows follows from the time alone.
+    """
+
+    phases: tuple[Phase, ...]
+
+    def __post_init__(self) -> None:
+        instance("phases", self.phases, (tuple, list))
+        object.__setattr__(self, "phases", tuple(self.phases))
+        for phase in self.phases:
+            instance("phase", phase, Phase)
+        if not self.phases:
+            raise InputError("a signal program needs at least one phase")
+
+    @cached_property
+    def cycle(self) -> float:
+        """[s]."""
+        return math.fsum(phase.duration for phase in self.phases)
+
+    def colours(self, time: float, n: int) -> list[Colour]:
+        """What the heads of n lanes show from `time` [s] on."""
+        k = self._stage(time) % len(self._starts)
+        phase, colour = self.phases[k // len(_STAGES)], _STAGES[k % len(_STAGES)]
+        return [colour if lane in phase.lanes else Colour.RED for lane in range(n)]
+
+    def next_switch(self, time: float) -> float:
+        """The first time after `time` at which a head may change [s]."""
+        return self._start(self._stage(time) + 1)
+
+    def _stage(self, time: float) -> int:
+        """The stage at `time`, counted from time 0 over all cycles; never one without duration."""
+        before = max(math.floor(time / self.cycle) * len(self._starts) - 1, 0)
+        return next(stage for stage in count(before) if self._start(stage + 1) > time)
+
+    def _start(self, stage: int) -> float:
+        # From the number of the cycle, so that no rounding error adds up.
+        cycle, k = divmod(stage, len(self._starts))
+        return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
+
+    @cached_property
+    def _starts(self) -> tuple[float, ...]:
+        """When the stages of every phase start within a cycle [s]."""
+        stages = [stage for p in self.phases for stage in (p.green, p.amber, p.all_red)]
+        return tuple(accumulate(stages[:-1], initial=0.0))
+
+
+class Heads:
+    """The signal heads of a run, and the vehicles that they have let go.
+
+    Attributes:
+        colours: what each lane's head shows now. A head that is wanted green while somebody
+            still crosses its lane's way stays red (or amber) until that vehicle is clear.
+    """
+
+    def __init__(self, site: Site) -> None:
+        n = site.intersection.n
+        conflicts = site.conflicts.reshape(n, n - 1, n, n - 1)
+        # Nested lists: a plain lookup is much faster than one in a small array.
+        self._crossed = np.any(conflicts, axis=1).tolist()  # lane, then lane and manoeuvre − 1
+        self._exclusive = np.any(conflicts, axis=(1, 3)).tolist()  # lane, then lane
+        self._deceleration = site.vehicle.deceleration
+        self._let_go: set[int] = set()
+        self.colours = [Colour.RED] * n
+
+    def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
+        """Turn the heads to `wanted` as far as that is safe now, and say how.
+
+        Lanes are closed before others are opened, in one answer.
+        """
+        commands: list[Command] = []
+        self._let_go.intersection_update(v.id for v in view.vehicles)
+        for lane, colour in enumerate(wanted):
+            if colour is not Colour.GREEN:
+                if self.colours[lane] is Colour.GREEN:
+                    commands += self._close(lane, view)
+                self.colours[lane] = colour
+        for lane, colour in enumerate(wanted):
+            if colour is not self.colours[lane] and self._may_open(lane, view):
+                commands.append(Open(lane))
+                self.colours[lane] = Colour.GREEN
+        return commands
+
+    def _close(self, lane: int, view: View) -> list[Command]:
+        going = committed([v for v in view.vehicles if v.lane == lane], self._deceleration)
+        self._let_go.update(v.id for v in going)
+        return [Close(lane), *(Go(v.id) for v in going)]
+
+    def _may_open(self, lane: int, view: View) -> bool:
+        """Nobody crosses the lane's way, and no head is green for somebody who might."""
+        if any(
+            colour is Colour.GREEN and self._exclusive[lane][other]
+            for other, colour in enumerate(self.colours)
+        ):
+            return False
+        return not any(
+            (v.distance < 0.0 or v.id in self._let_go)
+            and self._crossed[lane][v.lane][v.manoeuvre - 1]
+            for v in view.vehicles
+        )
+
+
+def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
+    """The vehicles of one lane, before the junction, to be let go when it is closed.
+
+    Those that comfortable braking no longer stops, and everybody before them, for a follower
+    cannot go before its leader does.
+
+    Args:
+        lane: the lane's vehicles, front to back.
+        deceleration: comfortable braking [m/s²].
+    """
+    approaching = [v for v in lane if v.distance >= 0.0]
+    last = max(
+        (i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1
+    )
+    return approaching[: last + 1]
+
+
+def stopping_sight(site: Site) -> float:
+    """How far a view must reach so that everybody beyond it can still stop [m]."""
+    fastest = site.speed_limit * (FASTEST_DRIVER if site.vehicle.speed_deviation else 1.0)
+    needed = stopping_distance(fastest, site.vehicle.deceleration)
+    return needed + COMMIT_MARGIN + SIGHT_MARGIN

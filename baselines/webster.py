@@ -1,0 +1,166 @@
+"""Cycle and green times of a fixed-time signal, and the delay to expect (Webster 1958).
+
+F. V. Webster, Traffic Signal Settings, Road Research Technical Paper 39, HMSO 1958. Flows are in
+veh/h, as in that book; times in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from minisim.errors import InputError, number, numbers
+
+#: Above this flow ratio the optimum cycle is of no use (it is infinite at 1): cap it.
+MAX_FLOW_RATIO = 0.95
+#: Green of a lane that hardly anybody uses [s]: whoever stands at the line gets across it, and
+#: Webster's own greens at the paper's demands, 2.03 s at the least, stay as they are.
+MIN_GREEN = 2.0
+
+
+@dataclass(frozen=True)
+class SignalTiming:
+    """A signal's timing and what it means for a demand.
+
+    Attributes:
+        cycle: [s].
+        greens: of each lane [s].
+        flow_ratio: Webster's Y, the sum over the lanes of inflow over saturation flow.
+        saturation: of each lane, the degree of saturation x = qC/(sg); above 1 its queue grows
+            as long as the demand lasts.
+        capped: whether the optimum cycle was cut to a maximum (or does not exist).
+    """
+
+    cycle: float
+    greens: tuple[float, ...]
+    flow_ratio: float
+    saturation: tuple[float, ...]
+    capped: bool = False
+
+
+def webster(
+    rates: Iterable[float],
+    *,
+    saturation_flow: float = 1500.0,
+    lost_time_per_phase: float = 2.0,
+    equal_greens: bool = False,
+    min_green: float = MIN_GREEN,
+    max_cycle: float = 180.0,
+) -> SignalTiming:
+    """Webster's timing for one phase a lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
+
+    Where Y > 0.95 the cycle is at most `max_cycle`, also where no optimum exists (Y ≥ 1).
+    Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
+    `min_green`; that lengthens the cycle, except where it is capped: there the other lanes
+    share the rest.
+
+    Args:
+        rates: inflow of each lane [veh/h].
+        saturation_flow: of a lane [veh/h].
+        lost_time_per_phase: [s]; L is this times the number of lanes.
+        equal_greens: divide the greens equally instead of in proportion to the inflows.
+        min_green: [s].
+        max_cycle: [s].
+
+    Raises:
+        InputError: a value out of range, or a `max_cycle` without room for the minimal greens.
+    """
+    flows = _rates(rates)
+    n = len(flows)
+    number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
+    lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=60)
+    number("min_green [s]", min_green, above=0, high=600)
+    number("max_cycle [s]", max_cycle, low=lost + n * min_green, high=3600)
+
+    ratio = sum(flows) / saturation_flow
+    capped = ratio > MAX_FLOW_RATIO and optimal_cycle(ratio, lost) > max_cycle
+    total = (max_cycle if capped else optimal_cycle(ratio, lost)) - lost
+    shares = (1.0,) * n if equal_greens or ratio == 0.0 else flows
+    greens = [total * share / sum(shares) for share in shares]
+    if capped:
+        greens = _raise_within(greens, min_green)
+    else:
+        greens = [max(green, min_green) for green in greens]
+    return timing_of(greens, sum(greens) + lost, flows, saturation_flow, capped=capped)
+
+
+def optimal_cycle(flow_ratio: float, lost_time: float) -> float:
+    """Webster's cycle of least delay, (1.5L + 5)/(1 − Y) [s]; infinite for Y ≥ 1."""
+    return (1.5 * lost_time + 5.0) / (1.0 - flow_ratio) if flow_ratio < 1.0 else math.inf
+
+
+def timing_of(
+    greens: Iterable[float],
+    cycle: float,
+    rates: Iterable[float],
+    saturation_flow: float = 1500.0,
+    *,
+    capped: bool = False,
+) -> SignalTiming:
+    """Describe given greens and cycle [s] under the inflows `rates` [veh/h]."""
+    greens, rates = tuple(greens), tuple(rates)
+    return SignalTiming(
+        cycle=cycle,
+        greens=greens,
+        flow_ratio=sum(rates) / saturation_flow,
+        saturation=tuple(
+            rate * cycle / (saturation_flow * green)
+            for rate, green in zip(rates, greens, strict=True)
+        ),
+        capped=capped,
+    )
+
+
+def webster_delay(
+    rate: float, green: float, cycle: float, saturation_flow: float = 1500.0
+) -> float:
+    """Mean delay of a vehicle on one lane in the long run [s].
+
+    d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with λ = g/C, the degree
+    of saturation x = qC/(sg) and q in veh/s; infinite for x ≥ 1. Near x = 1 it overstates the
+    delay of a finite run, whose queue has not had time to grow.
+
+    Args:
+        rate: inflow q [veh/h].
+        green: g [s].
+        cycle: C [s].
+        saturation_flow: s [veh/h].
+    """
+    number("rate [veh/h]", rate, low=0, high=1e5)
+    number("cycle [s]", cycle, above=0, high=1e5)
+    number("green [s]", green, above=0, high=cycle)
+    number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
+    share = green / cycle
+    x = rate / (saturation_flow * share)
+    if x >= 1.0:
+        return math.inf
+    uniform = cycle * (1.0 - share) ** 2 / (2.0 * (1.0 - share * x))
+    q = rate / 3600.0
+    if q == 0.0:  # the limit: nobody waits for anybody
+        return uniform
+    random = x * x / (2.0 * q * (1.0 - x))
+    scale = math.cbrt(cycle) / math.cbrt(q) ** 2
+    correction = 0.65 * scale * math.pow(x, 2.0 + 5.0 * share)
+    return uniform + random - correction
+
+
+def _rates(rates: Iterable[float]) -> tuple[float, ...]:
+    flows = numbers("rates [veh/h]", rates)
+    if not flows:
+        raise InputError("rates must have at least one lane")
+    return tuple(number("rate [veh/h]", flow, low=0, high=1e5) for flow in flows)
+
+
+def _raise_within(greens: Sequence[float], low: float) -> list[float]:
+    """Raise greens to `low`, the others giving way in proportion; the sum stays the same."""
+    raised: set[int] = set()
+    result = list(greens)
+    while below := {i for i, green in enumerate(result) if green < low} - raised:
+        raised |= below
+        rest = sum(greens) - low * len(raised)
+        others = sum(green for i, green in enumerate(greens) if i not in raised)
+        result = [
+            low if i in raised else green * rest / others for i, green in enumerate(greens)
+        ]
+    return result

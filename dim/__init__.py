@@ -1,0 +1,19 @@
+"""Decentralised intersection management: vehicles that decide alone, with the same answer."""
+
+from dim.controller import Dim
+from dim.decision import DecisionTable, Explanation, decide, explain
+from dim.harmony import HarmonyMatrix
+from dim.perception import ExactPerception, Perception
+from dim.zones import Zones
+
+__all__ = [
+    "DecisionTable",
+    "Dim",
+    "ExactPerception",
+    "Explanation",
+    "HarmonyMatrix",
+    "Perception",
+    "Zones",
+    "decide",
+    "explain",
+]

@@ -1,0 +1,76 @@
+"""Algorithm 1 of the paper for one vehicle: does it go, from what it perceives, alone?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dim.decision import DecisionTable
+from dim.perception import COMMITS, Percept
+from minisim.errors import choice, instance
+
+#: Who may enter while others cross. "clear": nobody new (the paper). "harmonious": a participant
+#: in harmony with all of them (ours). "following": also behind a vehicle of its own lane, when it
+#: is in harmony with all the others (ours): in a lane the leader keeps them apart, not a rule.
+GATES = ("clear", "harmonious", "following")
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The public rules: all vehicles hold the same ones, and nothing else in common.
+
+    Attributes:
+        table: the decision of every case.
+        gate: who may enter while others cross, see `GATES`.
+        commit: when a vehicle is committed, see `perception.COMMITS`.
+    """
+
+    table: DecisionTable
+    gate: str = "clear"
+    commit: str = "stoppable"
+
+    def __post_init__(self) -> None:
+        instance("table", self.table, DecisionTable)
+        choice("gate", self.gate, GATES)
+        choice("commit rule", self.commit, COMMITS)
+
+
+class Agent:
+    """One vehicle's side of Algorithm 1; it remembers only whether it holds the right of way.
+
+    Attributes:
+        vehicle: its id.
+        lane: its approach lane.
+        right_of_way: whether it goes; False until it has decided otherwise.
+    """
+
+    __slots__ = ("lane", "right_of_way", "rules", "vehicle")
+
+    def __init__(self, vehicle: int, lane: int, rules: Rules) -> None:
+        self.vehicle = vehicle
+        self.lane = lane
+        self.rules = rules
+        self.right_of_way = False
+
+    def decide(self, percept: Percept) -> bool:
+        """Whether it goes, from what it perceives now (lines 4–12 of Algorithm 1).
+
+        Crossing, it keeps going; by the paper's commit rule it also goes when it rolled past
+        half of the green zone after losing its right of way ("it is granted the right of way by
+        others"). By the stoppable rule such a vehicle is stopping, and waits. Not yet its lane's
+        front vehicle, or held out by the gate, it does what it did before. Otherwise it goes
+        exactly if it belongs to the clique.
+        """
+        rules = self.rules
+        if percept.crossing:
+            if self.vehicle in percept.crossing:
+                self.right_of_way |= rules.commit == "paper"
+                return self.right_of_way
+            if rules.gate == "clear":
+                return self.right_of_way
+        if self.vehicle in percept.participants:
+            case = percept.case
+            if percept.crossing:
+                following = rules.gate == "following"
+                case = rules.table.admitted(case, percept.occupied, following)
+            self.right_of_way = bool(rules.table.lanes(case) >> self.lane & 1)
+        return self.right_of_way

@@ -1,0 +1,191 @@
+"""DIM as a controller: one agent per vehicle, hosted.
+
+The host calls at wake-ups only, while the vehicles of the paper look around all the time. Two
+wake-ups suffice, because between them no agent would change its mind:
+
+- Somebody new takes part only when a front bumper passes the start of the yellow zone (wake-up),
+  or when the vehicle ahead of it commits. In the second case the gate "clear" keeps everyone
+  where he is, and the gate "harmonious" leaves the newcomer out, in conflict with the vehicle
+  ahead, until that clears (wake-up).
+- Somebody who takes part begins to cross only when it holds the right of way, since whoever
+  waits can stop. The gate "clear" then freezes what was decided. Under "harmonious" the choice
+  among the rest stays the same: what is left of the best clique is the best clique among the
+  movements in harmony with the one that went, for two cliques compare by the smallest lane rank
+  that only one of them has, and a lane that both have does not count.
+- Somebody stops crossing when its rear bumper leaves the junction (wake-up).
+
+Three exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
+past half of the green zone, where it is granted it: another mark. Under the gate "following" a
+vehicle in the yellow zone takes part as soon as the one ahead of it commits; and on a host whose
+brakes differ, a vehicle that loses its right of way may look committed until it stands: in both
+cases the session looks again every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from dim.agent import GATES, Agent, Rules
+from dim.decision import ORDERS, decision_table, lane_ranks
+from dim.harmony import HarmonyMatrix
+from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
+from dim.zones import Zones
+from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
+from minisim.errors import InputError, choice, instance, number
+
+#: Views reach this far beyond the start of the yellow zone [m].
+SIGHT_MARGIN = 0.5
+
+
+@dataclass(frozen=True)
+class Dim:
+    """Decentralised intersection management: the paper's controller and our variants.
+
+    Attributes:
+        order: "size", the largest clique first, or "lanes", the highest-priority lanes first.
+        commit: "stoppable", committed when comfortable braking no longer stops it before the
+            junction, or "paper", past half of the green zone.
+        gate: who may enter while others cross: "clear", nobody new (the paper); "harmonious",
+            whoever is in harmony with all of them; "following", also behind a vehicle of its own
+            lane when in harmony with all the others.
+        priorities: rank of each lane, 0 first; "inflow" ranks by descending demand, ties by
+            lane; None is the lanes' own order.
+        zones: the road markings.
+        matrix: harmony of the movements; None derives it from geometry and vehicle.
+        perception: what vehicles see of each other.
+        period: look around every so many seconds too, or None: not needed, for tests.
+
+    Raises:
+        InputError: an unknown rule, or priorities that are no ranks.
+    """
+
+    order: str = "size"
+    commit: str = "stoppable"
+    gate: str = "clear"
+    priorities: tuple[int, ...] | Literal["inflow"] | None = None
+    zones: Zones = field(default_factory=Zones)
+    matrix: HarmonyMatrix | None = None
+    perception: Perception = field(default_factory=ExactPerception)
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        choice("order", self.order, ORDERS)
+        choice("commit rule", self.commit, COMMITS)
+        choice("gate", self.gate, GATES)
+        if isinstance(self.priorities, str):
+            choice("priorities", self.priorities, ("inflow",))
+        elif self.priorities is not None:
+            object.__setattr__(self, "priorities", _own_ranks(self.priorities))
+        instance("zones", self.zones, Zones)
+        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
+        instance("perception", self.perception, Perception)
+        if self.period is not None:
+            number("period [s]", self.period, above=0)
+
+    @property
+    def name(self) -> str:
+        """`dim`, and the rules in which it differs from the default: `dim-harmonious`."""
+        variants = {
+            self.gate: self.gate != "clear",
+            "lanes": self.order == "lanes",
+            "paper-commit": self.commit == "paper",
+            "inflow": self.priorities == "inflow",
+            "priorities": isinstance(self.priorities, tuple),
+        }
+        return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
+
+    def start(self, site: Site) -> DimSession:
+        """Begin a run.
+
+        Raises:
+            InputError: a matrix or priorities for another number of arms, or roads too short for
+                the zones.
+        """
+        return DimSession(self, site)
+
+    def ranks(self, site: Site) -> tuple[int, ...]:
+        """Rank of each lane at this site, 0 first; raises `InputError` for another n."""
+        n = site.intersection.n
+        if self.priorities == "inflow":
+            by_inflow = sorted(range(n), key=lambda lane: (-site.demand[lane], lane))
+            return tuple(by_inflow.index(lane) for lane in range(n))
+        return lane_ranks(self.priorities, n)
+
+    def harmony(self, site: Site) -> HarmonyMatrix:
+        """The matrix in force at this site; raises `InputError` for a given one of another n."""
+        n = site.intersection.n
+        if self.matrix is None:
+            return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+        if self.matrix.n != n:
+            raise InputError(
+                f"the harmony matrix is for {self.matrix.n} arms, the intersection has {n}"
+            )
+        return self.matrix
+
+
+class DimSession:
+    """One run of DIM: hosts an agent for each vehicle that takes part.
+
+    Attributes:
+        rules: those that all agents hold.
+        reader: how they read what they see.
+        plan: what the host has to provide.
+    """
+
+    def __init__(self, dim: Dim, site: Site) -> None:
+        instance("dim", dim, Dim)
+        instance("site", site, Site)
+        zones = dim.zones
+        zones.check(site)
+        table = decision_table(dim.harmony(site), dim.order, dim.ranks(site))
+        self.rules = Rules(table, dim.gate, dim.commit)
+        self.reader = Reader(site.intersection.n, zones, site.vehicle.deceleration, dim.commit)
+        half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
+        self.plan = Plan(
+            hold_distance=zones.hold_distance,
+            markings=zones.markings(site),
+            marks=(zones.yellow_start, *half_green),
+            wake_on_clear=True,
+            period=dim.period,
+            sight=zones.yellow_start + SIGHT_MARGIN,
+            lanes_open=False,
+        )
+        self._see = dim.perception.start(site)
+        self._dt = site.dt
+        self._following = dim.gate == "following"
+        self._agents: dict[int, Agent] = {}
+
+    def decide(self, view: View) -> Iterable[Command]:
+        """Let every vehicle from the yellow zone on perceive and decide; tell what changed."""
+        commands: list[Command] = []
+        agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
+        start = self.plan.marks[0] + ROUNDING
+        look_again = False
+        seen = percept = None
+        for ego in view.vehicles:
+            if ego.distance > start:
+                continue
+            vehicle = ego.id
+            agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
+            agents[vehicle] = agent
+            sight = self._see(view, ego)
+            if sight is not seen or percept is None:  # all who see the same read the same
+                seen, percept = sight, self.reader.read(sight)
+            had = agent.right_of_way
+            goes = agent.decide(percept)
+            if goes != had:
+                commands.append(Go(vehicle) if goes else Hold(vehicle))
+            if not goes and vehicle not in percept.participants:
+                look_again |= self._following or vehicle in percept.crossing
+        self._agents = agents
+        if look_again:
+            commands.append(Wake(view.time + self._dt))
+        return commands
+
+
+def _own_ranks(priorities: object) -> tuple[int, ...]:
+    if not isinstance(priorities, (tuple, list)):
+        raise InputError(f"priorities must be lane ranks or 'inflow', got {priorities!r}")
+    return lane_ranks(priorities, len(priorities))

@@ -1,0 +1,311 @@
+"""Which movements can be driven at once: the paper's harmony matrix.
+
+From the geometry (two movements are in harmony when the corridors that their bodies sweep keep a
+clearance), from a file, or as the paper prints it.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from minisim.control import CLEARANCE
+from minisim.errors import FileError, InputError, instance, integer
+from minisim.geometry import ARM_NAMES, Bools, Intersection, Movement
+from minisim.vehicle import VehicleType
+
+#: Arm counts for which the authors published a matrix.
+PAPER_ARMS = (3, 4, 5)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HarmonyMatrix:
+    """Harmony between all n(n−1) movements of a junction of n arms.
+
+    Two matrices are equal, and hash alike, when their entries are.
+
+    Attributes:
+        n: number of arms, 3 … 12.
+        values: bool, shape (m, m) with m = n(n−1), read-only; rows and columns in the order
+            a1, a2, …, b1, … True is harmony, False conflict; symmetric, and False within a lane.
+
+    Raises:
+        InputError: not square, not symmetric, an entry other than 0 and 1, or harmony within a
+            lane; the message names the entry.
+    """
+
+    n: int
+    values: Bools
+
+    def __post_init__(self) -> None:
+        n = integer("number of arms", self.n, low=3, high=len(ARM_NAMES))
+        object.__setattr__(self, "n", n)
+        values = _checked(self.values, n, self.labels)
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def from_geometry(
+        cls,
+        intersection: Intersection,
+        vehicle: VehicleType | None = None,
+        clearance: float = CLEARANCE,
+    ) -> HarmonyMatrix:
+        """Harmony where swept corridors of different arms stay more than `clearance` [m] apart.
+
+        Args:
+            intersection: the geometry.
+            vehicle: whose body sweeps the corridors; by default `VehicleType()`.
+            clearance: 0 … 10 m.
+        """
+        instance("intersection", intersection, Intersection)
+        vehicle = VehicleType() if vehicle is None else vehicle
+        instance("vehicle", vehicle, VehicleType)
+        conflicts = intersection.conflicts(vehicle, clearance)
+        return cls(intersection.n, ~conflicts & ~_same_lane(intersection.n))
+
+    @classmethod
+    def paper(cls, n: int) -> HarmonyMatrix:
+        """The authors' own matrix for 3, 4 or 5 arms (the paper prints the one for 4)."""
+        if integer("number of arms", n, low=1) not in PAPER_ARMS:
+            raise InputError(f"the paper has matrices for 3, 4 and 5 arms, not for {n}")
+        return _paper(int(n))
+
+    @classmethod
+    def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
+        """Read a matrix: a header `,a1,a2,…`, then one line a movement, `a1,0,0,1,…`.
+
+        Raises:
+            FileError: unreadable, or not such a table (with the line).
+            InputError: a table whose labels or entries are no harmony matrix (with the entry).
+        """
+        instance("path of a harmony matrix", path, (str, os.PathLike))
+        try:
+            data = Path(path).read_bytes()
+        except (OSError, ValueError) as error:
+            raise FileError(f"cannot read harmony matrix {path!s}: {_reason(error)}") from None
+        return _parse(data, f"harmony matrix {path!s}")
+
+    def to_text(self) -> str:
+        """The matrix as `from_csv` reads it."""
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(["", *self.labels])
+        for label, row in zip(self.labels, self.values.astype(int).tolist(), strict=True):
+            writer.writerow([label, *row])
+        return buffer.getvalue()
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the matrix, whole or not at all; raises `FileError` where that is impossible."""
+        instance("path of a harmony matrix", path, (str, os.PathLike))
+        target = Path(path)
+        part = target.parent / f".{target.name}.{os.getpid()}.part"
+        try:
+            part.write_text(self.to_text(), encoding="utf-8")
+            part.replace(target)
+        except (OSError, ValueError) as error:
+            raise FileError(f"cannot write harmony matrix {path!s}: {_reason(error)}") from None
+        finally:
+            _remove(part)
+
+    @cached_property
+    def movements(self) -> tuple[Movement, ...]:
+        """All n(n−1) movements, in the order of rows and columns."""
+        return tuple(Movement(i, j) for i in range(self.n) for j in range(1, self.n))
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Their names: a1, a2, …"""
+        return tuple(str(m) for m in self.movements)
+
+    @cached_property
+    def _index(self) -> dict[Movement | str, int]:
+        index: dict[Movement | str, int] = {m: k for k, m in enumerate(self.movements)}
+        index.update((label, k) for k, label in enumerate(self.labels))
+        return index
+
+    def index(self, movement: Movement | str) -> int:
+        """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError`."""
+        try:
+            return self._index[movement]
+        except (KeyError, TypeError):
+            text = str(movement) if isinstance(movement, str) else repr(movement)
+            raise InputError(
+                f"no movement {text} in an intersection of {self.n} arms: a lane a … "
+                f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.n - 1}, such as a1"
+            ) from None
+
+    def harmony(self, first: Movement | str, second: Movement | str) -> bool:
+        """Whether both can be driven at once; raises `InputError` for an unknown movement."""
+        return bool(self.values[self.index(first), self.index(second)])
+
+    def __getitem__(self, pair: tuple[Movement | str, Movement | str]) -> bool:
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise InputError(f"a harmony matrix is indexed by two movements, got {pair!r}")
+        return self.harmony(*pair)
+
+    def disagreements(self, other: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
+        """The unordered pairs on which two matrices differ; raises `InputError` for another n."""
+        instance("other", other, HarmonyMatrix)
+        if other.n != self.n:
+            raise InputError(f"cannot compare matrices of {self.n} and {other.n} arms")
+        rows, columns = np.nonzero(np.triu(self.values != other.values))
+        movements = self.movements
+        return tuple(
+            (movements[r], movements[c])
+            for r, c in zip(rows.tolist(), columns.tolist(), strict=True)
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, HarmonyMatrix):
+            return NotImplemented
+        return self.n == other.n and bool(np.array_equal(self.values, other.values))
+
+    def __hash__(self) -> int:
+        return hash((self.n, self.values.tobytes()))
+
+    def __reduce__(self) -> tuple[type[HarmonyMatrix], tuple[int, Bools]]:
+        # An unpickled array would be writable: go through the constructor.
+        return HarmonyMatrix, (self.n, self.values)
+
+    def __repr__(self) -> str:
+        # The digest tells matrices apart wherever a controller's repr is kept as provenance.
+        digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
+        pairs = int(self.values.sum()) // 2
+        return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
+
+
+@lru_cache(maxsize=len(PAPER_ARMS))
+def _paper(n: int) -> HarmonyMatrix:
+    name = f"harmony_{n}way.csv"
+    data = resources.files("dim").joinpath("data", name).read_bytes()
+    return _parse(data, name)
+
+
+def _same_lane(n: int) -> Bools:
+    """Whether two movements start in the same lane, shape (m, m)."""
+    lane = np.repeat(np.arange(n), n - 1)
+    return np.asarray(lane[:, None] == lane[None, :])
+
+
+def _checked(values: npt.ArrayLike, n: int, labels: tuple[str, ...]) -> Bools:
+    """A bool copy of `values`, after every check that a harmony matrix must pass."""
+    size = len(labels)
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise InputError("a harmony matrix is square: its rows differ in length") from None
+    if array.shape != (size, size):
+        raise InputError(
+            f"a harmony matrix of {n} arms is {size} × {size}, "
+            f"got {' × '.join(map(str, array.shape)) or repr(values)}"
+        )
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"a harmony matrix has entries 0 and 1, got {array.dtype} entries")
+    for row, column in _where((array != 0) & (array != 1)):
+        _refuse(labels, row, column, f"is {array[row, column]}; allowed: 0 or 1")
+    result: Bools = array.astype(np.bool_)
+    for row, column in _where(result != result.T):
+        here, there = int(result[row, column]), int(result[column, row])
+        _refuse(
+            labels, row, column, f"is {here} but the other way round {there}: it must be symmetric"
+        )
+    for row, column in _where(result & _same_lane(n)):
+        _refuse(labels, row, column, "is 1, but they share a lane: it must be 0")
+    return result
+
+
+def _where(bad: Bools) -> Iterator[tuple[int, int]]:
+    return ((int(r), int(c)) for r, c in np.argwhere(bad))
+
+
+def _refuse(labels: tuple[str, ...], row: int, column: int, why: str) -> NoReturn:
+    raise InputError(f"the harmony of {labels[row]} with {labels[column]} {why}")
+
+
+def _parse(data: bytes, where: str) -> HarmonyMatrix:
+    rows = _table(data, where)
+    line, header = rows[0]
+    n = _arms(len(header) - 1, f"{where}, line {line}")
+    labels = [f"{ARM_NAMES[i]}{j}" for i in range(n) for j in range(1, n)]
+    for k, (got, wanted) in enumerate(zip(header[1:], labels, strict=True), start=2):
+        if got != wanted:
+            raise InputError(f"{where}, line {line}: column {k} is {got!r}, expected {wanted!r}")
+    if len(rows) - 1 != len(labels):
+        raise InputError(
+            f"{where}, line {rows[-1][0]}: not square: the header names {len(labels)} movements, "
+            f"{len(rows) - 1} rows follow"
+        )
+    values = [
+        _row(cells, label, labels, f"{where}, line {line}")
+        for (line, cells), label in zip(rows[1:], labels, strict=True)
+    ]
+    try:
+        return HarmonyMatrix(n, np.array(values))
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
+    """The lines that hold cells, each with its number; all as long as the first."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise FileError(f"{where}, line {line}: not UTF-8 text") from None
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if cells]
+    except csv.Error as error:
+        raise FileError(f"{where}, line {reader.line_num}: {error}") from None
+    if not rows:
+        raise FileError(f"{where}, line 1: empty; expected a header such as ,a1,a2,b1,…")
+    width = len(rows[0][1])
+    for line, cells in rows:
+        if len(cells) != width:
+            raise FileError(f"{where}, line {line}: {len(cells)} cells, but the header has {width}")
+    return rows
+
+
+def _arms(columns: int, where: str) -> int:
+    for n in range(3, len(ARM_NAMES) + 1):
+        if n * (n - 1) == columns:
+            return n
+    raise InputError(
+        f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"
+    )
+
+
+def _row(cells: list[str], label: str, labels: list[str], where: str) -> list[int]:
+    if cells[0] != label:
+        raise InputError(
+            f"{where}: the row is labelled {cells[0]!r}, but the columns' order asks for {label!r}"
+        )
+    for other, cell in zip(labels, cells[1:], strict=True):
+        if cell not in ("0", "1"):
+            raise InputError(
+                f"{where}: the harmony of {label} with {other} is {cell!r}; allowed: 0 or 1"
+            )
+    return [int(cell) for cell in cells[1:]]
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except (OSError, ValueError):
+        return  # it was never created, and the reason has been reported

@@ -1,0 +1,118 @@
+"""What one vehicle sees of the others, and how it reads that.
+
+Seeing and reading are apart. A `Perception` says what an ego sees of the true view: everything
+(`ExactPerception`), or one day less, later, or wrong. `Reader` turns what was seen into the few
+facts that Algorithm 1 needs, the same way for every vehicle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+from dim.zones import Zones
+from minisim.control import Observed, Site, View, can_stop
+from minisim.errors import choice, instance, integer, number
+
+#: When a vehicle before the junction is committed. "stoppable": it can no longer stop before the
+#: junction by comfortable braking. "paper": it is past half of the green zone.
+COMMITS = ("stoppable", "paper")
+
+#: A host may report a front bumper that has just passed a mark a rounding error before it [m].
+ROUNDING = 1e-6
+
+#: What an ego sees of a view: again a view, ordered as every view is. It sees itself exactly.
+See = Callable[[View, Observed], View]
+
+
+@runtime_checkable
+class Perception(Protocol):
+    """A recipe for the vehicles' senses: hashable, picklable, never changed by a run."""
+
+    def start(self, site: Site) -> See:
+        """Begin a run: random streams and memory, if there are any, belong to the result."""
+
+
+@dataclass(frozen=True)
+class ExactPerception:
+    """Everyone sees everything, at once and as it is: the paper's assumption."""
+
+    def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
+        """The view itself, which a session therefore reads once for all vehicles."""
+        return _see_all
+
+
+def _see_all(view: View, ego: Observed) -> View:  # noqa: ARG001  (See's argument)
+    return view
+
+
+class Percept(NamedTuple):
+    """What Algorithm 1 needs to know of a view.
+
+    Attributes:
+        participants: ids of the vehicles that take part, by lane: the front vehicle of each lane,
+            if its front bumper is between the start of the yellow zone and the junction. A
+            vehicle that is crossing is nobody's front vehicle.
+        crossing: ids of the vehicles that are crossing: committed, or any part of the body in
+            the junction.
+        case: the participants' movements as an integer, see `DecisionTable`.
+        occupied: the crossing vehicles' movements, an integer with bit k for the k-th movement.
+    """
+
+    participants: tuple[int, ...]
+    crossing: tuple[int, ...]
+    case: int
+    occupied: int
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How a view is read, by public rules that every vehicle shares.
+
+    Attributes:
+        n: number of arms.
+        zones: the road markings.
+        deceleration: the vehicles' comfortable braking [m/s²].
+        commit: when a vehicle is committed, see `COMMITS`.
+    """
+
+    n: int
+    zones: Zones
+    deceleration: float
+    commit: str = "stoppable"
+
+    def __post_init__(self) -> None:
+        integer("number of arms", self.n, low=3, high=12)
+        instance("zones", self.zones, Zones)
+        number("deceleration [m/s²]", self.deceleration, above=0)
+        choice("commit rule", self.commit, COMMITS)
+
+    def committed(self, vehicle: Observed) -> bool:
+        """Whether others must treat a vehicle before the junction as crossing.
+
+        A vehicle that brakes comfortably for the hold line never is: the green zone is longer
+        than the margin of `can_stop`.
+        """
+        if self.commit == "paper":
+            return vehicle.distance < self.zones.green / 2.0
+        return not can_stop(vehicle, self.deceleration)
+
+    def read(self, view: View) -> Percept:
+        """Who takes part and who is crossing, in a view ordered by lane and front to back."""
+        n, start = self.n, self.zones.yellow_start + ROUNDING
+        participants, crossing = [], []
+        case = occupied = 0
+        lane_served = -1
+        for vehicle in view.vehicles:
+            if vehicle.distance > start:
+                continue
+            _, lane, manoeuvre, distance, _, _ = vehicle
+            if distance < 0.0 or self.committed(vehicle):
+                crossing.append(vehicle.id)
+                occupied |= 1 << lane * (n - 1) + manoeuvre - 1
+            elif lane != lane_served:
+                lane_served = lane
+                participants.append(vehicle.id)
+                case += manoeuvre * n**lane
+        return Percept(tuple(participants), tuple(crossing), case, occupied)

@@ -1,0 +1,167 @@
+"""Frames into files: GIF, MP4 and a web page that plays by itself.
+
+Frames are images of one size and arrive one by one; none is kept longer than the next one needs
+it, so that a long film needs no more memory than a short one.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import os
+import shutil
+import struct
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+from PIL import GifImagePlugin
+from PIL.Image import Dither, Image, Quantize, fromarray
+
+from minisim.errors import FileError, InputError, MissingExtraError
+
+FORMATS = ("gif", "mp4", "html")
+
+Indices = npt.NDArray[np.uint8]
+
+#: Colours of an indexed frame; in a GIF one more stands for "as before".
+COLOURS = 127
+
+
+def animation_format(path: str | os.PathLike[str]) -> str:
+    """The format of an animation by its suffix.
+
+    Raises:
+        InputError: another suffix than `FORMATS`.
+        MissingExtraError: .mp4 without the program ffmpeg.
+    """
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in FORMATS:
+        allowed = ", ".join(f".{name}" for name in FORMATS)
+        raise InputError(f"an animation file ends in {allowed}; got {str(path)!r}")
+    if suffix == "mp4" and shutil.which("ffmpeg") is None:
+        raise MissingExtraError(
+            "an .mp4 needs the program ffmpeg, which was not found; "
+            "install it, or write a .gif or .html"
+        )
+    return suffix
+
+
+def palette_of(frame: Image) -> Image:
+    """An indexed image with the colours of `frame`, to index others with."""
+    return frame.quantize(COLOURS, method=Quantize.MEDIANCUT)
+
+
+def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -> None:
+    """Write a GIF that loops for ever.
+
+    Each frame holds only the rectangle that changed, transparent where it did not (GIF89a, §18
+    screen, §20 image, §23 control; the loop is Netscape's extension).
+    """
+    colours = bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
+    size_code = COLOURS.bit_length() - 1
+    milliseconds = max(20, round(100.0 / fps) * 10)
+    shown: Indices | None = None
+    with path.open("wb") as file:
+        file.write(b"GIF89a" + struct.pack("<HHBBB", *palette.size, 0x80 | size_code, 0, 0))
+        file.write(colours + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
+        for frame in frames:
+            indices = np.asarray(_indexed(frame, palette))
+            corner, part = _changed(indices, shown)
+            blocks = GifImagePlugin.getdata(
+                fromarray(part, "P"), corner, duration=milliseconds, transparency=COLOURS,
+                disposal=1,
+            )  # fmt: skip
+            file.write(b"".join(blocks))
+            shown = indices
+        file.write(b";")
+
+
+def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
+    """Pipe the frames into ffmpeg; raises `FileError` with what it says when it fails."""
+    first = next(frames)
+    command = [
+        "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+        "-s", f"{first.width}x{first.height}", "-r", f"{fps:g}", "-i", "-", "-an",
+        "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(path),
+    ]  # fmt: skip
+    with (
+        tempfile.TemporaryFile() as log,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log) as encoder,
+    ):
+        _feed(encoder.stdin, first, frames)
+        if encoder.wait() != 0:
+            log.seek(0)
+            reason = " ".join(log.read().decode(errors="replace").split())
+            raise FileError(f"ffmpeg could not write the animation: {reason}")
+
+
+def write_html(frames: Iterator[Image], palette: Image, path: Path, fps: float, title: str) -> None:
+    """Write one web page that needs nothing else: a player with the frames inside.
+
+    Each frame holds only what differs from the first, so that the page stays small and every
+    frame can be shown without the ones before it.
+    """
+    template = Path(__file__).with_name("player.html").read_text(encoding="utf-8")
+    fields = {
+        "title": html.escape(title),
+        "fps": f"{fps:g}",
+        "width": str(palette.width),
+        "height": str(palette.height),
+    }
+    for name, value in fields.items():
+        template = template.replace(f"{{{{{name}}}}}", value)
+    before, after = template.split("{{frames}}")
+    ground: Indices | None = None
+    with path.open("w", encoding="utf-8") as file:
+        file.write(before)
+        for frame in frames:
+            indices = np.asarray(_indexed(frame, palette))
+            corner, part = _changed(indices, ground)
+            ground = indices if ground is None else ground
+            file.write(f'[{corner[0]}, {corner[1]}, "{_png(part, palette)}"],\n')
+        file.write(after)
+
+
+def _indexed(frame: Image, palette: Image) -> Image:
+    return frame.quantize(palette=palette, dither=Dither.NONE)
+
+
+def _png(indices: Indices, palette: Image) -> str:
+    """An indexed picture as base64 text; the index `COLOURS` is transparent."""
+    picture = fromarray(indices, "P")
+    picture.putpalette(palette.getpalette() or ())
+    buffer = io.BytesIO()
+    picture.save(buffer, format="PNG", transparency=COLOURS)
+    return base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _changed(indices: Indices, shown: Indices | None) -> tuple[tuple[int, int], Indices]:
+    """Corner (x, y) and content of the smallest rectangle that turns `shown` into `indices`."""
+    if shown is None:
+        return (0, 0), indices
+    differs = indices != shown
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return (0, 0), np.full((1, 1), COLOURS, dtype=np.uint8)
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    part = np.where(differs[box], indices[box], COLOURS).astype(np.uint8)
+    return (int(columns[0]), int(rows[0])), part
+
+
+def _feed(pipe: IO[bytes] | None, first: Image, frames: Iterator[Image]) -> None:
+    """Write frames until they end or the reader has given up (its exit code will tell)."""
+    if pipe is None:
+        return
+    try:
+        pipe.write(first.tobytes())
+        for frame in frames:
+            pipe.write(frame.tobytes())
+        pipe.close()
+    except BrokenPipeError:
+        return

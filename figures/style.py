@@ -1,0 +1,83 @@
+"""One look for every figure: colours, type and the bare figure.
+
+Colours are Okabe & Ito's (jfly.uni-koeln.de/color, 2008), told apart by colour-blind readers and
+in grey print. Figures are made through matplotlib's objects, never through pyplot: nothing here
+touches global state, a display or another program's figures.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from minisim.errors import InputError
+from minisim.recording import replacing
+
+BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
+
+INK, MUTED, FAINT, PAPER = "#22272E", "#68707C", "#D9DDE3", "#FFFFFF"
+GRASS, ASPHALT, PAINT = "#EEF2E8", "#C9CED6", "#FFFFFF"
+
+#: Road markings by the name of their zone; any other name is drawn in `SKY`.
+ZONES: Mapping[str, str] = MappingProxyType(
+    {"red": "#E8A49A", "yellow": "#F3D984", "green": "#A3D2AE"}
+)
+#: Vehicles by what they are doing.
+RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
+
+#: Formats that a figure can be written in.
+FORMATS = ("png", "pdf", "svg")
+
+
+def new_figure(width: float, height: float, *, dpi: float = 150) -> Figure:
+    """An empty figure of width × height inches on white paper."""
+    return Figure(figsize=(width, height), dpi=dpi, facecolor=PAPER)
+
+
+def canvas_of(figure: Figure) -> FigureCanvasAgg:
+    """A canvas of pixels for the figure."""
+    return FigureCanvasAgg(figure)
+
+
+def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
+    """Give a plot its quiet frame: light horizontal grid, no box, title on the left."""
+    axes.set_title(title, loc="left", fontsize=11, color=INK, fontweight="bold", pad=10)
+    axes.set_xlabel(xlabel, fontsize=9.5, color=INK)
+    axes.set_ylabel(ylabel, fontsize=9.5, color=INK)
+    axes.tick_params(labelsize=9, colors=MUTED, labelcolor=INK, length=3)
+    axes.grid(axis="y", color=FAINT, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(MUTED)
+
+
+def figure_format(path: str | os.PathLike[str]) -> str:
+    """The format of a figure file by its suffix; raises `InputError` for an unknown one."""
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in FORMATS:
+        allowed = ", ".join(f".{name}" for name in FORMATS)
+        raise InputError(f"a figure file ends in {allowed}; got {str(path)!r}")
+    return suffix
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure in the format of its suffix, whole or not at all.
+
+    The same figure gives the same bytes.
+
+    Raises:
+        InputError: a suffix other than `FORMATS`.
+        FileError: the file cannot be written.
+    """
+    kind = figure_format(path)
+    undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+    with replacing(path) as part, mpl.rc_context({"svg.hashsalt": "minisim", "pdf.fonttype": 42}):
+        figure.savefig(part, format=kind, metadata=undated.get(kind, {}))

@@ -1,0 +1,258 @@
+"""Demand and the arrival table drawn from it.
+
+The table is drawn before the run from the run's own streams, so every controller meets the same
+vehicles.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from minisim.errors import FileError, InputError, choice, instance, integer, number, numbers, show
+from minisim.geometry import ARM_NAMES
+from minisim.streams import stream
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+MODELS = ("poisson", "exponential", "shifted")
+COLUMNS = ("demand_time_s", "lane", "manoeuvre")
+#: More than any lane can carry; beyond it a density is surely a typing error.
+MAX_DENSITY = 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """An arrival table, sorted by demand time (ties keep lane order).
+
+    Attributes:
+        time: demand time [s], shape (k,).
+        lane: index of the approach lane, shape (k,).
+        manoeuvre: 1 … n−1, shape (k,).
+    """
+
+    time: Floats
+    lane: Ints
+    manoeuvre: Ints
+
+    def __post_init__(self) -> None:
+        time, lane, manoeuvre = (
+            _column("demand_time_s", self.time, np.float64),
+            _column("lane", self.lane, np.int64),
+            _column("manoeuvre", self.manoeuvre, np.int64),
+        )
+        if not len(time) == len(lane) == len(manoeuvre):
+            raise InputError("an arrival table needs as many times as lanes and manoeuvres")
+        if len(time) and (not np.isfinite(time).all() or time.min() < 0):
+            raise InputError("demand times must be finite and not negative")
+        order = np.lexsort((lane, time))
+        for name, column in (("time", time), ("lane", lane), ("manoeuvre", manoeuvre)):
+            sorted_column = column[order]
+            sorted_column.setflags(write=False)
+            object.__setattr__(self, name, sorted_column)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def check(self, n: int) -> None:
+        """Raise `InputError` for a lane or manoeuvre that n arms do not have."""
+        if not len(self):
+            return
+        if self.lane.min() < 0 or self.lane.max() >= n:
+            bad = int(self.lane[(self.lane < 0) | (self.lane >= n)][0])
+            name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
+            raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
+        if self.manoeuvre.min() < 1 or self.manoeuvre.max() >= n:
+            bad = int(self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)][0])
+            raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
+
+    def rates(self, n: int, horizon: float) -> tuple[float, ...]:
+        """Mean inflow of each lane over `horizon` seconds [veh/h]."""
+        counts = np.bincount(self.lane, minlength=n)
+        return tuple(float(c) * 3600.0 / horizon for c in counts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demand:
+    """How many vehicles come, from where, and where to.
+
+    Attributes:
+        density: mean inflow a lane [veh/h]; with a split, the mean over all lanes.
+        split: shares of the lanes, such as (4, 3, 2, 1); None is balanced.
+        turns: shares of the manoeuvres 1 … n−1, the same on every lane; None is uniform.
+        model: of the arrivals: "poisson" counts in every second (the paper's), "exponential"
+            headways, or headways "shifted" by `min_headway` (all with the same mean).
+        min_headway: of the shifted model [s].
+    """
+
+    density: float
+    split: tuple[float, ...] | None = None
+    turns: tuple[float, ...] | None = None
+    model: str = "poisson"
+    min_headway: float = 1.5
+
+    def __post_init__(self) -> None:
+        number("density [veh/h/lane]", self.density, low=0, high=MAX_DENSITY)
+        for name in ("split", "turns"):
+            value = getattr(self, name)
+            if value is not None:
+                shares = numbers(name, value)
+                if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
+                    raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
+                object.__setattr__(self, name, shares)
+        choice("arrival model", self.model, MODELS)
+        number("min_headway [s]", self.min_headway, low=0, high=60)
+
+    def rates(self, n: int) -> tuple[float, ...]:
+        """Mean inflow of each of n lanes [veh/h]."""
+        shares = _shares("split", self.split, n, "lanes")
+        rates = tuple(self.density * n * share for share in shares)
+        if max(rates) > MAX_DENSITY:
+            raise InputError(
+                f"the split gives a lane {max(rates):g} veh/h; at most {MAX_DENSITY:g} are allowed"
+            )
+        return rates
+
+    def draw(self, n: int, duration: float, seed: int) -> Arrivals:
+        """Draw the arrivals of `duration` seconds on n lanes.
+
+        Manoeuvres are drawn independently. (The authors drew them without replacement within a
+        second, which ends the run when more vehicles come than there are manoeuvres; at 350
+        veh/h/lane that touches 0.4 % of the lane-seconds.)
+        """
+        number("duration [s]", duration, above=0, high=1e7)
+        turns = _shares("turns", self.turns, n - 1, "manoeuvres")
+        rng = stream(seed, "arrivals")
+        times = [self._lane_times(rate / 3600.0, duration, rng) for rate in self.rates(n)]
+        lane = np.repeat(np.arange(n), [len(t) for t in times])
+        time = np.concatenate(times)
+        order = np.lexsort((lane, time))
+        manoeuvre = stream(seed, "manoeuvres").choice(
+            np.arange(1, n), size=len(time), p=np.array(turns)
+        )
+        return Arrivals(time[order], lane[order], manoeuvre)
+
+    def _lane_times(self, rate: float, duration: float, rng: np.random.Generator) -> Floats:
+        """Arrival times on one lane with `rate` veh/s."""
+        if rate == 0.0:
+            return np.empty(0)
+        if self.model == "poisson":
+            counts = rng.poisson(rate, size=math.ceil(duration))
+            seconds = np.repeat(np.arange(len(counts), dtype=float), counts)
+            return seconds[seconds < duration]
+        shift = self.min_headway if self.model == "shifted" else 0.0
+        if rate * shift >= 1.0:
+            raise InputError(
+                f"{rate * 3600:g} veh/h leave no room for a min_headway of {shift:g} s"
+            )
+        times: list[Floats] = []
+        last = 0.0
+        while last < duration:
+            headways = shift + rng.exponential(1.0 / rate - shift, size=256)
+            times.append(last + np.cumsum(headways))
+            last = float(times[-1][-1])
+        drawn = np.concatenate(times)
+        return drawn[drawn < duration]
+
+
+def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:
+    """Read an arrival table from a CSV file with the columns `COLUMNS`; lanes by letter.
+
+    Raises:
+        FileError: unreadable, a column missing, or a broken line (named by its number), or a lane
+            or manoeuvre that n arms do not have.
+    """
+    instance("arrivals file", path, (str, os.PathLike))
+    times, lanes, manoeuvres = [], [], []
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            missing = [c for c in COLUMNS if c not in (reader.fieldnames or ())]
+            if missing:
+                raise FileError(
+                    f"{path}: column {', '.join(missing)} missing; needed: {', '.join(COLUMNS)}"
+                )
+            for row in reader:
+                time, lane, manoeuvre = _parse_row(path, reader.line_num, row, n)
+                times.append(time)
+                lanes.append(lane)
+                manoeuvres.append(manoeuvre)
+    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
+        raise FileError(f"cannot read arrivals from {path}: {error}") from error
+    return Arrivals(
+        np.array(times, dtype=np.float64), np.array(lanes, dtype=np.int64),
+        np.array(manoeuvres, dtype=np.int64),
+    )  # fmt: skip
+
+
+def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
+    """Write an arrival table as `read_arrivals` reads it; raises `FileError`."""
+    instance("arrivals file", path, (str, os.PathLike))
+    arrivals.check(len(ARM_NAMES))
+    try:
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(COLUMNS)
+            for time, lane, manoeuvre in zip(
+                arrivals.time.tolist(), arrivals.lane, arrivals.manoeuvre, strict=True
+            ):
+                writer.writerow([time, ARM_NAMES[lane], manoeuvre])
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot write arrivals to {path}: {error}") from error
+
+
+def _parse_row(
+    path: str | os.PathLike[str], line: int, row: dict[str, str], n: int | None
+) -> tuple[float, int, int]:
+    where = f"{path}, line {line}"
+    texts = [row.get(column) for column in COLUMNS]
+    if None in row or None in texts:
+        raise FileError(f"{where}: expected {len(COLUMNS)} values, {', '.join(COLUMNS)}")
+    time_text, lane_text, manoeuvre_text = (str(t).strip() for t in texts)
+    lanes = ARM_NAMES[: n or len(ARM_NAMES)]
+    try:
+        time = number("demand_time_s", float(time_text), low=0)
+    except ValueError:
+        raise FileError(f"{where}: demand_time_s must be a number ≥ 0, got {time_text!r}") from None
+    if len(lane_text) != 1 or lane_text not in lanes:
+        raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {lane_text!r}")
+    try:
+        manoeuvre = integer("manoeuvre", int(manoeuvre_text), low=1, high=len(lanes) - 1)
+    except ValueError:
+        raise FileError(
+            f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {manoeuvre_text!r}"
+        ) from None
+    return time, lanes.index(lane_text), manoeuvre
+
+
+def _shares(
+    name: str, shares: tuple[float, ...] | None, count: int, things: str
+) -> tuple[float, ...]:
+    if shares is None:
+        return (1.0 / count,) * count
+    if len(shares) != count:
+        raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
+    total = sum(shares)
+    return tuple(share / total for share in shares)
+
+
+def _column(name: str, value: npt.ArrayLike, dtype: type) -> npt.NDArray[np.generic]:
+    wanted = InputError(f"{name} must be a one-dimensional column of {dtype.__name__} numbers")
+    try:
+        raw = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):
+        raise wanted from None
+    if raw.ndim != 1 or raw.dtype.kind not in "iuf":
+        raise wanted
+    with np.errstate(invalid="ignore", over="ignore"):
+        column = raw.astype(dtype)
+    if not np.array_equal(column, raw, equal_nan=True):
+        raise wanted
+    return column

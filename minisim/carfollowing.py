@@ -1,0 +1,113 @@
+"""Car-following laws as pure functions of plain floats, compiled where numba is installed.
+
+All in SI units. Positions and speeds advance by the ballistic rule (`ballistic`), so an
+acceleration here is what a vehicle keeps for one step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from minisim.jit import njit, njit_inline
+
+
+@njit_inline
+def free_road(v: float, v0: float, a: float, b: float, delta: float) -> float:
+    """IDM acceleration on an empty road, a·(1 − (v/v0)^δ) [m/s²].
+
+    Above the desired speed (a limit that begins late) it brakes at b at most.
+    Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 3 without interaction.
+    """
+    r = v / v0
+    if delta == 4.0:
+        r = r * r
+        power = r * r
+    else:
+        power = r**delta
+    acc = a * (1.0 - power)
+    return acc if acc > -b else -b
+
+
+@njit_inline
+def gap_ratio(
+    v: float, gap: float, v_leader: float, a: float, b: float, headway: float, min_gap: float
+) -> float:
+    """Desired over actual gap, z = s*/gap, with s* = s0 + max(0, vT + v·Δv / (2√(ab))).
+
+    Infinite for a gap ≤ 0: that is a collision, and no floor hides it. Of several leaders the
+    one with the largest z decides, in the IDM as in the improved one.
+    Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 4; Δv = v − v_leader.
+    """
+    if gap <= 0.0:
+        return math.inf
+    dynamic = v * headway + v * (v - v_leader) / (2.0 * math.sqrt(a * b))
+    return (min_gap + (dynamic if dynamic > 0.0 else 0.0)) / gap
+
+
+@njit_inline
+def idm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> float:
+    """IDM acceleration, a·(1 − (v/v0)^δ − z²) [m/s²], z from `gap_ratio` (0 without a leader).
+
+    Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 3.
+    """
+    return free_road(v, v0, a, b, delta) - a * z * z
+
+
+@njit_inline
+def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> float:
+    """Improved IDM acceleration [m/s²]: the equilibrium gap is s0 + vT up to v0 itself.
+
+    Source: Treiber, Kesting, Traffic Flow Dynamics, 2013, ch. 11.3.7.
+    """
+    if v > v0:
+        acc_free = -b * float(1.0 - (v0 / v) ** (a * delta / b))
+        return acc_free + a * (1.0 - z * z) if z >= 1.0 else acc_free
+    if z >= 1.0:
+        return a * (1.0 - z * z)
+    acc_free = free_road(v, v0, a, b, delta)
+    if acc_free <= 0.0:  # v = v0: the exponent 2a/a_free is infinite and its term vanishes
+        return acc_free
+    return acc_free * float(1.0 - z ** (2.0 * a / acc_free))
+
+
+@njit_inline
+def speed_towards(v: float, v_target: float, distance: float, b: float, dt: float) -> float:
+    """Highest speed after one step that still allows `v_target` at `distance`, braking at b.
+
+    Solves (v + v')/2·dt + (v'² − v_target²)/(2b) = distance for v'; a negative result means that
+    the vehicle has to stop within this step. A vehicle that follows this bound brakes at exactly
+    b and not a moment earlier than it must; with v_target = 0 it is a hold line.
+    The same construction is Krauß's safe speed (1998, §2) with a ballistic step.
+    """
+    half = 0.5 * b * dt
+    disc = half * half + v_target * v_target + 2.0 * b * distance - b * dt * v
+    if disc < 0.0:
+        return v - b * dt
+    return math.sqrt(disc) - half
+
+
+@njit_inline
+def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
+    """Position and speed after one step of constant acceleration; a vehicle never reverses.
+
+    A vehicle that would reverse stops where its speed reaches zero.
+    Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10.
+    """
+    v_new = v + acc * dt
+    if v_new < 0.0:
+        return s - v * v / (2.0 * acc), 0.0
+    return s + v * dt + 0.5 * acc * dt * dt, v_new
+
+
+@njit
+def safe_insertion_speed(
+    gap: float, v_leader: float, b: float, headway: float, min_gap: float
+) -> float:
+    """Highest speed with gap ≥ s0 + vT + v²/2b − v_leader²/2b; negative when there is none.
+
+    SUMO's insertion rule (VehicleInsertion: the follower must be able to brake safely).
+    """
+    room = gap - min_gap
+    if room < 0.0:
+        return -1.0
+    return math.sqrt(b * b * headway * headway + v_leader * v_leader + 2.0 * b * room) - b * headway

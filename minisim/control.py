@@ -1,0 +1,286 @@
+"""What a controller sees and may command: the only room that `dim` and `baselines` look into.
+
+A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
+`controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
+The host then advances alone until one of the plan's wake-ups, shows the session a `View`, and
+carries out the commands that it answers with. No session is called every step unless its plan
+has a period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from minisim.errors import InputError, instance, integer, number, numbers
+from minisim.geometry import Bools, Intersection, Movement
+from minisim.vehicle import VehicleType
+
+#: Room kept between two corridors that may be driven at once [m]: the static buffer of 0.25 m
+#: around each body in Dresner & Stone, JAIR 31 (2008), §3.
+CLEARANCE = 0.5
+
+#: Margin before a vehicle counts as unable to stop [m]: less than what a held vehicle leaves
+#: before its line (`minisim.state.STOP_MARGIN`), so that a vehicle that brakes for the junction
+#: entry never counts as committed; more than rounding, so that one that can stop always does.
+COMMIT_MARGIN = 0.1
+
+
+@dataclass(frozen=True)
+class Site:
+    """What a controller may know before the first vehicle comes.
+
+    Attributes:
+        intersection: its geometry.
+        vehicle: the vehicles' type.
+        speed_limit: of the roads [m/s].
+        demand: expected inflow of each lane [veh/h].
+        dt: step of the host [s].
+        seed: of the run, for controllers that draw random numbers (`minisim.streams`).
+    """
+
+    intersection: Intersection
+    vehicle: VehicleType
+    speed_limit: float
+    demand: tuple[float, ...]
+    dt: float = 0.1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        instance("intersection", self.intersection, Intersection)
+        instance("vehicle", self.vehicle, VehicleType)
+        number("speed_limit [m/s]", self.speed_limit, above=0, high=100)
+        object.__setattr__(self, "demand", numbers("demand [veh/h]", self.demand))
+        if len(self.demand) != self.intersection.n or min(self.demand) < 0:
+            raise InputError(
+                f"demand must be {self.intersection.n} numbers ≥ 0 [veh/h], got {self.demand}"
+            )
+        number("dt [s]", self.dt, low=0.001, high=0.5)
+        integer("seed", self.seed, low=0)
+        if self.intersection.room(self.vehicle) <= 0.0:
+            raise InputError(
+                f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
+                f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                "touch another that waits beside it"
+            )
+
+    @cached_property
+    def conflicts(self) -> Bools:
+        """Whether two movements of different arms must not be driven at once, shape (m, m).
+
+        Movements of one arm share their lane: they follow each other and are no conflict here.
+        """
+        movements = self.intersection.movements
+        origin = np.array([m.origin for m in movements])
+        apart = origin[:, None] != origin[None, :]
+        return self.intersection.conflicts(self.vehicle, CLEARANCE) & apart
+
+
+class Observed(NamedTuple):
+    """One vehicle in a view.
+
+    Attributes:
+        id: of the vehicle; the same in every view of a run.
+        lane: index of its approach lane.
+        manoeuvre: 1 … n−1.
+        distance: from its front bumper to the junction entry [m]; negative inside.
+        speed: [m/s].
+        length: [m].
+    """
+
+    id: int
+    lane: int
+    manoeuvre: int
+    distance: float
+    speed: float
+    length: float
+
+    @property
+    def movement(self) -> Movement:
+        """Origin and manoeuvre."""
+        return Movement(self.lane, self.manoeuvre)
+
+
+def stopping_distance(speed: float, deceleration: float) -> float:
+    """Distance to standstill at constant braking, v²/2b [m]."""
+    return speed * speed / (2.0 * deceleration)
+
+
+def can_stop(vehicle: Observed, deceleration: float) -> bool:
+    """Whether comfortable braking still stops the vehicle before the junction.
+
+    Every observer sees that from position and speed alone.
+    """
+    needed = vehicle.speed * vehicle.speed / (2.0 * deceleration)
+    return needed + COMMIT_MARGIN <= vehicle.distance or (
+        vehicle.speed == 0.0 and vehicle.distance >= 0.0
+    )
+
+
+class View(NamedTuple):
+    """What the session is shown at a wake-up.
+
+    Attributes:
+        time: [s].
+        vehicles: every vehicle from `Plan.sight` before the junction until its rear bumper has
+            left it; ordered by lane, then front to back (vehicles inside the junction first).
+    """
+
+    time: float
+    vehicles: tuple[Observed, ...]
+
+
+class Go(NamedTuple):
+    """Give one vehicle the right of way: its hold line no longer holds it."""
+
+    vehicle: int
+
+
+class Hold(NamedTuple):
+    """Take one vehicle's right of way: it stops at its hold line.
+
+    Where comfortable braking no longer reaches the hold line, it stops before the junction if
+    its brakes can; inside the junction a hold has no effect.
+    """
+
+    vehicle: int
+
+
+class Open(NamedTuple):
+    """Give a whole lane the right of way (a green signal)."""
+
+    lane: int
+
+
+class Close(NamedTuple):
+    """Take it back; vehicles with a `Go` of their own keep that."""
+
+    lane: int
+
+
+class Advise(NamedTuple):
+    """Cap one vehicle's speed at `speed` [m/s] until advised again; infinity lifts the cap."""
+
+    vehicle: int
+    speed: float
+
+
+class Wake(NamedTuple):
+    """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
+
+    time: float
+
+
+Command = Go | Hold | Open | Close | Advise | Wake
+
+
+@dataclass(frozen=True)
+class Marking:
+    """A stretch of approach lane, from `start` down to `end` metres before the junction entry.
+
+    Attributes:
+        name: shown in figures ("red", "yellow", "green" are drawn in their colour).
+        start, end: distance before the junction entry [m], start > end ≥ 0.
+        speed: limit on it [m/s], or None. A vehicle slows for it ahead of `start`.
+    """
+
+    name: str
+    start: float
+    end: float
+    speed: float | None = None
+
+    def __post_init__(self) -> None:
+        instance("name of a marking", self.name, str)
+        number(f"end of marking {self.name} [m]", self.end, low=0)
+        number(f"start of marking {self.name} [m]", self.start, above=self.end)
+        if self.speed is not None:
+            number(f"speed of marking {self.name} [m/s]", self.speed, above=0, high=100)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What a session needs of its host.
+
+    Attributes:
+        hold_distance: the hold line's distance before the junction entry [m].
+        markings: road markings of every approach lane.
+        marks: wake when a front bumper passes one of these distances [m] before the junction
+            entry; 0 is the entry itself.
+        wake_on_clear: wake when a rear bumper leaves the junction.
+        period: wake every so many seconds, or None.
+        sight: how far before the junction entry a view reaches [m].
+        lanes_open: whether lanes start open; otherwise everyone is held until told to go.
+    """
+
+    hold_distance: float = 0.0
+    markings: tuple[Marking, ...] = ()
+    marks: tuple[float, ...] = ()
+    wake_on_clear: bool = False
+    period: float | None = None
+    sight: float = 50.0
+    lanes_open: bool = False
+
+    def __post_init__(self) -> None:
+        number("hold_distance [m]", self.hold_distance, low=0, high=1000)
+        number("sight [m]", self.sight, low=0)
+        instance("markings", self.markings, tuple)
+        for marking in self.markings:
+            instance("marking", marking, Marking)
+        instance("wake_on_clear", self.wake_on_clear, bool)
+        instance("lanes_open", self.lanes_open, bool)
+        for mark in numbers("marks [m]", self.marks):
+            number("mark [m]", mark, low=0)
+        if self.period is not None:
+            number("period [s]", self.period, above=0)
+
+
+@runtime_checkable
+class Session(Protocol):
+    """One run's side of a controller: it may remember things."""
+
+    @property
+    def plan(self) -> Plan:
+        """What it needs of its host; read once, after `start`."""
+
+    def decide(self, view: View) -> Iterable[Command]:
+        """Answer a view with commands; all are collected before any is carried out.
+
+        Called once at time 0, then at every wake-up.
+        """
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """A recipe for sessions: hashable, picklable, never changed by a run."""
+
+    @property
+    def name(self) -> str:
+        """Short name, as on the command line."""
+
+    def start(self, site: Site) -> Session:
+        """Begin a run. Raises `InputError` for a site that it cannot serve."""
+
+
+@dataclass(frozen=True)
+class Unregulated:
+    """Everyone goes, whoever else does: what happens without any rule.
+
+    For tests of the host and for teaching; it collides as soon as there is cross traffic.
+    """
+
+    name: str = "unregulated"
+
+    def start(self, site: Site) -> Session:
+        """Open every lane, for good."""
+        return _UnregulatedSession()
+
+
+class _UnregulatedSession:
+    plan = Plan(lanes_open=True)
+
+    def decide(self, view: View) -> tuple[Command, ...]:
+        return ()

@@ -1,0 +1,126 @@
+"""What minisim raises, and the checks that turn bad input into one clear sentence.
+
+Every message names the value, what is allowed and where it came from, so that the
+command line can print it as it is.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from numbers import Integral, Real
+
+
+class MinisimError(Exception):
+    """Parent of everything minisim raises on purpose."""
+
+
+class InputError(MinisimError, ValueError):
+    """A value that a caller gave is not allowed."""
+
+
+class FileError(MinisimError):
+    """A file cannot be read or written, or its content is broken."""
+
+
+class CollisionError(MinisimError):
+    """Two bodies touched and the caller did not ask to record and go on."""
+
+
+class ControllerError(MinisimError):
+    """A controller broke its contract (`minisim.control`)."""
+
+
+class MissingExtraError(MinisimError):
+    """An optional dependency is needed and not installed."""
+
+
+def number(
+    name: str,
+    value: object,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    above: float = -math.inf,
+    below: float = math.inf,
+) -> float:
+    """Return `value` as a finite float inside [low, high] and (above, below), or raise.
+
+    Raises:
+        InputError: not a real number, not finite, or out of range.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"{name} must be a number, got {show(value)}")
+    try:
+        result = float(value)
+    except OverflowError:
+        raise InputError(f"{name} is too large: {show(value)}") from None
+    inside = low <= result <= high and above < result < below
+    if not math.isfinite(result) or not inside:
+        raise InputError(f"{name} must be {_range(low, high, above, below)}, got {show(value)}")
+    return result
+
+
+def integer(name: str, value: object, *, low: int, high: int | None = None) -> int:
+    """Return `value` as an int inside [low, high], or raise `InputError`."""
+    allowed = f"an integer of at least {low}" if high is None else f"an integer {low} … {high}"
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise InputError(f"{name} must be {allowed}, got {show(value)}")
+    result = int(value)
+    if result < low or (high is not None and result > high):
+        raise InputError(f"{name} must be {allowed}, got {show(value)}")
+    return result
+
+
+def choice(name: str, value: object, allowed: Iterable[str]) -> str:
+    """Return `value` when it is one of `allowed`; otherwise raise with the nearest ones."""
+    options = list(allowed)
+    if isinstance(value, str) and value in options:
+        return value
+    text = value if isinstance(value, str) else ""
+    close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise InputError(f"unknown {name} {show(value)}; allowed: {', '.join(options)}{hint}")
+
+
+def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
+    """Raise `InputError` unless `value` is a `kind`."""
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        wanted = " or ".join(k.__name__ for k in kinds)
+        raise InputError(f"{name} must be a {wanted}, got {show(value)}")
+
+
+def numbers(name: str, value: object) -> tuple[float, ...]:
+    """Return `value`, any sequence of finite numbers, as a tuple of floats, or raise."""
+    wanted = InputError(f"{name} must be a sequence of numbers, got {show(value)}")
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise wanted
+    try:
+        items = list(value)
+    except TypeError:  # an array without dimensions says that it is iterable
+        raise wanted from None
+    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(items))
+
+
+def show(value: object) -> str:
+    """`repr(value)`, cut to a line; Python refuses to print integers of thousands of digits."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return f"a {type(value).__name__} too large to print"
+    return text if len(text) <= 200 else f"{text[:200]}…"
+
+
+def _range(low: float, high: float, above: float, below: float) -> str:
+    parts = []
+    if math.isfinite(above):
+        parts.append(f"above {above:g}")
+    elif math.isfinite(low):
+        parts.append(f"at least {low:g}")
+    if math.isfinite(below):
+        parts.append(f"below {below:g}")
+    elif math.isfinite(high):
+        parts.append(f"at most {high:g}")
+    return " and ".join(parts) if parts else "a finite number"

@@ -1,0 +1,538 @@
+"""`Simulation`, the one mutable object of a run, and `simulate`, which makes one and runs it."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from minisim import kernel
+from minisim.arrivals import Arrivals
+from minisim.collision import Body, Collision, touching
+from minisim.control import (
+    Advise,
+    Close,
+    Command,
+    Controller,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Plan,
+    Session,
+    Site,
+    View,
+    Wake,
+)
+from minisim.errors import (
+    CollisionError,
+    ControllerError,
+    InputError,
+    choice,
+    instance,
+    integer,
+    number,
+    numbers,
+)
+from minisim.geometry import ARM_NAMES
+from minisim.recording import TRAJECTORY_COLUMNS
+from minisim.state import (
+    DRIVING,
+    NEVER,
+    OBSERVED,
+    TRACE,
+    Records,
+    build_lanes,
+    build_law,
+    build_road,
+    build_vehicles,
+    first_tick,
+)
+from minisim.trips import Trips, collect_trips, summarise, trip_table
+from minisim.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RECORDS = ("junction", "all")
+ON_COLLISION = ("stop", "record")
+
+
+class ScenarioLike(Protocol):
+    """What a run needs of a scenario (`scenarios.Scenario` is one)."""
+
+    @property
+    def name(self) -> str:
+        """Such as "four-way"."""
+
+    @property
+    def profile_name(self) -> str:
+        """Such as "paper"."""
+
+    @property
+    def density(self) -> float:
+        """Mean inflow a lane [veh/h]."""
+
+    @property
+    def horizon(self) -> float:
+        """Simulated time [s]."""
+
+    @property
+    def depart_speed(self) -> float | None:
+        """At insertion [m/s]; None is the highest safe one."""
+
+    def site(self, seed: int) -> Site:
+        """What the controller may know."""
+
+    def arrivals(self, seed: int) -> Arrivals:
+        """The arrival table."""
+
+
+class Simulation:
+    """One run: vehicles on their paths, advanced under a controller.
+
+    Args:
+        scenario: what to simulate.
+        controller: who decides; its session is private to this run.
+        seed: of the run's random streams.
+        record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
+        record_window: from and to [s].
+        on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
+
+    Raises:
+        InputError: a value that is not allowed, or a scenario that the controller cannot serve.
+    """
+
+    def __init__(
+        self,
+        scenario: ScenarioLike,
+        controller: Controller,
+        *,
+        seed: int = 0,
+        record: str | None = None,
+        record_window: tuple[float, float] = (0.0, math.inf),
+        on_collision: str = "stop",
+    ) -> None:
+        _check_scenario(scenario)
+        if not isinstance(controller, Controller) or isinstance(controller, type):
+            raise InputError(f"controller must be a Controller such as Dim(), got {controller!r}")
+        self.scenario = scenario
+        self.controller = controller
+        self.seed = integer("seed", seed, low=0)
+        if record is not None:
+            choice("record", record, RECORDS)
+        self.record = record
+        self._stop_on_collision = choice("on_collision", on_collision, ON_COLLISION) == "stop"
+
+        self.site = scenario.site(seed)
+        arrivals = scenario.arrivals(seed)
+        arrivals.check(self.site.intersection.n)
+        self._demand_time = arrivals.time
+        self._session = controller.start(self.site)
+        self.plan = _plan_of(self._session, controller)
+        self._road = build_road(self.site, self.plan)
+        self._law = build_law(
+            self.site,
+            self.plan,
+            depart_speed=scenario.depart_speed,
+            record=record,
+            record_window=_window(record_window),
+        )
+        self._vehicles = build_vehicles(self.site, arrivals)
+        self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
+        self._row = np.argsort(self._vehicles["id"]).tolist()
+        self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
+        self._traces: list[Records] = []
+        self._traced = 0
+        self._bodies = np.zeros((16 * self.site.intersection.n, 5))
+        self._observed = np.zeros(len(self._vehicles) + 1, OBSERVED)
+        self._collisions: dict[tuple[int, int], Collision] = {}
+        self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
+        self._wake_tick = NEVER
+        self._started = False
+        self._done = False
+        self.tick = 0
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.tick * self.site.dt
+
+    @property
+    def finished(self) -> bool:
+        """Whether the horizon is reached or every vehicle has arrived."""
+        return self._done or self.tick >= self._horizon_tick
+
+    @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """The collisions so far, each pair of vehicles once."""
+        return tuple(self._collisions.values())
+
+    def advance(self, until: float) -> None:
+        """Advance to time `until` [s], to the horizon, or to the last arrival.
+
+        Raises:
+            CollisionError: two bodies touched, unless collisions are only recorded.
+            ControllerError: the controller answered with something that is not a command.
+        """
+        target = min(
+            first_tick(number("until [s]", until, low=0), self.site.dt), self._horizon_tick
+        )
+        if not self._started:
+            self._started = True
+            self._decide()
+        while self.tick < target and not self._done:
+            self.tick, reasons, self._traced = kernel.advance(
+                self._vehicles,
+                self._lanes,
+                self._road,
+                self._law,
+                self._trace,
+                self._traced,
+                self._bodies,
+                self.tick,
+                min(target, self._wake_tick),
+            )
+            if reasons & kernel.TRACE_FULL:
+                self._keep_trace()
+            if reasons & (kernel.TOUCH | kernel.GAP):
+                self._check_collisions()
+            self._done = bool(reasons & kernel.DONE)
+            if reasons & (kernel.MARK | kernel.CLEAR) or self.tick >= self._wake_tick:
+                self._decide()
+
+    def run(self) -> Run:
+        """Advance to the end and return the result."""
+        self.advance(self._horizon_tick * self.site.dt)
+        return self.result()
+
+    def view(self) -> View:
+        """What a session would be shown now."""
+        count = kernel.observe(
+            self._vehicles,
+            self._lanes,
+            self._observed,
+            self._law.entry,
+            self._law.sight,
+            self._law.length,
+            self.site.intersection.n - 1,
+        )
+        return View(self.time, tuple(map(Observed._make, self._observed[:count].tolist())))
+
+    def result(self) -> Run:
+        """The result so far."""
+        self._keep_trace()
+        horizon = self._horizon_tick * self.site.dt
+        return Run(
+            scenario=self.scenario,
+            controller=self.controller,
+            seed=self.seed,
+            site=self.site,
+            plan=self.plan,
+            collisions=self.collisions,
+            columns=collect_trips(
+                self._vehicles,
+                self._demand_time,
+                self.site.intersection.n,
+                self.site.dt,
+                horizon if self._done else self.time,
+            ),
+            record=self.record,
+            trace=np.concatenate([*self._traces, self._trace[:0]]),
+            rows=self._vehicles[["id", "path"]].copy(),
+        )
+
+    def _decide(self) -> None:
+        if self.tick >= self._wake_tick:
+            self._wake_tick = NEVER
+        commands = list(self._session.decide(self.view()))
+        for command in commands:
+            self._apply(command)
+        if self.plan.period is not None:
+            self._wake_tick = self.tick + max(1, first_tick(self.plan.period, self.site.dt))
+
+    def _apply(self, command: Command) -> None:
+        kind = type(command)
+        try:
+            if kind is Go:
+                self._vehicles["go"][self._row_of(command[0])] = 1
+            elif kind is Hold:
+                self._vehicles["go"][self._row_of(command[0])] = 0
+            elif kind is Open or kind is Close:
+                lane = integer("lane", command[0], low=0, high=len(self._lanes) - 1)
+                self._lanes["open"][lane] = kind is Open
+            elif isinstance(command, Advise):
+                speed = math.inf if command.speed == math.inf else command.speed
+                if speed != math.inf:
+                    speed = number("advised speed [m/s]", speed, low=0)
+                self._vehicles["advice"][self._row_of(command.vehicle)] = speed
+            elif isinstance(command, Wake):
+                tick = first_tick(number("wake-up time [s]", command.time), self.site.dt)
+                if tick <= self.tick:
+                    raise InputError(
+                        f"wake-up time {command.time:g} s is not after {self.time:g} s"
+                    )
+                self._wake_tick = tick
+            else:
+                raise InputError(f"{command!r} is not a command")
+        except InputError as error:
+            raise ControllerError(
+                f"controller {self.controller.name!r} at {self.time:.1f} s: {error}"
+            ) from error
+
+    def _row_of(self, vehicle: int) -> int:
+        row: int = self._row[integer("vehicle", vehicle, low=0, high=len(self._row) - 1)]
+        return row
+
+    def _check_collisions(self) -> None:
+        """Ask pymunk which bodies touch; in a lane the gap tells."""
+        found = []
+        rows, bodies = self._near_bodies()
+        for i, j in touching(bodies):
+            found.append((rows[i], rows[j]))
+        found += self._overlaps_in_lane()
+        new = []
+        for i, j in found:
+            collision = self._describe(i, j)
+            if collision.vehicles not in self._collisions:
+                self._collisions[collision.vehicles] = collision
+                new.append(collision)
+        if new and self._stop_on_collision:
+            raise CollisionReport(new, self)
+
+    def _near_bodies(self) -> tuple[list[int], list[Body]]:
+        """Rows and bodies of all vehicles in and near the junction."""
+        v, vehicle = self._vehicles, self.site.vehicle
+        paths = self.site.intersection.paths
+        rows, bodies = [], []
+        for i in np.flatnonzero(v["status"] == DRIVING).tolist():
+            path, s = paths[v["path"][i]], float(v["s"][i])
+            if path.entry - vehicle.length <= s <= path.exit + 2 * vehicle.length:
+                centre, heading = path.pose(s, vehicle.length)
+                rows.append(i)
+                bodies.append(
+                    Body(*centre.tolist(), *heading.tolist(), vehicle.length, vehicle.width)
+                )
+        return rows, bodies
+
+    def _overlaps_in_lane(self) -> list[tuple[int, int]]:
+        """Rows of the vehicles whose front has reached the rear of the one ahead."""
+        v, law = self._vehicles, self._law
+        exits = self._road.ends[:, 0]
+        driving = np.flatnonzero(v["status"] == DRIVING)
+        found = []
+        for i in driving.tolist():
+            p = v["path"][i]
+            j = i - 1
+            if j >= 0 and v["lane"][j] == v["lane"][i] and v["status"][j] == DRIVING:
+                rear = v["s"][j] - law.length
+                if rear <= v["s"][i] and rear < self._road.branch[v["path"][j], p]:
+                    found.append((j, i))
+            j = int(v["ahead"][i])
+            if j >= 0 and v["status"][j] == DRIVING and v["s"][i] >= exits[p]:
+                rear = v["s"][j] - law.length - exits[v["path"][j]]
+                if rear <= v["s"][i] - exits[p]:
+                    found.append((j, i))
+        return found
+
+    def _describe(self, i: int, j: int) -> Collision:
+        v = self._vehicles
+        i, j = sorted((i, j), key=lambda row: int(v["id"][row]))
+        movements = self.site.intersection.movements
+        return Collision(
+            time=self.time,
+            vehicles=(int(v["id"][i]), int(v["id"][j])),
+            movements=(str(movements[v["path"][i]]), str(movements[v["path"][j]])),
+            positions=(float(v["s"][i]), float(v["s"][j])),
+            speeds=(float(v["v"][i]), float(v["v"][j])),
+        )
+
+    def _keep_trace(self) -> None:
+        self._traces.append(self._trace[: self._traced].copy())
+        self._traced = 0
+
+
+class CollisionReport(CollisionError):
+    """The collisions that stopped a run, and how to see them again.
+
+    Attributes:
+        collisions: those of the step at which the run stopped.
+        simulation: the stopped run.
+    """
+
+    def __init__(self, collisions: list[Collision], simulation: Simulation) -> None:
+        self.collisions = tuple(collisions)
+        self.simulation = simulation
+        what = "; ".join(str(c) for c in collisions)
+        super().__init__(
+            f"{what} (scenario {simulation.scenario.name}, controller "
+            f"{simulation.controller.name}, seed {simulation.seed})"
+        )
+
+    def replay(self, seconds: float = 10.0) -> Run:
+        """Run again up to a little after the collision and record its last `seconds` [s]."""
+        stopped = self.simulation
+        again = Simulation(
+            stopped.scenario,
+            stopped.controller,
+            seed=stopped.seed,
+            record="all",
+            record_window=(max(0.0, stopped.time - seconds), math.inf),
+            on_collision="record",
+        )
+        again.advance(stopped.time + 2.0)
+        return again.result()
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """The result of a run.
+
+    Attributes:
+        scenario, controller, seed: what was run.
+        site, plan: what the controller knew and asked for.
+        collisions: each pair of vehicles once.
+        columns: the trips as arrays.
+        record: what was recorded of the trajectories.
+        trace, rows: the recording, and each row's vehicle id and path.
+    """
+
+    scenario: ScenarioLike
+    controller: Controller
+    seed: int
+    site: Site
+    plan: Plan
+    collisions: tuple[Collision, ...]
+    columns: Trips
+    record: str | None
+    trace: Records
+    rows: Records
+
+    @cached_property
+    def trips(self) -> pd.DataFrame:
+        """One row a trip in demand order, columns `minisim.trips.TRIP_COLUMNS`."""
+        return trip_table(self.columns)
+
+    def summary(self) -> dict[str, Any]:
+        """What was run and its means; see `minisim.trips.summarise`."""
+        return {
+            "controller": self.controller.name,
+            "scenario": self.scenario.name,
+            "profile": self.scenario.profile_name,
+            "density": self.scenario.density,
+            "seed": self.seed,
+            "horizon_s": self.scenario.horizon,
+            **summarise(self.columns, self.site.intersection.n),
+            "collisions": len(self.collisions),
+        }
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """Version, environment and parameters: all that is needed to run it again."""
+        return {
+            "minisim": VERSION,
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scenario": repr(self.scenario),
+            "controller": repr(self.controller),
+            "seed": str(self.seed),
+        }
+
+    @cached_property
+    def trajectories(self) -> pd.DataFrame:
+        """One row a vehicle and step, columns `minisim.recording.TRAJECTORY_COLUMNS`.
+
+        Raises:
+            InputError: nothing was recorded.
+        """
+        import pandas as pd
+
+        if self.record is None:
+            raise InputError("no trajectories: simulate with record='junction' or record='all'")
+        trace, paths = self.trace, self.site.intersection.paths
+        path_of = self.rows["path"][trace["row"]]
+        front = np.zeros((len(trace), 2))
+        heading = np.zeros((len(trace), 2))
+        for p in np.unique(path_of).tolist():
+            chosen = path_of == p
+            s = trace["s"][chosen]
+            front[chosen] = paths[p].position(s)
+            heading[chosen] = paths[p].pose(s, self.site.vehicle.length)[1]
+        manoeuvres = self.site.intersection.n - 1
+        columns = (
+            np.round(trace["tick"] * self.site.dt, 6),
+            self.rows["id"][trace["row"]],
+            np.array(list(ARM_NAMES))[path_of // manoeuvres],
+            path_of % manoeuvres + 1,
+            trace["s"],
+            front[:, 0],
+            front[:, 1],
+            np.degrees(np.arctan2(heading[:, 0], heading[:, 1])) % 360.0,
+            trace["v"],
+            trace["a"],
+            trace["released"] != 0,
+        )
+        frame = pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
+        return frame.sort_values(["time_s", "vehicle"], ignore_index=True)
+
+
+def simulate(
+    scenario: ScenarioLike,
+    controller: Controller,
+    seed: int = 0,
+    *,
+    record: str | None = None,
+    record_window: tuple[float, float] = (0.0, math.inf),
+    on_collision: str = "stop",
+) -> Run:
+    """Run a scenario under a controller; see `Simulation` for the arguments and errors.
+
+    Example:
+        >>> import minisim
+        >>> from minisim.testing import small_scenario
+        >>> from minisim.control import Unregulated
+        >>> run = minisim.simulate(small_scenario(density=0), Unregulated())
+        >>> run.summary()["trips"]
+        0
+    """
+    return Simulation(
+        scenario,
+        controller,
+        seed=seed,
+        record=record,
+        record_window=record_window,
+        on_collision=on_collision,
+    ).run()
+
+
+def _check_scenario(scenario: object) -> None:
+    needed = ("name", "profile_name", "density", "horizon", "depart_speed", "site", "arrivals")
+    if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
+        raise InputError(f"scenario must be a Scenario such as four_way(), got {scenario!r}")
+
+
+def _plan_of(session: object, controller: Controller) -> Plan:
+    plan = getattr(session, "plan", None)
+    if not isinstance(plan, Plan) or not isinstance(session, Session):
+        raise ControllerError(
+            f"controller {controller.name!r}: start() must return a Session with a Plan, "
+            f"got {session!r}"
+        )
+    return plan
+
+
+def _window(window: Iterable[float]) -> tuple[float, float]:
+    instance("record_window", window, tuple)
+    if not isinstance(window, tuple) or len(window) != 2:
+        raise InputError(f"record_window must be (from, to) in seconds, got {window!r}")
+    start, end = window
+    end = end if end == math.inf else number("end of record_window [s]", end)
+    start = number("start of record_window [s]", start, low=0)
+    if end < start:
+        raise InputError(f"record_window must not end before it starts, got {window!r}")
+    return numbers("record_window", (start,))[0], end

@@ -1,0 +1,315 @@
+"""The contract of every controller, as a function to call in its tests.
+
+from minisim.testing import check_controller
+
+def test_contract():
+    check_controller(MyController())
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+from minisim.arrivals import Arrivals, Demand
+from minisim.control import (
+    Advise,
+    Close,
+    Command,
+    Controller,
+    Go,
+    Hold,
+    Open,
+    Plan,
+    Session,
+    Site,
+    View,
+    Wake,
+)
+from minisim.errors import ControllerError, MinisimError, instance, integer, number, numbers
+from minisim.geometry import ARM_NAMES, Intersection
+from minisim.simulation import Run, Simulation, simulate
+from minisim.vehicle import VehicleType
+
+#: Time to serve one vehicle that a controller may take after the demand has ended [s], and time
+#: for the roads. An all-way stop, the slowest sensible rule, needs about 2.5 s a vehicle.
+SECONDS_PER_VEHICLE, SECONDS_PER_ROAD = 10.0, 600.0
+
+
+class ContractError(MinisimError, AssertionError):
+    """A controller broke its contract; a failed assertion for test runners."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallScenario:
+    """A scenario for tests: SUMO's passenger car at 14 m/s, and roads that empty at the end.
+
+    Attributes:
+        bearings, side: of the intersection.
+        density: mean inflow a lane while demand lasts [veh/h].
+        demand_time: vehicles come until then [s].
+        drain: how much longer the run goes on [s].
+        vehicle: type of the vehicles.
+        speed_limit: [m/s].
+        arm_length: [m].
+        dt: step [s].
+    """
+
+    bearings: tuple[float, ...] = (0.0, 90.0, 180.0, 270.0)
+    side: Literal["left", "right"] = "left"
+    density: float = 350.0
+    demand_time: float = 300.0
+    drain: float = 0.0
+    vehicle: VehicleType = field(default_factory=VehicleType)
+    speed_limit: float = 14.0
+    arm_length: float = 500.0
+    dt: float = 0.1
+    name: str = "small"
+    profile_name: str = "test"
+    depart_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bearings", numbers("bearings", self.bearings))
+        number("drain [s]", self.drain, low=0, high=1e6)
+        number("demand_time [s]", self.demand_time, above=0, high=1e6)
+        self.site(0)
+
+    @property
+    def horizon(self) -> float:
+        """Simulated time [s]."""
+        return self.demand_time + self.drain
+
+    @cached_property
+    def intersection(self) -> Intersection:
+        """The geometry."""
+        return Intersection(self.bearings, side=self.side, arm_length=self.arm_length)
+
+    def site(self, seed: int) -> Site:
+        """What a controller may know of it."""
+        return Site(
+            intersection=self.intersection,
+            vehicle=self.vehicle,
+            speed_limit=self.speed_limit,
+            demand=Demand(density=self.density).rates(self.intersection.n),
+            dt=self.dt,
+            seed=seed,
+        )
+
+    def arrivals(self, seed: int) -> Arrivals:
+        """Arrivals in the first `demand_time` seconds."""
+        return Demand(density=self.density).draw(self.intersection.n, self.demand_time, seed)
+
+
+def small_scenario(arms: int = 4, *, density: float = 350.0, **options: Any) -> SmallScenario:
+    """A regular junction of so many arms; `options` are the attributes of `SmallScenario`."""
+    integer("arms", arms, low=3, high=len(ARM_NAMES))
+    bearings = tuple(360.0 * i / arms for i in range(arms))
+    return SmallScenario(bearings=bearings, density=density, **options)
+
+
+def drained(
+    arms: int = 4, *, density: float = 350.0, demand_time: float = 300.0, **options: Any
+) -> SmallScenario:
+    """A small scenario that lasts until any controller that serves at all has served everyone."""
+    number("demand_time [s]", demand_time, above=0, high=1e6)
+    vehicles = arms * density * demand_time / 3600.0
+    drain = SECONDS_PER_ROAD + SECONDS_PER_VEHICLE * vehicles
+    return small_scenario(arms, density=density, demand_time=demand_time, drain=drain, **options)
+
+
+def check_controller(
+    controller: Controller,
+    *,
+    arms: Iterable[int] = (3, 4, 5),
+    density: float = 350.0,
+    horizon: float = 300.0,
+    collision_free: bool = True,
+) -> None:
+    """Run a controller through its contract (`minisim.control`).
+
+    A controller is a recipe: it compares, hashes, prints and pickles as a value does, and runs
+    leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
+    same trips, also from a pickled copy and whatever was run in between. Nobody collides, and
+    after the demand has ended everyone is served.
+
+    Args:
+        controller: to check.
+        arms: junctions to check it on.
+        density: mean inflow a lane [veh/h].
+        horizon: how long the demand lasts [s].
+        collision_free: whether collisions break the contract.
+
+    Raises:
+        ContractError: what is broken, in one sentence.
+    """
+    instance("arms", arms, Iterable)
+    if isinstance(controller, type) or not isinstance(controller, Controller):
+        raise ContractError(f"{controller!r} is not a Controller: it needs a name and start(site)")
+    _require(
+        isinstance(controller.name, str) and controller.name != "",
+        controller, f"its name must be a text that is not empty, got {controller.name!r}",
+    )  # fmt: skip
+    copy = _check_value(controller)
+    before = repr(controller), hash(controller)
+    for n in arms:
+        scenario = drained(n, density=density, demand_time=horizon)
+        first = _watched_run(controller, scenario)
+        _check_arrivals(controller, first)
+        if collision_free:
+            _require(
+                not first.collisions,
+                controller,
+                f"vehicles collided: {'; '.join(map(str, first.collisions[:1]))}",
+            )
+        _check_served(controller, first)
+        _require(
+            _same(first, _disturbed_run(controller, scenario)), controller,
+            "a second run with the same seed gave other trips; a run left its traces",
+        )  # fmt: skip
+        _require(
+            _same(first, simulate(scenario, copy, 1, on_collision="record")), controller,
+            "a pickled copy gave other trips",
+        )  # fmt: skip
+    _require(
+        (repr(controller), hash(controller)) == before and controller == copy, controller,
+        "it is not the same after its runs: a run must not change its controller",
+    )  # fmt: skip
+
+
+def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
+    """Check a session's answer to a view.
+
+    Raises:
+        ContractError: not a command, a vehicle that is not in the view, a lane that does not
+            exist, a speed below 0, or a wake-up that is not in the future.
+    """
+    ids = {vehicle.id for vehicle in view.vehicles}
+    for command in commands:
+        problem = _problem(command, ids, view.time, site.intersection.n)
+        if problem:
+            raise ContractError(f"at {view.time:.1f} s: {command!r}: {problem}")
+
+
+def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | None:
+    match command:
+        case Go(vehicle) | Hold(vehicle) | Advise(vehicle, _) if vehicle not in ids:
+            return "this vehicle is not in the view"
+        case Open(lane) | Close(lane) if lane not in range(lanes):
+            return f"there is no such lane (0 … {lanes - 1})"
+        case Advise(_, speed) if not speed >= 0.0:
+            return "a speed must be at least 0 m/s"
+        case Wake(time) if not now < time < math.inf:
+            return "a wake-up must be in the future"
+    return None if isinstance(command, get_args(Command)) else "this is not a command"
+
+
+class _Watched:
+    """A controller whose sessions' answers are checked on the way to the host."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller = controller
+        self.name = controller.name
+
+    def start(self, site: Site) -> Session:
+        session = self._controller.start(site)
+        _require(
+            isinstance(session, Session), self._controller,
+            f"start(site) must give a Session with a plan and decide(view), got {session!r}",
+        )  # fmt: skip
+        _require(
+            isinstance(session.plan, Plan), self._controller,
+            f"the plan of its session must be a Plan, got {session.plan!r}",
+        )  # fmt: skip
+        return _WatchedSession(session, self._controller, site)
+
+
+class _WatchedSession:
+    def __init__(self, session: Session, controller: Controller, site: Site) -> None:
+        self.plan = session.plan
+        self._session, self._controller, self._site = session, controller, site
+
+    def decide(self, view: View) -> tuple[Command, ...]:
+        answer = self._session.decide(view)
+        _require(
+            isinstance(answer, Iterable), self._controller,
+            f"decide(view) must answer with commands, got {answer!r}",
+        )  # fmt: skip
+        commands = tuple(answer)
+        try:
+            check_commands(commands, view, self._site)
+        except ContractError as error:
+            raise ContractError(f"controller {self._controller.name!r} {error}") from None
+        return commands
+
+
+def _check_value(controller: Controller) -> Controller:
+    """Check that the controller behaves as a value; returns a pickled copy of it."""
+    try:
+        hash(controller)
+    except TypeError as error:
+        raise _broken(controller, f"it is not hashable: {error}") from error
+    try:
+        copy: Controller = pickle.loads(pickle.dumps(controller))
+    except (pickle.PicklingError, TypeError, AttributeError) as error:
+        raise _broken(controller, f"it is not picklable: {error}") from error
+    for name, alike in (
+        ("is not equal to it", copy == controller),
+        ("has another hash", hash(copy) == hash(controller)),
+        ("prints as something else", repr(copy) == repr(controller)),
+    ):
+        _require(alike, controller, f"a pickled copy of it {name}")
+    return copy
+
+
+def _watched_run(controller: Controller, scenario: SmallScenario) -> Run:
+    try:
+        return simulate(scenario, _Watched(controller), 1, on_collision="record")
+    except ControllerError as error:
+        raise ContractError(str(error)) from error
+
+
+def _disturbed_run(controller: Controller, scenario: SmallScenario) -> Run:
+    """Run seed 1 with a whole run of another seed in the middle."""
+    simulation = Simulation(scenario, controller, seed=1, on_collision="record")
+    simulation.advance(scenario.demand_time / 2.0)
+    simulate(scenario, controller, 2, on_collision="record")
+    return simulation.run()
+
+
+def _check_arrivals(controller: Controller, run: Run) -> None:
+    drawn, trips = run.scenario.arrivals(run.seed), run.columns
+    _require(
+        trips.demand_time.tolist() == drawn.time.tolist()
+        and trips.lane.tolist() == drawn.lane.tolist()
+        and trips.manoeuvre.tolist() == drawn.manoeuvre.tolist(),
+        controller,
+        "the run did not meet the arrivals of its scenario and seed",
+    )
+
+
+def _check_served(controller: Controller, run: Run) -> None:
+    waiting = run.columns.lane[~run.columns.arrived].tolist()
+    lanes = ", ".join(sorted({ARM_NAMES[lane] for lane in waiting}))
+    n = run.site.intersection.n
+    _require(
+        not waiting, controller,
+        f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served on {n} arms "
+        f"(lanes {lanes}), {run.scenario.horizon:.0f} s after the first could come",
+    )  # fmt: skip
+
+
+def _same(run: Run, other: Run) -> bool:
+    return run.trips.equals(other.trips)
+
+
+def _require(condition: bool, controller: Controller, problem: str) -> None:
+    if not condition:
+        raise _broken(controller, problem)
+
+
+def _broken(controller: Controller, problem: str) -> ContractError:
+    return ContractError(f"controller {controller.name!r}: {problem}")

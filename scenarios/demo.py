@@ -1,0 +1,196 @@
+"""The tour of `minisim demo`: DIM beside a fixed-time signal over density, with intervals."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.table import Table
+
+from minisim.errors import MinisimError, integer
+from minisim.recording import replacing
+from minisim.version import VERSION
+from scenarios.controllers import controller_named
+from scenarios.library import four_way
+from scenarios.statistics import Interval, mean_interval
+from scenarios.sweep import Experiment, sweep, workers
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from minisim.simulation import Run
+
+#: Controllers of the tour and how they are called in its table and figure.
+CONTROLLERS = {
+    "dim": "DIM, paper's gate",
+    "dim-harmonious": "DIM, harmonious gate",
+    "fixed-time": "fixed-time signal",
+}
+#: Averaged over seeds: column of a sweep -> heading.
+METRICS = {
+    "waiting_time_s": "waiting [s]",
+    "travel_time_s": "travel [s]",
+    "depart_delay_s": "departure delay [s]",
+    "unfinished": "unfinished",
+}
+PROFILE = "fair"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tour:
+    """What the tour simulates.
+
+    Attributes:
+        densities: [veh/h/lane].
+        seeds: runs a point.
+        horizon: of each run [s].
+        film_start, film_seconds: of the animation, at the highest density [s].
+    """
+
+    densities: tuple[float, ...] = (150.0, 200.0, 250.0, 300.0, 350.0)
+    seeds: int = 5
+    horizon: float = 3600.0
+    film_start: float = 600.0
+    film_seconds: float = 60.0
+    controllers: tuple[str, ...] = field(default=tuple(CONTROLLERS))
+
+    def __post_init__(self) -> None:
+        integer("seeds", self.seeds, low=2)
+
+    @classmethod
+    def quick(cls, seeds: int) -> Tour:
+        """A smoke test of a few seconds."""
+        return cls(
+            densities=(150.0, 350.0), seeds=min(seeds, 2), horizon=600.0, film_start=120.0,
+            film_seconds=10.0,
+        )  # fmt: skip
+
+    def experiments(self) -> list[Experiment]:
+        """Every density under every controller with every seed."""
+        return [
+            Experiment(
+                four_way(density, profile=PROFILE, horizon=self.horizon),
+                controller_named(name, PROFILE),
+                seed,
+            )
+            for density in self.densities
+            for name in self.controllers
+            for seed in range(1, self.seeds + 1)
+        ]
+
+    def film(self) -> Run:
+        """The run of the animation."""
+        from minisim.simulation import simulate
+
+        end = self.film_start + self.film_seconds
+        return simulate(
+            four_way(self.densities[-1], profile=PROFILE, horizon=end),
+            controller_named(self.controllers[0], PROFILE),
+            seed=1,
+            record="all",
+            record_window=(self.film_start, end),
+        )
+
+
+def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
+    """Run the tour's experiments and average them; see `average`.
+
+    Raises:
+        MinisimError: a run failed.
+    """
+    with workers(jobs) as executor:
+        rows = sweep(tour.experiments(), executor, progress)
+    failed = rows[rows["error"].notna()]
+    if len(failed):
+        first = failed.iloc[0]
+        raise MinisimError(
+            f"{len(failed)} of {len(rows)} runs failed; the first ({first['controller']}, "
+            f"{first['density']:g} veh/h/lane, seed {first['seed']}): {first['error']}"
+        )
+    return average(rows)
+
+
+def average(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means over seeds with the half widths of their 95 % intervals.
+
+    Returns:
+        One row a controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`
+        (sums), and each of `METRICS` with its `…_ci95`.
+    """
+    import pandas as pd
+
+    points = []
+    for (controller, density), runs in rows.groupby(["controller", "density"], sort=False):
+        point: dict[str, object] = {
+            "controller": controller,
+            "density": density,
+            "seeds": len(runs),
+            "trips": int(runs["trips"].sum()),
+            "collisions": int(runs["collisions"].sum()),
+        }
+        for metric in METRICS:
+            interval = mean_interval(runs[metric].astype(float).tolist())
+            point[metric] = interval.mean
+            point[f"{metric}_ci95"] = interval.half_width
+        points.append(point)
+    return pd.DataFrame(points)
+
+
+def demo_title(tour: Tour) -> str:
+    """What the table shows, in one line."""
+    return (
+        f"4 arms, profile {PROFILE}, {tour.horizon:g} s simulated, {tour.seeds} seeds a point: "
+        "mean ± 95 % confidence interval"
+    )
+
+
+def demo_table(points: pd.DataFrame) -> Table:
+    """The result for a terminal."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for k, heading in enumerate(_headings()):
+        table.add_column(heading, justify="left" if k == 1 else "right")
+    rows = _cells(points)
+    for row, following in zip(rows, [*rows[1:], None], strict=True):
+        table.add_row(*row, end_section=following is not None and following[0] != row[0])
+    return table
+
+
+def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
+    """Write demo.csv and demo.md, each whole or not at all; raises `FileError`."""
+    buffer = io.StringIO()
+    points.round(6).to_csv(buffer, index=False, lineterminator="\n")
+    headings = _headings()
+    lines = [
+        f"{demo_title(tour)}. minisim {VERSION}.",
+        "",
+        f"| {' | '.join(headings)} |",
+        f"|{'|'.join('---' if k == 1 else '---:' for k in range(len(headings)))}|",
+        *(f"| {' | '.join(row)} |" for row in _cells(points)),
+        "",
+    ]
+    for name, text in (("demo.csv", buffer.getvalue()), ("demo.md", "\n".join(lines))):
+        with replacing(folder / name) as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def _headings() -> list[str]:
+    return ["veh/h/lane", "controller", *METRICS.values(), "collisions"]
+
+
+def _cells(points: pd.DataFrame) -> list[list[str]]:
+    return [
+        [
+            f"{point['density']:g}",
+            CONTROLLERS.get(point["controller"], point["controller"]),
+            *(
+                str(Interval(point[metric], point[f"{metric}_ci95"], point["seeds"]))
+                for metric in METRICS
+            ),
+            str(point["collisions"]),
+        ]
+        for point in points.to_dict("records")
+    ]

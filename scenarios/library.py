@@ -1,0 +1,119 @@
+"""Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
+
+All take the demand as keywords of `minisim.arrivals.Demand` (density, split, turns, model) and
+the profile by name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from minisim.arrivals import Arrivals, Demand
+from minisim.errors import InputError, choice, instance, integer, numbers
+from minisim.geometry import Intersection
+from scenarios.scenario import Profile, Scenario, profile_named
+
+Side = Literal["left", "right"]
+
+#: In the authors' 5-arm network the approach lanes are 491.6 m long (4-arm 492.8 and 3-arm
+#: 495.84 follow from the default kerb radius), so its entries lie 8.4 m from the centre.
+FIVE_WAY_RADIUS = 8.4
+
+
+def three_way(density: float = 350.0, **options: Any) -> Scenario:
+    """The paper's Y junction: arms at 0°, 120° and 240°."""
+    return _regular("three-way", 3, density, options)
+
+
+def four_way(density: float = 350.0, **options: Any) -> Scenario:
+    """The paper's 4-arm junction: a north, b east, c south, d west."""
+    return _regular("four-way", 4, density, options)
+
+
+def five_way(density: float = 350.0, **options: Any) -> Scenario:
+    """The paper's 5-arm junction, with the junction radius of the authors' network."""
+    return _regular("five-way", 5, density, {"junction_radius": FIVE_WAY_RADIUS, **options})
+
+
+def regular(n: int, density: float = 350.0, **options: Any) -> Scenario:
+    """A junction of n arms at equal angles (3 ≤ n ≤ 12)."""
+    count = integer("number of arms", n, low=3, high=12)
+    return _regular(f"{count}-way", count, density, options)
+
+
+def from_bearings(
+    bearings: Sequence[float],
+    density: float = 350.0,
+    *,
+    name: str = "custom",
+    side: Side = "left",
+    lane_width: float = 3.2,
+    junction_radius: float = math.nan,
+    arm_length: float = 500.0,
+    split: Sequence[float] | None = None,
+    turns: Sequence[float] | None = None,
+    model: str = "poisson",
+    min_headway: float = 1.5,
+    profile: str | Profile = "paper",
+    horizon: float = 3600.0,
+    recorded: Arrivals | None = None,
+) -> Scenario:
+    """A junction with arms at these bearings [degrees clockwise from north].
+
+    Every other scenario of this module is this one with given bearings, and takes the same
+    keywords.
+
+    Raises:
+        InputError: arms closer than 30°, an unknown profile, impossible demand, horizon ≤ 0.
+    """
+    return Scenario(
+        name=name,
+        intersection=Intersection(
+            bearings=numbers("bearings", bearings),
+            side=side,
+            lane_width=lane_width,
+            junction_radius=junction_radius,
+            arm_length=arm_length,
+        ),
+        demand=Demand(
+            density=density,
+            split=None if split is None else numbers("split", split),
+            turns=None if turns is None else numbers("turns", turns),
+            model=model,
+            min_headway=min_headway,
+        ),
+        profile=profile_named(profile),
+        horizon=horizon,
+        recorded=recorded,
+    )
+
+
+def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
+    """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
+
+    Raises:
+        InputError: unknown name (with the nearest one), or bearings without `custom` or
+            `custom` without bearings.
+    """
+    instance("scenario", name, str)
+    if name == "custom":
+        if bearings is None:
+            raise InputError("scenario 'custom' needs bearings, such as 0,80,190,260")
+        return from_bearings(bearings, **options)
+    if bearings is not None:
+        raise InputError(f"bearings go with the scenario 'custom', not with {name!r}")
+    makers = {"three-way": three_way, "four-way": four_way, "five-way": five_way}
+    if name in makers:
+        return makers[name](**options)
+    count = name.removesuffix("-way")
+    if name.endswith("-way") and count.isascii() and count.isdigit() and len(count) <= 3:
+        return regular(int(count), **options)
+    known = choice("scenario", name, [*makers, "custom", "6-way"])
+    raise InputError(f"unknown scenario {known!r}")
+
+
+def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scenario:
+    bearings = [360.0 * i / n for i in range(n)]
+    return from_bearings(bearings, density, **{"name": name, **options})

@@ -1,0 +1,148 @@
+"""What is simulated: a junction, its demand and a profile; frozen, so it can name a result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from minisim.arrivals import Arrivals, Demand
+from minisim.control import Site
+from minisim.errors import InputError, choice, instance, number, show
+from minisim.geometry import Intersection
+from minisim.vehicle import VehicleType
+
+KMH = 1.0 / 3.6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """One consistent set of vehicle, speeds and step.
+
+    Attributes:
+        name: as on the command line.
+        vehicle: the type of all vehicles.
+        speed_limit: of the roads [m/s].
+        depart_speed: at insertion [m/s]; None is the highest safe speed up to the limit.
+        dt: step [s].
+    """
+
+    name: str
+    vehicle: VehicleType
+    speed_limit: float
+    depart_speed: float | None = None
+    dt: float = 0.1
+
+    def __post_init__(self) -> None:
+        instance("profile name", self.name, str)
+        instance("vehicle", self.vehicle, VehicleType)
+        number("speed_limit [m/s]", self.speed_limit, above=0, high=100)
+        if self.depart_speed is not None:
+            number("depart_speed [m/s]", self.depart_speed, low=0, high=self.speed_limit)
+        number("dt [s]", self.dt, low=0.001, high=0.5)
+
+
+#: The parameters that the paper's text prescribes: §III road 40 km/h, deceleration 2 m/s², car of
+#: 4 m with 2 m of headway. What it leaves open (acceleration, time headway, emergency braking,
+#: width) is SUMO's passenger car, since the paper simulates in SUMO.
+PAPER = Profile(
+    name="paper",
+    vehicle=VehicleType(length=4.0, min_gap=2.0, deceleration=2.0),
+    speed_limit=40.0 * KMH,
+)
+
+#: One vehicle, speed limit and departure speed for every controller: SUMO's passenger car on the
+#: 14 m/s roads of the authors' network.
+FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
+
+PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """A junction, its demand and a profile: everything of a run but controller and seed.
+
+    Attributes:
+        name: such as "four-way".
+        intersection: the geometry.
+        demand: what to draw arrivals from.
+        profile: vehicle, speeds and step.
+        horizon: simulated time [s]; arrivals come until then.
+        recorded: an arrival table to replay instead of drawing one.
+    """
+
+    name: str
+    intersection: Intersection
+    demand: Demand
+    profile: Profile = PAPER
+    horizon: float = 3600.0
+    recorded: Arrivals | None = None
+
+    def __post_init__(self) -> None:
+        instance("scenario name", self.name, str)
+        instance("intersection", self.intersection, Intersection)
+        instance("demand", self.demand, Demand)
+        instance("profile", self.profile, Profile)
+        number("horizon [s]", self.horizon, above=0, high=1e7)
+        n = self.intersection.n
+        self.demand.rates(n)
+        if self.demand.turns is not None and len(self.demand.turns) != n - 1:
+            raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        if self.recorded is not None:
+            instance("recorded", self.recorded, Arrivals)
+            self.recorded.check(n)
+
+    @property
+    def profile_name(self) -> str:
+        """Name of the profile."""
+        return self.profile.name
+
+    @property
+    def depart_speed(self) -> float | None:
+        """Speed at insertion [m/s]; None is the highest safe one."""
+        return self.profile.depart_speed
+
+    @property
+    def density(self) -> float:
+        """Mean inflow a lane [veh/h], as demanded or as recorded."""
+        rates = self.rates
+        return sum(rates) / len(rates)
+
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """Mean inflow of each lane [veh/h]."""
+        n = self.intersection.n
+        if self.recorded is not None:
+            return self.recorded.rates(n, self.horizon)
+        return self.demand.rates(n)
+
+    def site(self, seed: int = 0) -> Site:
+        """What a controller may know of it."""
+        return Site(
+            intersection=self.intersection,
+            vehicle=self.profile.vehicle,
+            speed_limit=self.profile.speed_limit,
+            demand=self.rates,
+            dt=self.profile.dt,
+            seed=seed,
+        )
+
+    def arrivals(self, seed: int) -> Arrivals:
+        """The arrival table of one seed, the same for every controller."""
+        if self.recorded is not None:
+            return self.recorded
+        return self.demand.draw(self.intersection.n, self.horizon, seed)
+
+
+def profile_named(name: str | Profile) -> Profile:
+    """Look a profile up by name; a `Profile` passes through."""
+    if isinstance(name, Profile):
+        return name
+    return PROFILES[choice("profile", name, PROFILES)]
+
+
+def parse_split(text: str) -> Sequence[float]:
+    """Read `4:3:2:1`; raises `InputError`."""
+    try:
+        return tuple(float(share) for share in text.split(":"))
+    except (ValueError, AttributeError, TypeError):
+        raise InputError(f"a split is written like 4:3:2:1, got {show(text)}") from None

@@ -1,0 +1,127 @@
+"""CPU time of a simulated hour, minisim against libsumo, as a ratio measured in one run.
+
+    python tests/bench/bench.py [--runs 5]
+
+DIM on 4 arms at 350 veh/h/lane and dt 0.1 s in minisim, against libsumo stepping the same
+arrivals through an all-way stop (the SUMO junction with the shortest queues, so the fewest
+vehicles to move) while Python reads every vehicle's position and speed at each step. Both times
+are CPU seconds of a warm process; without libsumo only ours is printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+BUDGET = 30.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=5, help="measured runs of minisim")
+    parser.add_argument("--sumo", metavar="FOLDER", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.sumo:
+        _step_sumo(Path(options.sumo))
+        return
+    ours = [_minisim_hour(seed) for seed in range(options.runs + 1)][1:]
+    median = statistics.median(ours)
+    spread = f"{min(ours):.3f} … {max(ours):.3f}"
+    print(f"minisim, DIM, 4 arms × 350 veh/h:  {median:.3f} s CPU per simulated hour ({spread})")
+    try:
+        import libsumo  # noqa: F401
+        import sumo
+    except ImportError:
+        print("libsumo is not installed (pip install 'minisim[sumo]'): no comparison")
+        return
+    theirs = _sumo_hour(Path(sumo.SUMO_HOME))
+    print(f"libsumo, same arrivals, all read:  {theirs:.3f} s CPU per simulated hour")
+    ratio = theirs / median
+    verdict = "within" if ratio >= BUDGET else "MISSED"
+    print(f"ratio {ratio:.0f}× (budget {BUDGET:.0f}×: {verdict})")
+
+
+def _minisim_hour(seed: int) -> float:
+    import minisim
+    from dim import Dim
+    from scenarios import four_way
+
+    scenario = four_way(density=350, profile="fair")
+    start = time.process_time()
+    minisim.simulate(scenario, Dim(), seed=seed).summary()
+    return time.process_time() - start
+
+
+def _sumo_hour(home: Path) -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        _write_network(Path(folder), home)
+        _write_routes(Path(folder))
+        command = [sys.executable, __file__, "--sumo", folder]
+        environment = {**os.environ, "SUMO_HOME": str(home)}
+        done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
+    return float(json.loads(done.stdout.splitlines()[-1]))
+
+
+def _write_network(folder: Path, home: Path) -> None:
+    """The 4-arm left-hand junction as netconvert reads it: arms of 500 m, 14 m/s."""
+    ends = {"a": (0, 500), "b": (500, 0), "c": (0, -500), "d": (-500, 0)}
+    nodes = ['<node id="C" x="0" y="0" type="allway_stop"/>']
+    edges = []
+    for arm, (x, y) in ends.items():
+        nodes.append(f'<node id="{arm}" x="{x}" y="{y}" type="dead_end"/>')
+        for name, origin, target in ((f"{arm}in", arm, "C"), (f"{arm}out", "C", arm)):
+            edges.append(
+                f'<edge id="{name}" from="{origin}" to="{target}" numLanes="1" speed="14"/>'
+            )
+    (folder / "x.nod.xml").write_text(f"<nodes>{''.join(nodes)}</nodes>")
+    (folder / "x.edg.xml").write_text(f"<edges>{''.join(edges)}</edges>")
+    command = [home / "bin" / "netconvert", "-n", "x.nod.xml", "-e", "x.edg.xml", "-o", "x.net.xml"]
+    command += ["--lefthand", "true", "--no-turnarounds", "true"]
+    environment = {**os.environ, "SUMO_HOME": str(home)}
+    subprocess.run(command, check=True, cwd=folder, capture_output=True, env=environment)
+
+
+def _write_routes(folder: Path) -> None:
+    from scenarios import four_way
+
+    arrivals = four_way(density=350, profile="fair").arrivals(seed=1)
+    lines = ['<routes><vType id="car" carFollowModel="IDM" speedDev="0"/>']
+    for i in range(len(arrivals)):
+        origin = arrivals.lane[i]
+        target = (origin + arrivals.manoeuvre[i]) % 4
+        lines.append(
+            f'<vehicle id="{i}" type="car" depart="{arrivals.time[i]}" departSpeed="max">'
+            f'<route edges="{"abcd"[origin]}in {"abcd"[target]}out"/></vehicle>'
+        )
+    (folder / "x.rou.xml").write_text("\n".join([*lines, "</routes>"]))
+
+
+def _step_sumo(folder: Path) -> None:
+    import libsumo
+
+    libsumo.start(
+        ["sumo", "-n", str(folder / "x.net.xml"), "-r", str(folder / "x.rou.xml")]
+        + ["--step-length", "0.1", "--time-to-teleport", "-1", "--no-step-log", "true"]
+        + ["--no-warnings", "true"]
+    )
+    start = time.process_time()
+    metres = 0.0
+    for _ in range(36_000):
+        libsumo.simulationStep()
+        for vehicle in libsumo.vehicle.getIDList():
+            x, _y = libsumo.vehicle.getPosition(vehicle)
+            metres += x + libsumo.vehicle.getSpeed(vehicle)
+    elapsed = time.process_time() - start
+    libsumo.close()
+    print(json.dumps(elapsed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""The decision on random harmony matrices, not only on those of real junctions."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dim import DecisionTable, HarmonyMatrix, decide, explain
+from dim.decision import ORDERS
+from minisim.geometry import Movement
+
+
+@st.composite
+def matrices(draw: st.DrawFn) -> HarmonyMatrix:
+    """Any symmetric 0/1 matrix without harmony in a lane, 3 … 7 arms, sparse to dense."""
+    n = draw(st.integers(3, 7))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    upper = np.triu(rng.random((n * (n - 1),) * 2) < draw(st.floats(0.0, 1.0)), 1)
+    lane = np.repeat(np.arange(n), n - 1)
+    return HarmonyMatrix(n, (upper | upper.T) & (lane[:, None] != lane[None, :]))
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]]:
+    """A matrix, participants in random order, an order and priorities."""
+    matrix = draw(matrices())
+    wishes = draw(st.lists(st.integers(0, matrix.n - 1), min_size=matrix.n, max_size=matrix.n))
+    participants = [Movement(lane, j) for lane, j in enumerate(wishes) if j]
+    ranks = draw(st.permutations(range(matrix.n)))
+    order = draw(st.sampled_from(ORDERS))
+    return matrix, draw(st.permutations(participants)), order, tuple(ranks)
+
+
+@given(cases())
+def test_the_right_of_way_is_a_best_maximal_clique(
+    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]],
+) -> None:
+    matrix, participants, order, ranks = case
+    chosen = decide(participants, matrix, order, ranks)
+    assert set(chosen) <= set(participants)
+    assert bool(chosen) == bool(participants)
+    assert all(matrix[a, b] for a, b in itertools.combinations(chosen, 2))
+    outside = set(participants) - set(chosen)
+    assert not any(all(matrix[m, other] for other in chosen) for m in outside)
+    if participants and order == "lanes":  # the highest-priority lane present always goes
+        first = min(participants, key=lambda m: ranks[m.origin])
+        assert first in chosen
+    if participants:
+        assert len(chosen) <= len(explain(participants, matrix, order, ranks).tied[0])
+        assert explain(participants, matrix, order, ranks).right_of_way == chosen
+    assert DecisionTable(matrix, order, ranks).decide(participants) == chosen
+    assert decide(sorted(participants), matrix, order, ranks) == chosen
+
+
+@given(cases(), st.randoms(use_true_random=False))
+def test_whoever_goes_first_does_not_change_who_goes_with_it(
+    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]], random: object
+) -> None:
+    """Why the gate "harmonious" needs no wake-up when a vehicle commits (dim.controller).
+
+    When some of the chosen cross already, the best of those in harmony with them is the rest.
+    """
+    matrix, participants, order, ranks = case
+    table = DecisionTable(matrix, order, ranks)
+    chosen = table.decide(participants)
+    gone = {m for m in chosen if random.random() < 0.5}  # type: ignore[attr-defined]
+    occupied = sum(1 << matrix.index(m) for m in gone)
+    rest = table.admitted(table.case(set(participants) - gone), occupied, False)
+    lanes = table.lanes(rest)
+    assert {m for m in participants if lanes >> m.origin & 1} == set(chosen) - gone

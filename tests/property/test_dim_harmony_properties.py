@@ -1,0 +1,67 @@
+"""Harmony over random geometries: mirroring, clearance, bigger vehicles."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dim import HarmonyMatrix
+from minisim.geometry import Intersection, Movement
+from minisim.vehicle import VehicleType
+from tests.strategies import intersections, vehicles
+
+
+def mirrored(intersection: Intersection) -> tuple[Intersection, list[Movement]]:
+    """The mirror image (east for west), and for each movement the one that it becomes."""
+    images = [(360.0 - b) % 360.0 for b in intersection.bearings]
+    bearings = sorted(images)
+    image = dataclasses.replace(
+        intersection,
+        bearings=tuple(bearings),
+        side="right" if intersection.side == "left" else "left",
+    )
+    # The j-th arm clockwise is the (n−j)-th clockwise in the mirror.
+    return image, [
+        Movement(bearings.index(images[m.origin]), intersection.n - m.manoeuvre)
+        for m in intersection.movements
+    ]
+
+
+@settings(max_examples=30)
+@given(intersections(max_arms=5), vehicles())
+def test_mirrored_geometry_gives_the_mirrored_matrix(
+    intersection: Intersection, vehicle: VehicleType
+) -> None:
+    image, becomes = mirrored(intersection)
+    matrix = HarmonyMatrix.from_geometry(intersection, vehicle)
+    reflected = HarmonyMatrix.from_geometry(image, vehicle)
+    rows = [reflected.index(m) for m in becomes]
+    np.testing.assert_array_equal(matrix.values, reflected.values[np.ix_(rows, rows)])
+
+
+def test_the_mirror_moves_what_it_should() -> None:
+    """Guards the property above: on 4 arms left and right turns and the arms b, d swap."""
+    _, becomes = mirrored(Intersection((0.0, 90.0, 180.0, 270.0)))
+    assert " ".join(map(str, becomes)) == "a3 a2 a1 d3 d2 d1 c3 c2 c1 b3 b2 b1"
+
+
+@settings(max_examples=25)
+@given(intersections(), st.lists(st.floats(0.0, 10.0), min_size=2, max_size=5))
+def test_more_clearance_only_removes_harmony(
+    intersection: Intersection, clearances: list[float]
+) -> None:
+    matrices = [HarmonyMatrix.from_geometry(intersection, clearance=c) for c in sorted(clearances)]
+    for smaller, larger in itertools.pairwise(matrices):
+        assert not np.any(larger.values & ~smaller.values)
+
+
+@settings(max_examples=20)
+@given(intersections(max_arms=5), st.floats(0.0, 0.5))
+def test_wider_vehicles_only_remove_harmony(intersection: Intersection, extra: float) -> None:
+    narrow = HarmonyMatrix.from_geometry(intersection, VehicleType(width=1.6))
+    wide = HarmonyMatrix.from_geometry(intersection, VehicleType(width=1.6 + extra))
+    assert not np.any(wide.values & ~narrow.values)

@@ -1,0 +1,119 @@
+"""Hypothesis strategies for geometries, vehicles, demands and scenarios, for all tests."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Literal
+
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from minisim.arrivals import Demand
+from minisim.geometry import MIN_ANGLE, Intersection, Movement
+from minisim.vehicle import VehicleType
+from scenarios.scenario import FAIR, PAPER, Profile, Scenario
+
+SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
+
+
+def share(part: float) -> settings:
+    """Decorator: only this share of the profile's examples, for costly properties."""
+    return settings(max_examples=max(1, round(part * settings().max_examples)))
+
+
+def floats(low: float, high: float) -> st.SearchStrategy[float]:
+    """Finite floats in [low, high]."""
+    return st.floats(low, high, allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def bearings(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> tuple[float, ...]:
+    """Bearings of 3 … 6 arms, at least `MIN_ANGLE` apart; any such set can come out."""
+    n = draw(st.integers(min_arms, max_arms))
+    spare = 360.0 - MIN_ANGLE * n
+    cuts = sorted(draw(st.lists(floats(0.0, spare), min_size=n - 1, max_size=n - 1)))
+    gaps = [MIN_ANGLE + b - a for a, b in itertools.pairwise([0.0, *cuts])]
+    last = 360.0 - sum(gaps)
+    start = draw(floats(0.0, 0.999)) * last
+    return tuple(itertools.accumulate(gaps, initial=start))
+
+
+@st.composite
+def intersections(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> Intersection:
+    """Junctions of any shape: both sides, lanes of 2.8 … 4 m, the default radius or a larger."""
+    lane_width = draw(st.sampled_from([3.2, 2.8, 3.5, 4.0]))
+    widened = draw(st.sampled_from([1.0, 1.25, 2.0]))
+    angles = draw(bearings(min_arms, max_arms))
+    default = Intersection(angles, lane_width=lane_width).junction_radius
+    return Intersection(
+        angles,
+        side=draw(st.sampled_from(SIDES)),
+        lane_width=lane_width,
+        junction_radius=default * widened,
+    )
+
+
+@st.composite
+def vehicles(draw: st.DrawFn) -> VehicleType:
+    """Passenger cars: 3 … 6 m long, 1.5 … 2 m wide, any ordinary way of driving."""
+    deceleration = draw(floats(1.5, 5.0))
+    return VehicleType(
+        length=draw(floats(3.0, 6.0)),
+        width=draw(floats(1.5, 2.0)),
+        acceleration=draw(floats(0.8, 4.0)),
+        deceleration=deceleration,
+        headway=draw(floats(0.8, 2.0)),
+        min_gap=draw(floats(1.0, 4.0)),
+        max_deceleration=draw(floats(max(6.0, deceleration), 10.0)),
+        model=draw(st.sampled_from(["idm", "iidm"])),
+    )
+
+
+def movements(intersection: Intersection) -> st.SearchStrategy[Movement]:
+    """Any movement of the intersection."""
+    return st.sampled_from(intersection.movements)
+
+
+@st.composite
+def demands(draw: st.DrawFn, n: int, max_density: float = 350.0) -> Demand:
+    """Balanced or split demand on n lanes, uniform or uneven turns, every arrival model."""
+
+    def shares(count: int) -> st.SearchStrategy[Sequence[float] | None]:
+        some = st.lists(st.integers(0, 4), min_size=count, max_size=count).filter(any)
+        return st.none() | some
+
+    split = draw(shares(n))
+    turns = draw(shares(n - 1))
+    return Demand(
+        density=draw(floats(20.0, max_density)),
+        split=None if split is None else tuple(split),
+        turns=None if turns is None else tuple(turns),
+        model=draw(st.sampled_from(["poisson", "exponential", "shifted"])),
+    )
+
+
+def profiles() -> st.SearchStrategy[Profile]:
+    """The ready-made profiles."""
+    return st.sampled_from([PAPER, FAIR])
+
+
+@st.composite
+def scenarios(
+    draw: st.DrawFn,
+    min_arms: int = 3,
+    max_arms: int = 6,
+    max_density: float = 350.0,
+    horizon: float = 120.0,
+    arm_length: float = 150.0,
+) -> Scenario:
+    """Short scenarios on random junctions; roads of `arm_length` keep a run quick."""
+    angles = draw(bearings(min_arms, max_arms))
+    intersection = Intersection(angles, side=draw(st.sampled_from(SIDES)), arm_length=arm_length)
+    return Scenario(
+        name="random",
+        intersection=intersection,
+        demand=draw(demands(intersection.n, max_density)),
+        profile=draw(profiles()),
+        horizon=horizon,
+    )

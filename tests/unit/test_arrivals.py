@@ -1,0 +1,327 @@
+"""Arrivals against their distributions, and the arrival table as a file.
+
+Statistical tests run on fixed seeds, so they never fail by chance; `ALPHA` is the chance with
+which a correct model would fail one of them on a fresh seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
+from minisim.errors import FileError, InputError
+
+ALPHA = 1e-3
+DAY = 86_400.0
+DENSITY = 350.0
+RATE = DENSITY / 3600.0
+
+
+def per_second(arrivals: Arrivals, lane: int, duration: float) -> np.ndarray:
+    """Vehicles on the lane in each second."""
+    seconds = np.floor(arrivals.time[arrivals.lane == lane]).astype(int)
+    return np.bincount(seconds, minlength=int(duration))
+
+
+def chi_square_poisson(counts: np.ndarray, rate: float) -> float:
+    """p-value of Pearson's test that the counts are Poisson; the last class holds the tail."""
+    classes = 4  # 0, 1, 2 and 3 or more: expected 7 or more in a day at 350 veh/h
+    observed = np.bincount(np.minimum(counts, classes - 1), minlength=classes)
+    probability = stats.poisson.pmf(np.arange(classes - 1), rate)
+    expected = np.append(probability, 1.0 - probability.sum()) * len(counts)
+    return float(stats.chisquare(observed, expected).pvalue)
+
+
+# --- the three models --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_poisson_counts_per_second_pass_a_chi_square_test(seed: int) -> None:
+    arrivals = Demand(density=DENSITY).draw(4, DAY, seed)
+    for lane in range(4):
+        assert chi_square_poisson(per_second(arrivals, lane, DAY), RATE) > ALPHA / 4
+
+
+def test_the_chi_square_test_can_fail() -> None:
+    """Its power: at least 1.5 s between vehicles leaves seconds with two of them empty."""
+    shifted = Demand(density=DENSITY, model="shifted").draw(3, DAY, seed=1)
+    assert chi_square_poisson(per_second(shifted, 0, DAY), RATE) < 1e-6
+
+
+def test_poisson_arrivals_fall_on_whole_seconds_before_the_end() -> None:
+    """The paper draws a number of vehicles for each second."""
+    arrivals = Demand(density=3000.0).draw(3, 10.5, seed=1)
+    assert (arrivals.time == np.floor(arrivals.time)).all()
+    assert arrivals.time.max() <= 10.0
+
+
+@pytest.mark.parametrize(
+    ("model", "shift"), [("exponential", 0.0), ("shifted", 1.5), ("shifted", 4.0)]
+)
+def test_headways_pass_a_kolmogorov_smirnov_test(model: str, shift: float) -> None:
+    demand = Demand(density=DENSITY, model=model, min_headway=shift or 1.5)
+    arrivals = demand.draw(4, DAY, seed=5)
+    for lane in range(4):
+        headways = np.diff(arrivals.time[arrivals.lane == lane], prepend=0.0)
+        assert headways.min() >= shift
+        law = stats.expon(loc=shift, scale=1.0 / RATE - shift)
+        assert stats.kstest(headways, law.cdf).pvalue > ALPHA / 4
+
+
+@pytest.mark.parametrize("model", ["poisson", "exponential", "shifted"])
+def test_every_model_has_the_mean_that_was_asked_for(model: str) -> None:
+    """Within 4 σ of a Poisson count (the shifted model varies less)."""
+    arrivals = Demand(density=DENSITY, model=model).draw(4, DAY, seed=9)
+    expected = RATE * DAY
+    counts = np.bincount(arrivals.lane, minlength=4)
+    assert np.abs(counts - expected).max() < 4.0 * np.sqrt(expected)
+    assert arrivals.rates(4, DAY) == pytest.approx(counts / 24.0)
+
+
+# --- shares ------------------------------------------------------------------------------------
+
+
+def test_unbalanced_demand_keeps_the_total_and_gives_each_lane_its_share() -> None:
+    """The paper's unbalanced demand: λ = share · D · N, shares 0.4, 0.3, 0.2, 0.1."""
+    demand = Demand(density=350.0, split=(4, 3, 2, 1))
+    assert demand.rates(4) == pytest.approx((560.0, 420.0, 280.0, 140.0))
+    assert sum(demand.rates(4)) == pytest.approx(4 * 350.0)
+    counts = np.bincount(demand.draw(4, DAY, seed=3).lane, minlength=4)
+    expected = np.array([560.0, 420.0, 280.0, 140.0]) * 24.0
+    assert (np.abs(counts - expected) < 4.0 * np.sqrt(expected)).all()
+
+
+def test_a_lane_without_share_stays_empty() -> None:
+    arrivals = Demand(density=350.0, split=(1, 0, 1)).draw(3, 3600.0, seed=1)
+    assert set(arrivals.lane.tolist()) == {0, 2}
+    assert len(Demand(density=0.0).draw(3, 3600.0, seed=1)) == 0
+
+
+@pytest.mark.parametrize("turns", [None, (1, 2, 1), (0, 1, 0)])
+def test_manoeuvres_follow_their_shares_independently_of_the_lane(
+    turns: tuple[float, ...] | None,
+) -> None:
+    arrivals = Demand(density=350.0, turns=turns).draw(4, DAY, seed=4)
+    shares = np.array(turns or (1, 1, 1)) / sum(turns or (1, 1, 1))
+    table = np.zeros((4, 3))
+    np.add.at(table, (arrivals.lane, arrivals.manoeuvre - 1), 1)
+    assert (table[:, shares == 0] == 0).all()
+    if (shares > 0).sum() > 1:
+        expected = table.sum(axis=1, keepdims=True) * shares
+        assert stats.chisquare(table, expected, axis=1).pvalue.min() > ALPHA / 4
+        assert stats.chi2_contingency(table).pvalue > ALPHA
+
+
+# --- reproducibility ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["poisson", "exponential", "shifted"])
+def test_the_same_seed_gives_the_same_bytes(model: str) -> None:
+    demand = Demand(density=350.0, model=model)
+    one, same, other = (demand.draw(4, 3600.0, seed) for seed in (1, 1, 2))
+    for column in ("time", "lane", "manoeuvre"):
+        assert getattr(one, column).tobytes() == getattr(same, column).tobytes()
+    assert one.time.tobytes() != other.time.tobytes()
+
+
+def test_manoeuvres_are_drawn_from_their_own_stream() -> None:
+    """Other turn shares leave the arrival times as they are (common random numbers)."""
+    uniform = Demand(density=350.0).draw(4, 3600.0, seed=1)
+    turning = Demand(density=350.0, turns=(5, 1, 5)).draw(4, 3600.0, seed=1)
+    np.testing.assert_array_equal(uniform.time, turning.time)
+    assert (uniform.manoeuvre != turning.manoeuvre).any()
+
+
+# --- the table ---------------------------------------------------------------------------------
+
+
+def test_the_table_is_sorted_by_time_then_lane_and_read_only() -> None:
+    table = Arrivals(
+        time=np.array([2.0, 1.0, 2.0]), lane=np.array([1, 2, 0]), manoeuvre=np.array([1, 2, 3])
+    )
+    assert table.time.tolist() == [1.0, 2.0, 2.0]
+    assert table.lane.tolist() == [2, 0, 1]
+    assert table.manoeuvre.tolist() == [2, 3, 1]
+    with pytest.raises(ValueError, match="read-only"):
+        table.time[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        (([1.0], [0, 1], [1]), "as many times as lanes"),
+        (([-1.0], [0], [1]), "finite and not negative"),
+        (([np.nan], [0], [1]), "finite and not negative"),
+        (([np.inf], [0], [1]), "finite and not negative"),
+        (([1.0], [0.5], [1]), "lane must be a one-dimensional column of int64"),
+        (([1.0], [np.nan], [1]), "lane must be"),
+        (([1.0], ["a"], [1]), "lane must be"),
+        (([[1.0]], [0], [1]), "demand_time_s must be a one-dimensional"),
+        (([1j], [0], [1]), "demand_time_s must be"),
+        ((None, [0], [1]), "demand_time_s must be"),
+    ],
+)
+def test_broken_columns_are_refused(columns: tuple[object, ...], message: str) -> None:
+    time, lane, manoeuvre = columns
+    with pytest.raises(InputError, match=message):
+        Arrivals(time=time, lane=lane, manoeuvre=manoeuvre)  # type: ignore[arg-type]
+
+
+def test_check_names_what_the_geometry_does_not_have() -> None:
+    def table(lane: int, manoeuvre: int) -> Arrivals:
+        return Arrivals(np.array([0.0]), np.array([lane]), np.array([manoeuvre]))
+
+    table(2, 2).check(3)
+    for lane, manoeuvre, message in [
+        (3, 1, r"lane d is not in the geometry \(lanes a … c\)"),
+        (-1, 1, "lane -1"),
+        (99, 1, "lane 99"),
+        (0, 3, r"manoeuvre 3 does not exist with 3 arms \(1 … 2\)"),
+        (0, 0, "manoeuvre 0"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            table(lane, manoeuvre).check(3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"density": -1}, "density"),
+        ({"density": 3601}, "at most 3600"),
+        ({"split": ()}, "split must be shares"),
+        ({"split": (0, 0)}, "split must be shares"),
+        ({"split": (1, -1)}, "split must be shares"),
+        ({"split": (1e308, 1e308)}, "split must be shares"),
+        ({"turns": "ab"}, "turns must be a sequence"),
+        ({"model": "possion"}, "did you mean 'poisson'"),
+        ({"min_headway": -1}, "min_headway"),
+    ],
+)
+def test_impossible_demand_is_refused(options: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Demand(**{"density": 100.0, **options})  # type: ignore[arg-type]
+
+
+def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
+    with pytest.raises(InputError, match="split has 3 shares for 4 lanes"):
+        Demand(density=100.0, split=(1, 2, 3)).rates(4)
+    with pytest.raises(InputError, match="turns has 2 shares for 3 manoeuvres"):
+        Demand(density=100.0, turns=(1, 2)).draw(4, 60.0, seed=1)
+    with pytest.raises(InputError, match="gives a lane 4000 veh/h; at most 3600"):
+        Demand(density=1000.0, split=(1, 0, 0, 0)).rates(4)
+    with pytest.raises(InputError, match="leave no room for a min_headway of 4 s"):
+        Demand(density=1000.0, model="shifted", min_headway=4.0).draw(4, 60.0, seed=1)
+    with pytest.raises(InputError, match="duration"):
+        Demand(density=100.0).draw(4, 0.0, seed=1)
+
+
+# --- files -------------------------------------------------------------------------------------
+
+GOOD = "demand_time_s,lane,manoeuvre\n0.01,c,2\n2.01,a,1\n"
+
+
+@pytest.fixture
+def csv_file(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "arrivals.csv"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_a_recorded_table_is_read(csv_file: Callable[[str], Path]) -> None:
+    arrivals = read_arrivals(csv_file(GOOD), n=4)
+    assert arrivals.time.tolist() == [0.01, 2.01]
+    assert arrivals.lane.tolist() == [2, 0]
+    assert arrivals.manoeuvre.tolist() == [2, 1]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace("\n", "\r\n"),
+        "\ufeff" + GOOD,  # as spreadsheets save it
+        "manoeuvre,lane,note,demand_time_s\n2,c,x,0.01\n1,a,,2.01\n",
+        GOOD.replace("0.01,c,2", " 0.01 , c , 2 "),
+    ],
+    ids=["windows", "byte-order mark", "other columns", "blanks"],
+)
+def test_harmless_variants_are_read_alike(csv_file: Callable[[str], Path], text: str) -> None:
+    arrivals = read_arrivals(csv_file(text), n=4)
+    assert arrivals.time.tolist() == [0.01, 2.01]
+    assert arrivals.manoeuvre.tolist() == [2, 1]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("x,a,1", "demand_time_s must be a number ≥ 0, got 'x'"),
+        ("-1,a,1", "demand_time_s"),
+        ("nan,a,1", "demand_time_s"),
+        ("1e999,a,1", "demand_time_s"),
+        (",a,1", "demand_time_s"),
+        ("3,e,1", "lane must be one of a, b, c, d, got 'e'"),
+        ("3,A,1", "lane"),
+        ("3,ab,1", "lane"),
+        ("3,,1", "lane"),
+        ("3,0,1", "lane"),
+        ("3,a,0", "manoeuvre must be 1 … 3, got '0'"),
+        ("3,a,4", "manoeuvre"),
+        ("3,a,1.0", "manoeuvre"),
+        ("3,a,", "manoeuvre"),
+        ("3,a," + "9" * 5000, "manoeuvre"),
+        ("3,a", "expected 3 values"),
+        ("3", "expected 3 values"),
+        ("3,a,1,5", "expected 3 values"),
+        ('"3,a,1', "expected 3 values"),
+    ],
+)
+def test_a_malformed_line_is_named_by_its_number(
+    csv_file: Callable[[str], Path], line: str, message: str
+) -> None:
+    path = csv_file(GOOD + line + "\n")
+    with pytest.raises(FileError, match=message) as caught:
+        read_arrivals(path, n=4)
+    assert f"{path}, line 4: " in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [("", "demand_time_s, lane, manoeuvre"), ("demand_time_s,manoeuvre\n1,2\n", "lane")],
+)
+def test_missing_columns_are_named(
+    csv_file: Callable[[str], Path], text: str, missing: str
+) -> None:
+    with pytest.raises(FileError, match=f"column {missing} missing"):
+        read_arrivals(csv_file(text))
+
+
+def test_unreadable_files_are_reported(tmp_path: Path) -> None:
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"demand_time_s,lane,manoeuvre\n\xff\xfe,a,1\n")
+    for path in (tmp_path / "none.csv", tmp_path, binary, "a\0b"):
+        with pytest.raises(FileError, match="cannot read arrivals from"):
+            read_arrivals(path)
+    with pytest.raises(InputError, match="arrivals file must be"):
+        read_arrivals(3)  # type: ignore[arg-type]
+
+
+def test_unwritable_files_are_reported(tmp_path: Path) -> None:
+    arrivals = Demand(density=350.0).draw(4, 60.0, seed=1)
+    for path in (tmp_path / "none" / "x.csv", tmp_path, "a\0b"):
+        with pytest.raises(FileError, match="cannot write arrivals to"):
+            write_arrivals(arrivals, path)
+
+
+def test_a_table_without_letters_for_its_lanes_is_not_half_written(tmp_path: Path) -> None:
+    path = tmp_path / "arrivals.csv"
+    table = Arrivals(np.array([0.0, 1.0]), np.array([0, 12]), np.array([1, 1]))
+    with pytest.raises(InputError, match="lane 12"):
+        write_arrivals(table, path)
+    assert not path.exists()
