@@ -86,8 +86,7 @@ class FixedTime:
     def _program(self, greens: Sequence[float]) -> Program:
         return Program(
             tuple(
-                Phase((lane,), green, self.amber, self.all_red)
-                for lane, green in enumerate(greens)
+                Phase((lane,), green, self.amber, self.all_red) for lane, green in enumerate(greens)
             )
         )
 

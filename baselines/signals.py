@@ -194,9 +194,7 @@ def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
         deceleration: comfortable braking [m/s²].
     """
     approaching = [v for v in lane if v.distance >= 0.0]
-    last = max(
-        (i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1
-    )
+    last = max((i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1)
     return approaching[: last + 1]
 
 

@@ -160,7 +160,5 @@ def _raise_within(greens: Sequence[float], low: float) -> list[float]:
         raised |= below
         rest = sum(greens) - low * len(raised)
         others = sum(green for i, green in enumerate(greens) if i not in raised)
-        result = [
-            low if i in raised else green * rest / others for i, green in enumerate(greens)
-        ]
+        result = [low if i in raised else green * rest / others for i, green in enumerate(greens)]
     return result

@@ -9,9 +9,8 @@ from dim.perception import COMMITS, Percept
 from minisim.errors import choice, instance
 
 #: Who may enter while others cross. "clear": nobody new (the paper). "harmonious": a participant
-#: in harmony with all of them (ours). "following": also behind a vehicle of its own lane, when it
-#: is in harmony with all the others (ours): in a lane the leader keeps them apart, not a rule.
-GATES = ("clear", "harmonious", "following")
+#: in harmony with all of them (ours); behind a vehicle of its own lane it just follows.
+GATES = ("clear", "harmonious")
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,6 @@ class Agent:
         if self.vehicle in percept.participants:
             case = percept.case
             if percept.crossing:
-                following = rules.gate == "following"
-                case = rules.table.admitted(case, percept.occupied, following)
+                case = rules.table.admitted(case, percept.occupied)
             self.right_of_way = bool(rules.table.lanes(case) >> self.lane & 1)
         return self.right_of_way

@@ -1,12 +1,11 @@
 """DIM as a controller: one agent per vehicle, hosted.
 
-The host calls at wake-ups only, while the vehicles of the paper look around all the time. Two
+The host calls at wake-ups only, while the vehicles of the paper look around all the time. A few
 wake-ups suffice, because between them no agent would change its mind:
 
-- Somebody new takes part only when a front bumper passes the start of the yellow zone (wake-up),
-  or when the vehicle ahead of it commits. In the second case the gate "clear" keeps everyone
-  where he is, and the gate "harmonious" leaves the newcomer out, in conflict with the vehicle
-  ahead, until that clears (wake-up).
+- Somebody new takes part when a front bumper passes the start of the yellow zone (wake-up), or
+  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps
+  everyone where he is; the gate "harmonious" asks for a wake-up at the entry.
 - Somebody who takes part begins to cross only when it holds the right of way, since whoever
   waits can stop. The gate "clear" then freezes what was decided. Under "harmonious" the choice
   among the rest stays the same: what is left of the best clique is the best clique among the
@@ -14,11 +13,10 @@ wake-ups suffice, because between them no agent would change its mind:
   that only one of them has, and a lane that both have does not count.
 - Somebody stops crossing when its rear bumper leaves the junction (wake-up).
 
-Three exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
-past half of the green zone, where it is granted it: another mark. Under the gate "following" a
-vehicle in the yellow zone takes part as soon as the one ahead of it commits; and on a host whose
-brakes differ, a vehicle that loses its right of way may look committed until it stands: in both
-cases the session looks again every step.
+Two exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
+past half of the green zone, where it is granted it: another mark. And on a host whose brakes
+differ, a vehicle that loses its right of way may look committed until it stands: then the session
+looks again every step.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
 from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, number
+from minisim.errors import InputError, choice, instance, number, show
 
 #: Views reach this far beyond the start of the yellow zone [m].
 SIGHT_MARGIN = 0.5
@@ -48,8 +46,8 @@ class Dim:
         commit: "stoppable", committed when comfortable braking no longer stops it before the
             junction, or "paper", past half of the green zone.
         gate: who may enter while others cross: "clear", nobody new (the paper); "harmonious",
-            whoever is in harmony with all of them; "following", also behind a vehicle of its own
-            lane when in harmony with all the others.
+            whoever is in harmony with all of them, where vehicles of one lane just follow each
+            other.
         priorities: rank of each lane, 0 first; "inflow" ranks by descending demand, ties by
             lane; None is the lanes' own order.
         zones: the road markings.
@@ -143,10 +141,11 @@ class DimSession:
         self.rules = Rules(table, dim.gate, dim.commit)
         self.reader = Reader(site.intersection.n, zones, site.vehicle.deceleration, dim.commit)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
+        entry = (0.0,) if dim.gate == "harmonious" else ()
         self.plan = Plan(
             hold_distance=zones.hold_distance,
             markings=zones.markings(site),
-            marks=(zones.yellow_start, *half_green),
+            marks=(zones.yellow_start, *half_green, *entry),
             wake_on_clear=True,
             period=dim.period,
             sight=zones.yellow_start + SIGHT_MARGIN,
@@ -154,7 +153,6 @@ class DimSession:
         )
         self._see = dim.perception.start(site)
         self._dt = site.dt
-        self._following = dim.gate == "following"
         self._agents: dict[int, Agent] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -177,8 +175,8 @@ class DimSession:
             goes = agent.decide(percept)
             if goes != had:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
-            if not goes and vehicle not in percept.participants:
-                look_again |= self._following or vehicle in percept.crossing
+            if not goes and vehicle in percept.crossing:
+                look_again = True
         self._agents = agents
         if look_again:
             commands.append(Wake(view.time + self._dt))
@@ -187,5 +185,5 @@ class DimSession:
 
 def _own_ranks(priorities: object) -> tuple[int, ...]:
     if not isinstance(priorities, (tuple, list)):
-        raise InputError(f"priorities must be lane ranks or 'inflow', got {priorities!r}")
+        raise InputError(f"priorities must be lane ranks or 'inflow', got {show(priorities)}")
     return lane_ranks(priorities, len(priorities))

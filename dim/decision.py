@@ -16,7 +16,7 @@ from itertools import combinations, pairwise
 import networkx as nx
 
 from dim.harmony import HarmonyMatrix
-from minisim.errors import InputError, choice, instance, integer
+from minisim.errors import InputError, choice, instance, integer, show
 from minisim.geometry import ARM_NAMES, Movement
 
 #: "size": the largest clique, among equals the one of the higher-priority lanes (the paper's
@@ -38,11 +38,11 @@ def lane_ranks(priorities: Iterable[int] | None, n: int) -> tuple[int, ...]:
     if priorities is None:
         return tuple(range(n))
     if isinstance(priorities, str | bytes) or not isinstance(priorities, Iterable):
-        raise InputError(f"priorities must be a sequence of lane ranks, got {priorities!r}")
+        raise InputError(f"priorities must be a sequence of lane ranks, got {show(priorities)}")
     ranks = tuple(integer("lane rank", rank, low=0) for rank in priorities)
     if sorted(ranks) != list(range(n)):
         raise InputError(
-            f"priorities of {n} lanes are the ranks 0 … {n - 1}, each once, got {ranks}"
+            f"priorities of {n} lanes are the ranks 0 … {n - 1}, each once, got {show(ranks)}"
         )
     return ranks
 
@@ -138,9 +138,9 @@ class DecisionTable:
         matrix, order, priorities: what the table was made from, as in `decide`.
         lanes: case -> lanes with the right of way (no check: for agents, which build cases
             from what they see).
-        admitted: (case, crossing, following) -> the case without the participants that are in
-            conflict with one of the movements `crossing`, an integer with bit k set for the
-            k-th movement. Movements of one lane are in conflict unless `following`.
+        admitted: (case, crossing) -> the case without the participants that are in conflict with
+            one of the movements `crossing`, an integer with bit k set for the k-th movement.
+            Movements of one lane follow each other and are not in conflict.
 
     Raises:
         InputError: unknown order, or priorities that are no permutation of the lanes.
@@ -199,13 +199,13 @@ class DecisionTable:
         chosen = decide(self.participants(case), self.matrix, self.order, self.priorities)
         return sum(1 << m.origin for m in chosen)
 
-    def _admit(self, case: int, crossing: int, following: bool) -> int:
+    def _admit(self, case: int, crossing: int) -> int:
         matrix = self.matrix
         occupied = [m for k, m in enumerate(matrix.movements) if crossing >> k & 1]
 
         def free(movement: Movement) -> bool:
             return all(
-                matrix.harmony(movement, other) or (following and other.origin == movement.origin)
+                other.origin == movement.origin or matrix.harmony(movement, other)
                 for other in occupied
             )
 
@@ -224,7 +224,7 @@ def _participants(movements: Iterable[Movement | str], matrix: HarmonyMatrix) ->
     """The movements by lane, checked."""
     instance("matrix", matrix, HarmonyMatrix)
     if isinstance(movements, str) or not isinstance(movements, Iterable):
-        raise InputError(f"movements must be a sequence such as a1, b2, got {movements!r}")
+        raise InputError(f"movements must be a sequence such as a1, b2, got {show(movements)}")
     found = sorted(matrix.movements[matrix.index(m)] for m in movements)
     for one, other in pairwise(found):
         if one.origin == other.origin:

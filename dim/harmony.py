@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.control import CLEARANCE
-from minisim.errors import FileError, InputError, instance, integer
+from minisim.errors import FileError, InputError, instance, integer, show
 from minisim.geometry import ARM_NAMES, Bools, Intersection, Movement
 from minisim.vehicle import VehicleType
 
@@ -72,14 +72,14 @@ class HarmonyMatrix:
         instance("intersection", intersection, Intersection)
         vehicle = VehicleType() if vehicle is None else vehicle
         instance("vehicle", vehicle, VehicleType)
-        conflicts = intersection.conflicts(vehicle, clearance)
-        return cls(intersection.n, ~conflicts & ~_same_lane(intersection.n))
+        # Movements of one arm share their start: they are at distance 0 and in conflict too.
+        return cls(intersection.n, ~intersection.conflicts(vehicle, clearance))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
         """The authors' own matrix for 3, 4 or 5 arms (the paper prints the one for 4)."""
         if integer("number of arms", n, low=1) not in PAPER_ARMS:
-            raise InputError(f"the paper has matrices for 3, 4 and 5 arms, not for {n}")
+            raise InputError(f"the paper has matrices for 3, 4 and 5 arms, not for {show(n)}")
         return _paper(int(n))
 
     @classmethod
@@ -140,7 +140,7 @@ class HarmonyMatrix:
         try:
             return self._index[movement]
         except (KeyError, TypeError):
-            text = str(movement) if isinstance(movement, str) else repr(movement)
+            text = show(movement)
             raise InputError(
                 f"no movement {text} in an intersection of {self.n} arms: a lane a … "
                 f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.n - 1}, such as a1"
@@ -152,7 +152,7 @@ class HarmonyMatrix:
 
     def __getitem__(self, pair: tuple[Movement | str, Movement | str]) -> bool:
         if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InputError(f"a harmony matrix is indexed by two movements, got {pair!r}")
+            raise InputError(f"a harmony matrix is indexed by two movements, got {show(pair)}")
         return self.harmony(*pair)
 
     def disagreements(self, other: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
@@ -209,7 +209,7 @@ def _checked(values: npt.ArrayLike, n: int, labels: tuple[str, ...]) -> Bools:
     if array.shape != (size, size):
         raise InputError(
             f"a harmony matrix of {n} arms is {size} × {size}, "
-            f"got {' × '.join(map(str, array.shape)) or repr(values)}"
+            f"got {' × '.join(map(str, array.shape)) or show(values)}"
         )
     if array.dtype.kind not in "biuf":
         raise InputError(f"a harmony matrix has entries 0 and 1, got {array.dtype} entries")

@@ -52,8 +52,8 @@ class Percept(NamedTuple):
 
     Attributes:
         participants: ids of the vehicles that take part, by lane: the front vehicle of each lane,
-            if its front bumper is between the start of the yellow zone and the junction. A
-            vehicle that is crossing is nobody's front vehicle.
+            if its front bumper is between the start of the yellow zone and the junction and
+            it is not committed. While it is, nobody of its lane takes part.
         crossing: ids of the vehicles that are crossing: committed, or any part of the body in
             the junction.
         case: the participants' movements as an integer, see `DecisionTable`.
@@ -108,11 +108,13 @@ class Reader:
             if vehicle.distance > start:
                 continue
             _, lane, manoeuvre, distance, _, _ = vehicle
+            front = distance >= 0.0 and lane != lane_served
+            if front:
+                lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
                 occupied |= 1 << lane * (n - 1) + manoeuvre - 1
-            elif lane != lane_served:
-                lane_served = lane
+            elif front:
                 participants.append(vehicle.id)
                 case += manoeuvre * n**lane
         return Percept(tuple(participants), tuple(crossing), case, occupied)

@@ -63,7 +63,7 @@ class Zones:
         """
         b = site.vehicle.deceleration
         braking = stopping_distance(site.speed_limit, b) - stopping_distance(self.red_speed, b)
-        slowed = min(max(self.red_start - max(braking, 0.0), self.yellow_start), self.red_start)
+        slowed = min(max(self.red_start - braking, self.yellow_start), self.red_start)
         stretches = (
             Marking("red", self.red_start, slowed) if self.red_start > slowed else None,
             Marking("red", slowed, self.yellow_start, self.red_speed)

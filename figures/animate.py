@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.text import Text
 from PIL import Image
@@ -111,7 +113,7 @@ class Picture:
         self._counts = self._text(0.97, 8.18, 12, "right")
         for artist in (*self._moving, self._clock, self._counts):
             artist.set_animated(True)
-        self._canvas = style.canvas_of(self._figure)
+        self._canvas = _canvas_of(self._figure)
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
         self._written, self._ground = "", self._still
@@ -214,6 +216,8 @@ class Picture:
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
         counts = f"waiting {film.waiting(film.at(time))}   served {film.served(time)}"
+        if self.run.collisions:
+            counts = f"collisions {film.collided(time)}   {counts}"
         if clock + counts == self._written:
             return
         self._written = clock + counts
@@ -223,6 +227,11 @@ class Picture:
         self._figure.draw_artist(self._clock)
         self._figure.draw_artist(self._counts)
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
+
+
+def _canvas_of(figure: Figure) -> Any:
+    """A canvas of pixels; its methods carry no types."""
+    return FigureCanvasAgg(figure)
 
 
 def view_reach(intersection: Intersection, zone: float) -> float:

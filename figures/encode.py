@@ -63,13 +63,12 @@ def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -
     Each frame holds only the rectangle that changed, transparent where it did not (GIF89a, §18
     screen, §20 image, §23 control; the loop is Netscape's extension).
     """
-    colours = bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
     size_code = COLOURS.bit_length() - 1
     milliseconds = max(20, round(100.0 / fps) * 10)
     shown: Indices | None = None
     with path.open("wb") as file:
         file.write(b"GIF89a" + struct.pack("<HHBBB", *palette.size, 0x80 | size_code, 0, 0))
-        file.write(colours + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
+        file.write(_colours(palette) + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
         for frame in frames:
             indices = np.asarray(_indexed(frame, palette))
             corner, part = _changed(indices, shown)
@@ -132,10 +131,15 @@ def _indexed(frame: Image, palette: Image) -> Image:
     return frame.quantize(palette=palette, dither=Dither.NONE)
 
 
+def _colours(palette: Image) -> bytes:
+    """Red, green and blue of every index, the transparent one too."""
+    return bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
+
+
 def _png(indices: Indices, palette: Image) -> str:
     """An indexed picture as base64 text; the index `COLOURS` is transparent."""
     picture = fromarray(indices, "P")
-    picture.putpalette(palette.getpalette() or ())
+    picture.putpalette(_colours(palette))
     buffer = io.BytesIO()
     picture.save(buffer, format="PNG", transparency=COLOURS)
     return base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from figures import junction
 from minisim.errors import InputError
-from minisim.geometry import ARM_NAMES, Floats, Intersection, Movement
+from minisim.geometry import Floats, Intersection, Movement
 from minisim.kernel import WAITING_SPEED
+from minisim.recording import movement_index
 from minisim.simulation import Run
 
 Rows = npt.NDArray[np.int64]
@@ -19,6 +20,8 @@ Rows = npt.NDArray[np.int64]
 DRIVING, STANDING, RELEASED = 0, 1, 2
 #: How long a collision stays marked [s].
 COLLISION_SHOWN = 3.0
+#: Radius of the ring that marks it [m].
+RING = 5.0
 
 
 class Film:
@@ -31,13 +34,13 @@ class Film:
                 f"no vehicle was recorded from {start:g} s on; start later or raise the density"
             )
         site = run.site
+        self.start = start
         self.run, self.n = run, site.intersection.n
         self.x, self.y = frame["x_m"].to_numpy(), frame["y_m"].to_numpy()
         self.angle, self.s = frame["angle_deg"].to_numpy(), frame["s_m"].to_numpy()
         self.speed = frame["speed_mps"].to_numpy()
-        lane = frame["lane"].map(ARM_NAMES.index).to_numpy()
-        self.lane = lane
-        self.path = lane * (self.n - 1) + frame["manoeuvre"].to_numpy() - 1
+        self.path = movement_index(frame, site)
+        self.lane = self.path // (self.n - 1)
         paths = site.intersection.paths
         self.turn = np.array([_turn(site.intersection, p.movement) for p in paths])
         self.exit = np.array([p.exit for p in paths])
@@ -52,7 +55,7 @@ class Film:
         self.bounds = np.append(first, len(ticks))
         gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
-        #: Who was clear of the junction before the first frame was not served in this film.
+        # Who was clear of the junction before the first frame was not served in this film.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
         counts = np.diff(self.bounds)
         self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)
@@ -78,6 +81,10 @@ class Film:
     def served(self, time: float) -> int:
         """How many vehicles have cleared the junction since the film began."""
         return int(np.searchsorted(self.cleared, time, side="right"))
+
+    def collided(self, time: float) -> int:
+        """How many collisions there have been since the film began."""
+        return sum(self.start <= c.time <= time for c in self.run.collisions)
 
     def open_lanes(self, rows: Rows) -> set[int]:
         """Lanes whose first vehicle before the junction has the right of way."""
@@ -120,9 +127,10 @@ class Film:
         return lamps
 
     def crashes(self, time: float) -> list[Floats]:
-        """A cross at each recent collision."""
+        """A ring around each recent collision."""
         site = self.run.site
-        cross = np.array([[(-3.0, -3.0), (3.0, 3.0)], [(-3.0, 3.0), (3.0, -3.0)]])
+        angle = np.linspace(0.0, 2.0 * np.pi, 49)
+        ring = RING * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         found: list[Floats] = []
         for collision in self.run.collisions:
             if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
@@ -133,7 +141,7 @@ class Film:
                 )[0]
                 for movement, s in zip(collision.movements, collision.positions, strict=True)
             ]
-            found += list(cross + np.mean(centres, axis=0))
+            found.append(ring + np.mean(centres, axis=0))
         return found
 
 

@@ -14,7 +14,6 @@ from types import MappingProxyType
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from minisim.errors import InputError
@@ -40,11 +39,6 @@ FORMATS = ("png", "pdf", "svg")
 def new_figure(width: float, height: float, *, dpi: float = 150) -> Figure:
     """An empty figure of width × height inches on white paper."""
     return Figure(figsize=(width, height), dpi=dpi, facecolor=PAPER)
-
-
-def canvas_of(figure: Figure) -> FigureCanvasAgg:
-    """A canvas of pixels for the figure."""
-    return FigureCanvasAgg(figure)
 
 
 def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:

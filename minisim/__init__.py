@@ -15,7 +15,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from minisim.version import VERSION as __version__
+from minisim.version import __version__
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals

@@ -118,6 +118,10 @@ class Demand:
             raise InputError(
                 f"the split gives a lane {max(rates):g} veh/h; at most {MAX_DENSITY:g} are allowed"
             )
+        if self.model == "shifted" and max(rates) / 3600.0 * self.min_headway >= 1.0:
+            raise InputError(
+                f"{max(rates):g} veh/h leave no room for a min_headway of {self.min_headway:g} s"
+            )
         return rates
 
     def draw(self, n: int, duration: float, seed: int) -> Arrivals:
@@ -148,10 +152,6 @@ class Demand:
             seconds = np.repeat(np.arange(len(counts), dtype=float), counts)
             return seconds[seconds < duration]
         shift = self.min_headway if self.model == "shifted" else 0.0
-        if rate * shift >= 1.0:
-            raise InputError(
-                f"{rate * 3600:g} veh/h leave no room for a min_headway of {shift:g} s"
-            )
         times: list[Floats] = []
         last = 0.0
         while last < duration:
@@ -252,7 +252,7 @@ def _column(name: str, value: npt.ArrayLike, dtype: type) -> npt.NDArray[np.gene
     if raw.ndim != 1 or raw.dtype.kind not in "iuf":
         raise wanted
     with np.errstate(invalid="ignore", over="ignore"):
-        column = raw.astype(dtype)
+        column: npt.NDArray[np.generic] = raw.astype(dtype)
     if not np.array_equal(column, raw, equal_nan=True):
         raise wanted
     return column

@@ -100,14 +100,18 @@ def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
 
 
 @njit
-def safe_insertion_speed(
-    gap: float, v_leader: float, b: float, headway: float, min_gap: float
+def insertion_speed(
+    gap: float, v_leader: float, a: float, b: float, headway: float, min_gap: float
 ) -> float:
-    """Highest speed with gap ≥ s0 + vT + v²/2b − v_leader²/2b; negative when there is none.
+    """Highest speed whose desired gap s* is not above `gap`; negative when there is none.
 
-    SUMO's insertion rule (VehicleInsertion: the follower must be able to brake safely).
+    SUMO's insertion rule for the IDM: the gap must be the law's own secure gap
+    (`MSCFModel_IDM::getSecureGap`), so that a vehicle never starts with hard braking.
+    Solves s0 + vT + v·(v − v_leader) / (2√(ab)) = gap for v.
     """
     room = gap - min_gap
     if room < 0.0:
         return -1.0
-    return math.sqrt(b * b * headway * headway + v_leader * v_leader + 2.0 * b * room) - b * headway
+    root = math.sqrt(a * b)
+    half = 0.5 * v_leader - root * headway
+    return half + math.sqrt(half * half + 2.0 * root * room)

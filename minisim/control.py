@@ -77,7 +77,7 @@ class Site:
         movements = self.intersection.movements
         origin = np.array([m.origin for m in movements])
         apart = origin[:, None] != origin[None, :]
-        return self.intersection.conflicts(self.vehicle, CLEARANCE) & apart
+        return np.asarray(self.intersection.conflicts(self.vehicle, CLEARANCE) & apart)
 
 
 class Observed(NamedTuple):
@@ -274,7 +274,7 @@ class Unregulated:
 
     name: str = "unregulated"
 
-    def start(self, site: Site) -> Session:
+    def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""
         return _UnregulatedSession()
 
@@ -282,5 +282,5 @@ class Unregulated:
 class _UnregulatedSession:
     plan = Plan(lanes_open=True)
 
-    def decide(self, view: View) -> tuple[Command, ...]:
+    def decide(self, view: View) -> tuple[Command, ...]:  # noqa: ARG002  (Session's argument)
         return ()

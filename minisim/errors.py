@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from numbers import Integral, Real
+from typing import Any
 
 
 class MinisimError(Exception):
@@ -25,7 +26,27 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched and the caller did not ask to record and go on."""
+    """Two bodies touched and the caller did not ask to record and go on.
+
+    Attributes:
+        collisions: the `minisim.collision.Collision`s of the step at which the run stopped.
+        replay: call it to run again up to a little after it, with the trajectories of the last
+            seconds (10 unless told) recorded; returns a `Run`. None on a copy from another
+            process.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        collisions: tuple[Any, ...] = (),
+        replay: Callable[..., Any] | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.collisions = collisions
+        self.replay = replay
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (*self.args, self.collisions)
 
 
 class ControllerError(MinisimError):

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from minisim.errors import InputError, choice, instance, number, numbers
+from minisim.errors import InputError, choice, number, numbers, show
 from minisim.vehicle import VehicleType
 
 Floats = npt.NDArray[np.float64]
@@ -178,8 +178,8 @@ class Intersection:
         choice("side", self.side, ("left", "right"))
         number("lane_width [m]", self.lane_width, low=2, high=6)
         number("arm_length [m]", self.arm_length, low=20, high=20_000)
-        instance("junction_radius", self.junction_radius, Real)
-        if self.junction_radius != self.junction_radius:  # NaN: not given
+        radius = self.junction_radius
+        if isinstance(radius, Real) and radius != radius:  # NaN: not given
             object.__setattr__(self, "junction_radius", self._default_radius)
         number("junction_radius [m]", self.junction_radius, above=0, below=self.arm_length - 10)
         tightest = min(self._arc_radius(m, self.junction_radius) for m in self.movements)
@@ -230,7 +230,7 @@ class Intersection:
             digits = text[1:]
             if digits.isascii() and digits.isdigit() and 10 <= int(digits) < self.n:
                 return Movement(ARM_NAMES.index(text[0]), int(digits))
-        raise InputError(self._no_such(repr(text)))
+        raise InputError(self._no_such(show(text)))
 
     def exit_arm(self, movement: Movement) -> int:
         """Index of the arm by which a movement leaves."""
@@ -360,7 +360,9 @@ def _corridors(intersection: Intersection, length: float, width: float) -> npt.N
 @lru_cache(maxsize=256)
 def _separation(intersection: Intersection, length: float, width: float) -> Floats:
     corridors = _corridors(intersection, length, width)
-    result = np.asarray(shapely.distance(corridors[:, None], corridors[None, :]))
+    i, j = np.triu_indices(len(corridors), 1)
+    result = np.zeros((len(corridors), len(corridors)))
+    result[i, j] = result[j, i] = shapely.distance(corridors[i], corridors[j])
     origin = np.array([m.origin for m in intersection.movements])
     result[origin[:, None] == origin[None, :]] = 0.0
     result.setflags(write=False)

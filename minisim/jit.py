@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Literal, TypeVar, cast
 
 _F = TypeVar("_F", bound=Callable[..., object])
 
@@ -20,7 +20,7 @@ def _enabled() -> bool:
         import numba
     except ImportError:
         return False
-    return not numba.config.DISABLE_JIT
+    return not getattr(numba.config, "DISABLE_JIT", False)
 
 
 #: Whether kernels are compiled in this process.
@@ -41,10 +41,10 @@ def njit_inline(function: _F) -> _F:
     return _compile(function, inline="always")
 
 
-def _compile(function: _F, inline: str) -> _F:
+def _compile(function: _F, inline: Literal["never", "always"]) -> _F:
     if not COMPILED:
         return function
     import numba
 
-    compiled: _F = numba.njit(cache=True, error_model="numpy", inline=inline)(function)
-    return compiled
+    compiler = numba.njit(cache=True, error_model="numpy", inline=inline)
+    return cast(_F, compiler(function))

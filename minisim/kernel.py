@@ -14,7 +14,7 @@ from minisim.carfollowing import (
     gap_ratio,
     idm,
     iidm,
-    safe_insertion_speed,
+    insertion_speed,
     speed_towards,
 )
 from minisim.jit import njit, njit_inline
@@ -80,8 +80,9 @@ def step(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats
 def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
     """Insert on each lane the next vehicle that is due, if the gap allows; FIFO, none dropped.
 
-    No faster than comfortable braking allows with the vehicle ahead, the lower limits ahead and,
+    No faster than the vehicle ahead allows, nor comfortable braking the lower limits ahead and,
     while the lane is closed, the hold line.
+
     Returns whether a vehicle was inserted past a wake-up mark.
     """
     passed = False
@@ -103,7 +104,9 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
             rear = vehicles[j]["s"] - law.length
-            safe = safe_insertion_speed(rear - s, vehicles[j]["v"], law.b, law.headway, law.min_gap)
+            safe = insertion_speed(
+                rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
+            )
             if safe < 0.0:
                 continue
             v = min(v, safe)
@@ -206,7 +209,7 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
     """Bound on the acceleration that meets a lower limit ahead by comfortable braking."""
     if v + acc * law.dt <= target:
         return acc
-    v_new = speed_towards(v, target, distance, law.b, law.dt)
+    v_new = max(speed_towards(v, target, distance, law.b, law.dt), target)
     return max((v_new - v) / law.dt, -law.b)
 
 
@@ -218,14 +221,14 @@ def hold(v: float, s: float, law: Law) -> float:
     that no longer reaches the line, stop before the junction, braking as hard as that needs.
     """
     to_line = law.hold - s
-    if v * v <= 2.0 * law.b * to_line:
-        distance = to_line - STOP_MARGIN
+    distance = to_line - STOP_MARGIN
+    if v * v <= 2.0 * law.b * distance:
         if v == 0.0 and distance < 1e-3:
             return 0.0
         v_new = speed_towards(v, 0.0, distance, law.b, law.dt)
-        if v_new > 0.0:
-            return (v_new - v) / law.dt
-        return -v * v / (2.0 * max(distance, 1e-6))
+        return (v_new - v) / law.dt if v_new > 0.0 else -v * v / (2.0 * max(distance, 1e-6))
+    if v * v <= 2.0 * law.b * to_line:
+        return -law.b
     to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
     return -max(law.b, v * v / (2.0 * to_junction))
 

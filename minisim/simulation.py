@@ -39,7 +39,6 @@ from minisim.errors import (
     number,
     numbers,
 )
-from minisim.geometry import ARM_NAMES
 from minisim.recording import TRAJECTORY_COLUMNS
 from minisim.state import (
     DRIVING,
@@ -54,13 +53,16 @@ from minisim.state import (
     first_tick,
 )
 from minisim.trips import Trips, collect_trips, summarise, trip_table
-from minisim.version import VERSION
+from minisim.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
+
+#: How long a replay goes on after the collision [s].
+AFTERMATH = 2.0
 
 
 class ScenarioLike(Protocol):
@@ -161,7 +163,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self.tick * self.site.dt
+        return round(self.tick * self.site.dt, 6)
 
     @property
     def finished(self) -> bool:
@@ -260,9 +262,9 @@ class Simulation:
         kind = type(command)
         try:
             if kind is Go:
-                self._vehicles["go"][self._row_of(command[0])] = 1
+                self._vehicles["go"][self._row_of(command)] = 1
             elif kind is Hold:
-                self._vehicles["go"][self._row_of(command[0])] = 0
+                self._vehicles["go"][self._row_of(command)] = 0
             elif kind is Open or kind is Close:
                 lane = integer("lane", command[0], low=0, high=len(self._lanes) - 1)
                 self._lanes["open"][lane] = kind is Open
@@ -270,7 +272,7 @@ class Simulation:
                 speed = math.inf if command.speed == math.inf else command.speed
                 if speed != math.inf:
                     speed = number("advised speed [m/s]", speed, low=0)
-                self._vehicles["advice"][self._row_of(command.vehicle)] = speed
+                self._vehicles["advice"][self._row_of(command)] = speed
             elif isinstance(command, Wake):
                 tick = first_tick(number("wake-up time [s]", command.time), self.site.dt)
                 if tick <= self.tick:
@@ -285,8 +287,9 @@ class Simulation:
                 f"controller {self.controller.name!r} at {self.time:.1f} s: {error}"
             ) from error
 
-    def _row_of(self, vehicle: int) -> int:
-        row: int = self._row[integer("vehicle", vehicle, low=0, high=len(self._row) - 1)]
+    def _row_of(self, command: Command) -> int:
+        vehicle = integer("vehicle", command[0], low=0, high=len(self._row) - 1)
+        row: int = self._row[vehicle]
         return row
 
     def _check_collisions(self) -> None:
@@ -303,7 +306,7 @@ class Simulation:
                 self._collisions[collision.vehicles] = collision
                 new.append(collision)
         if new and self._stop_on_collision:
-            raise CollisionReport(new, self)
+            raise _collision_error(new, self)
 
     def _near_bodies(self) -> tuple[list[int], list[Body]]:
         """Rows and bodies of all vehicles in and near the junction."""
@@ -315,9 +318,8 @@ class Simulation:
             if path.entry - vehicle.length <= s <= path.exit + 2 * vehicle.length:
                 centre, heading = path.pose(s, vehicle.length)
                 rows.append(i)
-                bodies.append(
-                    Body(*centre.tolist(), *heading.tolist(), vehicle.length, vehicle.width)
-                )
+                (x, y), (ux, uy) = centre.tolist(), heading.tolist()
+                bodies.append(Body(x, y, ux, uy, vehicle.length, vehicle.width))
         return rows, bodies
 
     def _overlaps_in_lane(self) -> list[tuple[int, int]]:
@@ -357,26 +359,10 @@ class Simulation:
         self._traced = 0
 
 
-class CollisionReport(CollisionError):
-    """The collisions that stopped a run, and how to see them again.
+def _collision_error(collisions: list[Collision], stopped: Simulation) -> CollisionError:
+    """What stopped a run, with a `replay` that records what led to it."""
 
-    Attributes:
-        collisions: those of the step at which the run stopped.
-        simulation: the stopped run.
-    """
-
-    def __init__(self, collisions: list[Collision], simulation: Simulation) -> None:
-        self.collisions = tuple(collisions)
-        self.simulation = simulation
-        what = "; ".join(str(c) for c in collisions)
-        super().__init__(
-            f"{what} (scenario {simulation.scenario.name}, controller "
-            f"{simulation.controller.name}, seed {simulation.seed})"
-        )
-
-    def replay(self, seconds: float = 10.0) -> Run:
-        """Run again up to a little after the collision and record its last `seconds` [s]."""
-        stopped = self.simulation
+    def replay(seconds: float = 10.0) -> Run:
         again = Simulation(
             stopped.scenario,
             stopped.controller,
@@ -385,8 +371,12 @@ class CollisionReport(CollisionError):
             record_window=(max(0.0, stopped.time - seconds), math.inf),
             on_collision="record",
         )
-        again.advance(stopped.time + 2.0)
+        again.advance(stopped.time + AFTERMATH)
         return again.result()
+
+    what = "; ".join(str(collision) for collision in collisions)
+    where = f"scenario {stopped.scenario.name}, controller {stopped.controller.name}"
+    return CollisionError(f"{what} ({where}, seed {stopped.seed})", tuple(collisions), replay)
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,7 +425,7 @@ class Run:
     def provenance(self) -> dict[str, str]:
         """Version, environment and parameters: all that is needed to run it again."""
         return {
-            "minisim": VERSION,
+            "minisim": __version__,
             "python": platform.python_version(),
             "numpy": np.__version__,
             "scenario": repr(self.scenario),
@@ -454,20 +444,23 @@ class Run:
 
         if self.record is None:
             raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        trace, paths = self.trace, self.site.intersection.paths
+        vehicle = self.rows["id"][self.trace["row"]]
+        order = np.lexsort((vehicle, self.trace["tick"]))
+        trace, vehicle = self.trace[order], vehicle[order]
+        paths, arms = self.site.intersection.paths, self.site.intersection.arms
         path_of = self.rows["path"][trace["row"]]
         front = np.zeros((len(trace), 2))
         heading = np.zeros((len(trace), 2))
         for p in np.unique(path_of).tolist():
-            chosen = path_of == p
+            chosen = np.flatnonzero(path_of == p)
             s = trace["s"][chosen]
             front[chosen] = paths[p].position(s)
             heading[chosen] = paths[p].pose(s, self.site.vehicle.length)[1]
         manoeuvres = self.site.intersection.n - 1
         columns = (
             np.round(trace["tick"] * self.site.dt, 6),
-            self.rows["id"][trace["row"]],
-            np.array(list(ARM_NAMES))[path_of // manoeuvres],
+            vehicle,
+            pd.Categorical.from_codes(path_of // manoeuvres, pd.Index([arm.name for arm in arms])),
             path_of % manoeuvres + 1,
             trace["s"],
             front[:, 0],
@@ -477,8 +470,7 @@ class Run:
             trace["a"],
             trace["released"] != 0,
         )
-        frame = pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
-        return frame.sort_values(["time_s", "vehicle"], ignore_index=True)
+        return pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
 
 
 def simulate(

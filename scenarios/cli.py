@@ -5,25 +5,41 @@ Every command imports what it needs when it runs, so that `minisim --help` is qu
 
 from __future__ import annotations
 
-import json
-import math
 import os
+import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
-from minisim.errors import InputError, MinisimError
-from minisim.version import VERSION
+from minisim.errors import InputError, MinisimError, integer
+from minisim.version import __version__
+from scenarios.options import (
+    Arrivals,
+    AsJson,
+    Bearings,
+    ControllerName,
+    Density,
+    ProfileName,
+    ScenarioName,
+    Seed,
+    Side,
+    Split,
+    Turns,
+    build_scenario,
+)
+from scenarios.terminal import bar, show, show_json
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    import pandas as pd
 
     from minisim.simulation import Run
     from scenarios.scenario import Scenario
+
+COMMANDS = ("demo", "run", "harmony", "decide", "animate")
 
 #: What typer raises for a wrong command line: the parent of its public `BadParameter`.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
@@ -37,76 +53,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-ScenarioName = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="The junction: three-way, four-way, five-way, N-way (such as 6-way), or custom "
-        "with --bearings.",
-        show_default=False,
-    ),
-]
-ControllerName = Annotated[
-    str,
-    typer.Option(
-        "--controller", "-c", metavar="NAME",
-        help="Who decides: dim (the paper's rules), dim-harmonious (enter beside crossing "
-        "vehicles in harmony), dim-lanes, dim-inflow, dim-paper-commit, fixed-time, "
-        "fixed-time-equal, unregulated.",
-    ),
-]  # fmt: skip
-Density = Annotated[
-    float | None,
-    typer.Option(
-        "--density", "-d", metavar="VEH/H",
-        help="Mean inflow a lane in vehicles per hour; 350 by default.", show_default=False,
-    ),
-]  # fmt: skip
-Split = Annotated[
-    str | None,
-    typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …; equal by default."),
-]
-Turns = Annotated[
-    str | None,
-    typer.Option(
-        metavar="1:2:1",
-        help="Shares of the manoeuvres 1, 2, 3, … (the j-th exit clockwise); equal by default.",
-    ),
-]
-ProfileName = Annotated[
-    str,
-    typer.Option(
-        "--profile", "-p", metavar="NAME",
-        help="Vehicle and speeds: paper (what its text prescribes) or fair (one vehicle and "
-        "speed limit for every controller).",
-    ),
-]  # fmt: skip
-Side = Annotated[
-    str, typer.Option(metavar="left|right", help="Side of the road that traffic keeps to.")
-]
-Bearings = Annotated[
-    str | None,
-    typer.Option(
-        metavar="0,80,190,260",
-        help="Bearings of the arms in degrees clockwise from north, at least 30 apart; "
-        "for the scenario custom.",
-    ),
-]
-Seed = Annotated[int, typer.Option("--seed", "-s", help="Of the random arrivals.", min=0)]
-Arrivals = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="CSV of recorded arrivals (demand_time_s, lane, manoeuvre) to replay instead of "
-        "drawing them.",
-    ),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
-
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"minisim {VERSION}")
+        typer.echo(f"minisim {__version__}")
         raise typer.Exit
 
 
@@ -130,10 +80,10 @@ def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table, plot and GIF.")] = (
         Path("out")
     ),
-    seeds: Annotated[int, typer.Option(help="Runs a point; at least 2.", min=2, max=1000)] = 5,
+    seeds: Annotated[int, typer.Option(help="Runs a point; at least 2.")] = 5,
     jobs: Annotated[
         int | None,
-        typer.Option(help="Processes to use; one a core by default.", show_default=False, min=1),
+        typer.Option(help="Processes to use; one a core by default.", show_default=False),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Fewer points, shorter runs: a smoke test.")
@@ -143,24 +93,26 @@ def demo(
     from scenarios.demo import Tour, demo_table, demo_title, run_tour, write_tables
     from scenarios.files import make_folder
 
-    folder = make_folder(out)
     tour = Tour.quick(seeds) if quick else Tour(seeds=seeds)
-    with _bar("starting"):
+    processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1)
+    folder = make_folder(out)
+    with bar("starting"):
         film = tour.film()  # first, for it compiles the kernel once for all processes
-    with _bar("simulating") as bar:
-        points = run_tour(tour, jobs or os.cpu_count() or 1, bar)
+    with bar("simulating") as progress:
+        points = run_tour(tour, processes, progress)
     from figures.animate import write_animation
     from figures.performance import performance_figure
     from figures.style import save
 
     write_tables(points, tour, folder)
     save(performance_figure(points, demo_title(tour)), folder / "demo.png")
-    with _bar("drawing") as bar:
+    with bar("drawing") as progress:
         write_animation(
             film, folder / "demo.gif", start=tour.film_start, seconds=tour.film_seconds,
-            progress=bar,
+            progress=progress,
         )  # fmt: skip
-    _print(demo_title(tour), demo_table(points))
+    typer.echo(demo_title(tour))
+    show(demo_table(points))
     for name in ("demo.csv", "demo.md", "demo.png", "demo.gif"):
         typer.echo(f"  wrote {folder / name}")
 
@@ -217,7 +169,7 @@ def run(
             check_table(table)
     if fcd is not None:
         check_file(fcd)
-    what = _scenario(
+    what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
@@ -227,21 +179,22 @@ def run(
         what, who, seed, record="all" if everything else "junction", on_collision=on_collision
     )
     summary = result.summary()
-    summary["safety"] = safety_summary(result.trajectories, result.site)
-    if trips is not None:
-        write_trips(result.trips, trips)
-    if trajectories is not None:
-        write_trajectories(result.trajectories, trajectories)
-    if fcd is not None:
-        write_fcd(result.trajectories, fcd, result.site)
+    with bar("measuring"):
+        summary["safety"] = safety_summary(_near_junction(result), result.site)
+        if trips is not None:
+            write_trips(result.trips, trips)
+        if trajectories is not None:
+            write_trajectories(result.trajectories, trajectories)
+        if fcd is not None:
+            write_fcd(result.trajectories, fcd, result.site)
     if as_json:
-        _print_json(summary)
+        show_json(summary)
         return
     from scenarios.report import run_table, run_title, safety_line
 
-    _print(run_title(summary), run_table(summary), safety_line(summary))
+    show(run_title(summary), run_table(summary), safety_line(summary))
     for collision in result.collisions[:10]:
-        _print(f"  {collision}")
+        typer.echo(f"  {collision}")
     for path in (trips, trajectories, fcd):
         if path is not None:
             typer.echo(f"  wrote {path}")
@@ -271,13 +224,13 @@ def harmony(
 
     if csv and as_json:
         raise InputError("--csv and --json exclude each other; give one")
-    what = _scenario(scenario, bearings, profile=profile, side=side)
+    what = build_scenario(scenario, bearings, profile=profile, side=side)
     room = CLEARANCE if clearance is None else clearance
     matrix = HarmonyMatrix.from_geometry(what.intersection, what.profile.vehicle, room)
     if csv:
         typer.echo(matrix.to_text(), nl=False)
     elif as_json:
-        _print_json({
+        show_json({
             "scenario": what.name,
             "side": side,
             "clearance_m": room,
@@ -287,8 +240,8 @@ def harmony(
     else:
         from scenarios.report import harmony_table
 
-        title = f"{what.name}, {side}-hand traffic: ● harmony, · conflict"
-        _print(title, harmony_table(matrix))
+        typer.echo(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
+        show(harmony_table(matrix))
 
 
 @app.command(
@@ -334,7 +287,7 @@ def decide(
 
         figure_format(plot)
         check_file(plot)
-    what = _scenario(scenario, bearings, profile=profile, side=side)
+    what = build_scenario(scenario, bearings, profile=profile, side=side)
     site = what.site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     explanation = explain(movements, matrix, order)
@@ -344,7 +297,7 @@ def decide(
 
         save(decision_figure(explanation, site, Dim().start(site).plan), plot)
     if as_json:
-        _print_json({
+        show_json({
             "scenario": what.name,
             "order": order,
             "participants": list(map(str, explanation.participants)),
@@ -357,7 +310,7 @@ def decide(
         return
     from scenarios.report import decision_text
 
-    _print(decision_text(explanation))
+    show(decision_text(explanation))
     if plot is not None:
         typer.echo(f"wrote {plot}")
 
@@ -399,7 +352,7 @@ def animate(
     animation_format(out)
     check_file(out)
     frame_times(start, seconds, fps, profile_named(profile).dt)
-    what = _scenario(
+    what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=start + seconds,
     )  # fmt: skip
@@ -407,8 +360,8 @@ def animate(
         what, controller_named(controller, profile), seed,
         record="all", record_window=(start, start + seconds), on_collision="record",
     )  # fmt: skip
-    with _bar("drawing") as bar:
-        write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=bar)
+    with bar("drawing") as progress:
+        write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=progress)
     typer.echo(f"wrote {out}")
 
 
@@ -424,63 +377,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MinisimError as error:
         return _fail(str(error))
     except _USAGE_ERROR as error:
-        return _fail(str(getattr(error, "format_message", error.__str__)()))
+        message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
+        help_of = [name for name in given[:1] if name in COMMANDS]
+        see = shlex.join(["minisim", *help_of, "--help"])
+        return _fail(f"{message} (typed: {shlex.join(given)}; see {see})")
     except (KeyboardInterrupt, typer.Abort):
-        print("minisim: interrupted", file=sys.stderr)  # noqa: T201
-        return 130
+        code = 130
     except BrokenPipeError:
         # The reader of our output has gone (as `head` does): no more to say, and no complaint.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    if code == 130:
+        typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
 
 
 def _fail(message: str) -> int:
-    print("minisim:", " ".join(message.split()), file=sys.stderr)  # noqa: T201
+    typer.echo(f"minisim: {' '.join(message.split())}", err=True)
     return 2
-
-
-def _scenario(
-    name: str,
-    bearings: str | None,
-    arrivals: Path | None = None,
-    density: float | None = None,
-    split: str | None = None,
-    turns: str | None = None,
-    **options: Any,
-) -> Scenario:
-    """The scenario of the options that all commands share."""
-    from dataclasses import replace
-
-    from minisim.arrivals import read_arrivals
-    from scenarios.library import scenario_named
-
-    drawn = {"--density": density, "--split": split, "--turns": turns}
-    if arrivals is not None:
-        clash = [option for option, value in drawn.items() if value is not None]
-        if clash:
-            raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
-    made = scenario_named(
-        name,
-        None if bearings is None else _numbers("--bearings", bearings, ",", "0,80,190,260"),
-        density=350.0 if density is None else density,
-        split=None if split is None else _numbers("--split", split, ":", "4:3:2:1"),
-        turns=None if turns is None else _numbers("--turns", turns, ":", "1:2:1"),
-        **options,
-    )
-    if arrivals is None:
-        return made
-    return replace(made, recorded=read_arrivals(arrivals, made.intersection.n))
-
-
-def _numbers(option: str, text: str, separator: str, example: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(part) for part in text.split(separator))
-    except ValueError:
-        values = (math.nan,)
-    if not all(map(math.isfinite, values)):
-        raise InputError(f"{option} is written like {example}, got {text!r}")
-    return values
 
 
 def _simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
@@ -489,48 +403,25 @@ def _simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) ->
 
     simulation = Simulation(scenario, controller, seed=seed, **options)
     parts = 100
-    with _bar("simulating") as bar:
+    with bar("simulating") as progress:
         for part in range(1, parts + 1):
             simulation.advance(scenario.horizon * part / parts)
-            bar(part, parts)
+            progress(part, parts)
     return simulation.run()
 
 
-class _Bar:
-    """Shows `done` of `total`, once there is something to show."""
+def _near_junction(run: Run) -> pd.DataFrame:
+    """The trajectories as far as `record="junction"` keeps them.
 
-    def __init__(self, progress: Progress, label: str) -> None:
-        self._progress = progress
-        self._task = progress.add_task(label, total=None)
+    A recording of everything then gives the same safety numbers.
+    """
+    from minisim.recording import S, movement_index
+    from minisim.state import RECORD_BEFORE, RECORD_PAST
 
-    def __call__(self, done: int, total: int) -> None:
-        self._progress.update(self._task, completed=done, total=total)
-
-
-@contextmanager
-def _bar(label: str) -> Iterator[_Bar]:
-    """A progress bar on stderr that leaves nothing behind; silent where that is no terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
-        yield _Bar(progress, label)
-
-
-def _print(*renderables: Any) -> None:
-    """Print for a terminal; where output goes to a file, nothing is wrapped."""
-    from rich.console import Console
-
-    console = Console(highlight=False, markup=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, markup=False, width=400)
-    for renderable in renderables:
-        console.print(renderable)
-
-
-def _print_json(value: Any) -> None:
-    typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
+    frame, paths = run.trajectories, run.site.intersection.paths
+    if run.record == "junction":
+        return frame
+    last = np.array([path.exit + RECORD_PAST for path in paths])
+    s = frame[S].to_numpy()
+    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, run.site)])
+    return frame[near]

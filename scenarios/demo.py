@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.table import Table
 
-from minisim.errors import MinisimError, integer
+from minisim.errors import InputError, MinisimError, integer, number, numbers
 from minisim.recording import replacing
-from minisim.version import VERSION
+from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
 from scenarios.statistics import Interval, mean_interval
@@ -60,6 +60,11 @@ class Tour:
 
     def __post_init__(self) -> None:
         integer("seeds", self.seeds, low=2)
+        if not numbers("densities", self.densities):
+            raise InputError("a tour needs at least one density [veh/h/lane]")
+        number("horizon [s]", self.horizon, above=0)
+        number("film_start [s]", self.film_start, low=0)
+        number("film_seconds [s]", self.film_seconds, above=0)
 
     @classmethod
     def quick(cls, seeds: int) -> Tour:
@@ -165,7 +170,7 @@ def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
     points.round(6).to_csv(buffer, index=False, lineterminator="\n")
     headings = _headings()
     lines = [
-        f"{demo_title(tour)}. minisim {VERSION}.",
+        f"{demo_title(tour)}. minisim {__version__}.",
         "",
         f"| {' | '.join(headings)} |",
         f"|{'|'.join('---' if k == 1 else '---:' for k in range(len(headings)))}|",

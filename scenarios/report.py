@@ -66,11 +66,11 @@ def harmony_table(matrix: HarmonyMatrix) -> Table:
     manoeuvres = range(1, matrix.n)
     for lane in ARM_NAMES[: matrix.n]:
         table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, row in zip(matrix.movements, matrix.values.tolist(), strict=True):
+    for movement, values in zip(matrix.movements, matrix.values, strict=True):
         cells = [Text(str(movement), style="bold")]
-        for lane in range(matrix.n):
-            marks = row[lane * (matrix.n - 1) :]
-            cells.append(Text("").join(map(_mark, marks, manoeuvres)))
+        for first in range(0, len(values), matrix.n - 1):
+            part = values[first:].tolist()
+            cells.append(Text("").join(map(_mark, part, manoeuvres)))
         table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
     return table
 

@@ -12,6 +12,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     as_completed,
 )
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
@@ -72,7 +73,8 @@ def sweep(
     if executor is None:
         with workers(min(os.cpu_count() or 1, max(1, len(todo)))) as own:
             return sweep(todo, own, progress)
-    futures = [executor.submit(run_row, experiment) for experiment in todo]
+    with _uninterrupted():
+        futures = [executor.submit(run_row, experiment) for experiment in todo]
     try:
         for done, _ in enumerate(as_completed(futures), start=1):
             if progress is not None:
@@ -93,7 +95,7 @@ def workers(jobs: int) -> Executor:
     integer("jobs", jobs, low=1, high=1024)
     if jobs == 1:
         return ThreadPoolExecutor(1)
-    # Ctrl-C reaches every process of the terminal; the parent's answer is enough.
+    # Ctrl-C reaches every process of the terminal; the answer of this one is enough.
     return ProcessPoolExecutor(
         jobs,
         mp_context=get_context("spawn"),
@@ -111,6 +113,19 @@ def run_row(experiment: Experiment) -> dict[str, Any]:
     except MinisimError as error:
         return _failed(experiment, error)
     return {**dict(_flat(run.summary())), "error": None}
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Put Ctrl-C off, and keep it from processes that are started meanwhile."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _outcome(experiment: Experiment, future: Future[dict[str, Any]]) -> dict[str, Any]:

@@ -106,11 +106,10 @@ def _write_routes(folder: Path) -> None:
 def _step_sumo(folder: Path) -> None:
     import libsumo
 
-    libsumo.start(
-        ["sumo", "-n", str(folder / "x.net.xml"), "-r", str(folder / "x.rou.xml")]
-        + ["--step-length", "0.1", "--time-to-teleport", "-1", "--no-step-log", "true"]
-        + ["--no-warnings", "true"]
-    )
+    command = ["sumo", "-n", str(folder / "x.net.xml"), "-r", str(folder / "x.rou.xml")]
+    command += ["--step-length", "0.1", "--time-to-teleport", "-1"]
+    command += ["--no-step-log", "true", "--no-warnings", "true"]
+    libsumo.start(command)
     start = time.process_time()
     metres = 0.0
     for _ in range(36_000):

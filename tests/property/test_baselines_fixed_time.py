@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
@@ -43,7 +43,6 @@ def emptying(draw: st.DrawFn) -> Scenario:
     )
 
 
-@settings(max_examples=100)
 @given(emptying(), signals())
 def test_nobody_collides_and_everybody_is_served(scenario: Scenario, signal: FixedTime) -> None:
     run = minisim.simulate(scenario, signal, record="junction", on_collision="record")

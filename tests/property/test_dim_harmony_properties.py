@@ -59,7 +59,7 @@ def test_more_clearance_only_removes_harmony(
         assert not np.any(larger.values & ~smaller.values)
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(intersections(max_arms=5), st.floats(0.0, 0.5))
 def test_wider_vehicles_only_remove_harmony(intersection: Intersection, extra: float) -> None:
     narrow = HarmonyMatrix.from_geometry(intersection, VehicleType(width=1.6))

@@ -215,7 +215,7 @@ def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
     with pytest.raises(InputError, match="gives a lane 4000 veh/h; at most 3600"):
         Demand(density=1000.0, split=(1, 0, 0, 0)).rates(4)
     with pytest.raises(InputError, match="leave no room for a min_headway of 4 s"):
-        Demand(density=1000.0, model="shifted", min_headway=4.0).draw(4, 60.0, seed=1)
+        Demand(density=1000.0, model="shifted", min_headway=4.0).rates(4)
     with pytest.raises(InputError, match="duration"):
         Demand(density=100.0).draw(4, 0.0, seed=1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 
@@ -139,7 +140,7 @@ def test_delay_has_no_bound_at_saturation() -> None:
         ([350] * 4, {"max_cycle": 15}, "max_cycle .* at least 16"),
     ],
 )
-def test_bad_input_is_one_clear_error(rates: list[float], options: dict[str, float], message: str) -> None:
+def test_bad_input_is_one_clear_error(rates: Any, options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         webster(rates, **options)
 

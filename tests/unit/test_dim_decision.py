@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -129,8 +130,7 @@ def test_choice_and_reason(
     assert text(explanation.right_of_way) == chosen
     assert explanation.cliques[0] == explanation.right_of_way
     assert decide(movements.split(), matrix, order, priorities) == explanation.right_of_way
-    with pytest.raises(AssertionError, match=reason):
-        raise AssertionError(explanation.reason)
+    assert re.search(reason, explanation.reason)
 
 
 def test_nobody() -> None:
@@ -236,25 +236,25 @@ def test_a_table_of_many_arms_is_filled_on_demand_only() -> None:
 
 
 @pytest.mark.parametrize(
-    ("participants", "crossing", "following", "admitted"),
+    ("participants", "crossing", "admitted"),
     [
-        ("a1 b2 c2 d2", "b1", False, "a1 c2 d2"),  # b2 follows in the lane of b1
-        ("a1 b2 c2 d2", "b1", True, "a1 b2 c2 d2"),
-        ("a1 b2 c2 d2", "a1", False, "b2 c2"),
-        ("a1 b2 c2 d2", "a1", True, "a1 b2 c2"),
-        ("a1 b2 c2 d2", "a1 b2", False, ""),
-        ("a1 b2 c2 d2", "a1 b2", True, "a1 b2"),
-        ("a2 c2", "b2", False, ""),
-        ("c1", "a1 b1", False, "c1"),
+        ("a1 b2 c2 d2", "", "a1 b2 c2 d2"),
+        ("a1 b2 c2 d2", "b1", "a1 b2 c2 d2"),  # b2 follows in the lane of b1
+        ("a1 b2 c2 d2", "a1", "a1 b2 c2"),
+        ("a1 b2 c2 d2", "a1 b2", "a1 b2"),
+        ("a2 c2", "b2", ""),
+        ("c1", "a1 b1", "c1"),
+        ("d3", "d1 d2", "d3"),  # all of one lane
+        ("a3 b2", "a1 c1", ""),  # a3 behind a1, but in conflict with c1
     ],
 )
 def test_who_is_admitted_beside_crossing_vehicles(
-    participants: str, crossing: str, following: bool, admitted: str
+    participants: str, crossing: str, admitted: str
 ) -> None:
     matrix = HarmonyMatrix.paper(4)
     table = DecisionTable(matrix)
     occupied = sum(1 << matrix.index(m) for m in crossing.split())
-    case = table.admitted(table.case(participants.split()), occupied, following)
+    case = table.admitted(table.case(participants.split()), occupied)
     assert text(table.participants(case)) == admitted
 
 
@@ -263,9 +263,10 @@ def test_who_is_admitted_beside_crossing_vehicles(
     [
         (["a1", "a2"], "one participant a lane: lane a has a1 and a2"),
         (["b1", "b1"], "lane b has b1 and b1"),
-        (["e1"], "no movement e1"),
-        (["a4"], "no movement a4"),
+        (["e1"], "no movement 'e1'"),
+        (["a4"], "no movement 'a4'"),
         ([5], "no movement 5"),
+        ([10**5000], "no movement a int too large"),
         ("a1", "must be a sequence such as a1, b2"),
         (7, "must be a sequence"),
     ],
@@ -281,7 +282,7 @@ def test_participants_are_checked(movements: object, message: str) -> None:
 
 def test_other_arguments_are_checked() -> None:
     matrix = HarmonyMatrix.paper(4)
-    with pytest.raises(InputError, match="unknown order 'sise'.*did you mean 'size'"):
+    with pytest.raises(InputError, match=r"unknown order 'sise'.*did you mean 'size'"):
         decide(["a1"], matrix, "sise")
     with pytest.raises(InputError, match="unknown order"):
         DecisionTable(matrix, "first")
@@ -299,9 +300,9 @@ def test_other_arguments_are_checked() -> None:
     [(0, 1, 2), (0, 1, 2, 2), (1, 2, 3, 4), (0, 1, 2, 3, 4), "abcd", 4, (0.0, 1, 2, 3)],
 )
 def test_priorities_are_a_permutation_of_the_lanes(priorities: object) -> None:
-    with pytest.raises(InputError, match="priorities|lane rank"):
+    with pytest.raises(InputError, match=r"priorities|lane rank"):
         lane_ranks(priorities, 4)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="priorities|lane rank"):
+    with pytest.raises(InputError, match=r"priorities|lane rank"):
         decide(["a1"], HarmonyMatrix.paper(4), "size", priorities)  # type: ignore[arg-type]
 
 

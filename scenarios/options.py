@@ -1,0 +1,122 @@
+"""Options that several commands share, and the scenario that they describe."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from minisim.errors import InputError
+
+if TYPE_CHECKING:
+    from scenarios.scenario import Scenario
+
+ScenarioName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="The junction: three-way, four-way, five-way, N-way (such as 6-way), or custom "
+        "with --bearings.",
+        show_default=False,
+    ),
+]
+ControllerName = Annotated[
+    str,
+    typer.Option(
+        "--controller", "-c", metavar="NAME",
+        help="Who decides: dim (the paper's rules), dim-harmonious (enter beside crossing "
+        "vehicles in harmony), dim-lanes, dim-inflow, dim-paper-commit, fixed-time, "
+        "fixed-time-equal, unregulated.",
+    ),
+]  # fmt: skip
+Density = Annotated[
+    float | None,
+    typer.Option(
+        "--density", "-d", metavar="VEH/H",
+        help="Mean inflow a lane in vehicles per hour; 350 by default.", show_default=False,
+    ),
+]  # fmt: skip
+Split = Annotated[
+    str | None,
+    typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …; equal by default."),
+]
+Turns = Annotated[
+    str | None,
+    typer.Option(
+        metavar="1:2:1",
+        help="Shares of the manoeuvres 1, 2, 3, … (the j-th exit clockwise); equal by default.",
+    ),
+]
+ProfileName = Annotated[
+    str,
+    typer.Option(
+        "--profile", "-p", metavar="NAME",
+        help="Vehicle and speeds: paper (what its text prescribes) or fair (one vehicle and "
+        "speed limit for every controller).",
+    ),
+]  # fmt: skip
+Side = Annotated[
+    str, typer.Option(metavar="left|right", help="Side of the road that traffic keeps to.")
+]
+Bearings = Annotated[
+    str | None,
+    typer.Option(
+        metavar="0,80,190,260",
+        help="Bearings of the arms in degrees clockwise from north, at least 30 apart; "
+        "for the scenario custom.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", "-s", help="Of the random arrivals.")]
+Arrivals = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="CSV of recorded arrivals (demand_time_s, lane, manoeuvre) to replay instead of "
+        "drawing them.",
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def build_scenario(
+    name: str,
+    bearings: str | None,
+    arrivals: Path | None = None,
+    density: float | None = None,
+    split: str | None = None,
+    turns: str | None = None,
+    **options: Any,
+) -> Scenario:
+    """The scenario that the options describe; raises `MinisimError` for what they may not be."""
+    from minisim.arrivals import read_arrivals
+    from scenarios.library import scenario_named
+
+    drawn = {"--density": density, "--split": split, "--turns": turns}
+    if arrivals is not None:
+        clash = [option for option, value in drawn.items() if value is not None]
+        if clash:
+            raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
+    made = scenario_named(
+        name,
+        None if bearings is None else _numbers("--bearings", bearings, ",", "0,80,190,260"),
+        density=350.0 if density is None else density,
+        split=None if split is None else _numbers("--split", split, ":", "4:3:2:1"),
+        turns=None if turns is None else _numbers("--turns", turns, ":", "1:2:1"),
+        **options,
+    )
+    if arrivals is None:
+        return made
+    return replace(made, recorded=read_arrivals(arrivals, made.intersection.n))
+
+
+def _numbers(option: str, text: str, separator: str, example: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(separator))
+    except ValueError:
+        values = (math.nan,)
+    if not all(map(math.isfinite, values)):
+        raise InputError(f"{option} is written like {example}, got {text!r}")
+    return values

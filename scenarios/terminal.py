@@ -1,0 +1,57 @@
+"""Printing on stdout and progress on stderr."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.measure import Measurement
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+
+class Bar:
+    """Shows `done` of `total`, once there is something to show."""
+
+    def __init__(self, progress: Progress, label: str) -> None:
+        self._progress = progress
+        self._task = progress.add_task(label, total=None)
+
+    def __call__(self, done: int, total: int) -> None:
+        """Move the bar."""
+        self._progress.update(self._task, completed=done, total=total)
+
+
+@contextmanager
+def bar(label: str) -> Iterator[Bar]:
+    """A progress bar on stderr that leaves nothing behind; silent where that is no terminal."""
+    console = Console(stderr=True)
+    columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        yield Bar(progress, label)
+
+
+def show(*renderables: Text | Table) -> None:
+    """Print on stdout; only text is wrapped, and only for a terminal."""
+    console = Console(highlight=False, markup=False)
+    for renderable in renderables:
+        if isinstance(renderable, Table) or not console.is_terminal:
+            console.width = max(console.width, _width(console, renderable))
+        console.print(renderable)
+
+
+def _width(console: Console, renderable: Text | Table) -> int:
+    """Columns that it takes where there is room for everything."""
+    return Measurement.get(console, console.options.update(max_width=10_000), renderable).maximum
+
+
+def show_json(value: Any) -> None:
+    """Print JSON and nothing else; what has no value is null."""
+    typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))

@@ -1,0 +1,339 @@
+"""Every controller keeps the contract, and the check of the contract finds who does not."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+import minisim
+from baselines import FixedTime
+from dim import Dim
+from minisim.arrivals import Arrivals
+from minisim.control import (
+    Advise,
+    Close,
+    Command,
+    Controller,
+    Go,
+    Hold,
+    Observed,
+    Open,
+    Plan,
+    Session,
+    Site,
+    Unregulated,
+    View,
+    Wake,
+)
+from minisim.errors import InputError
+from minisim.testing import (
+    ContractError,
+    SmallScenario,
+    check_commands,
+    check_controller,
+    drained,
+    small_scenario,
+)
+
+#: Every controller there is, with its variants. A new one is added here.
+CONTROLLERS: tuple[Controller, ...] = (
+    Dim(),
+    Dim(gate="harmonious"),
+    Dim(order="lanes"),
+    Dim(priorities="inflow"),
+    Dim(order="lanes", gate="harmonious", priorities="inflow"),
+    FixedTime(),
+    FixedTime(amber=0.0),
+    FixedTime(greens=2.0, amber=3.0, all_red=1.0),
+    FixedTime(equal_greens=True, max_cycle=90.0),
+)
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+def test_every_controller_keeps_the_contract(controller: Controller) -> None:
+    check_controller(controller, horizon=120.0)
+
+
+def test_the_contract_without_safety() -> None:
+    check_controller(Unregulated(), arms=(4,), density=20.0, collision_free=False)
+
+
+def test_every_controller_meets_the_same_arrivals() -> None:
+    scenario = small_scenario(4, demand_time=120.0)
+    tables = [
+        minisim.simulate(scenario, controller, seed=5).trips[
+            ["demand_time_s", "lane", "manoeuvre", "exit_lane"]
+        ]
+        for controller in CONTROLLERS
+    ]
+    assert len(tables[0]) > 20
+    assert all(table.equals(tables[0]) for table in tables)
+
+
+# Controllers that break the contract, one clause each.
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A fixed-time signal at heart; its children spoil one thing."""
+
+    name: str = "broken"
+
+    def start(self, site: Site) -> Session:
+        return FixedTime().start(site)
+
+
+@dataclass(frozen=True)
+class Leaking(Broken):
+    """What a run does depends on how many were started before."""
+
+    runs: list[Site] = field(default_factory=list, compare=False, repr=False)
+
+    def start(self, site: Site) -> Session:
+        self.runs.append(site)
+        return FixedTime(greens=5.0 + len(self.runs)).start(site)
+
+
+COUNTER = itertools.count()
+
+
+@dataclass(frozen=True)
+class GloballyLeaking(Broken):
+    """The same through a global."""
+
+    def start(self, site: Site) -> Session:
+        return FixedTime(greens=5.0 + next(COUNTER)).start(site)
+
+
+class SharedSession:
+    """One signal for all runs, which remembers the time of another run."""
+
+    plan = Plan(wake_on_clear=True)
+
+    def __init__(self) -> None:
+        self.latest = 0.0
+
+    def decide(self, view: View) -> Iterable[Command]:
+        self.latest = max(self.latest, view.time)
+        green = int(self.latest // 10.0) % 4
+        yield from (Open(lane) if lane == green else Close(lane) for lane in range(4))
+        yield Wake(view.time + 1.0)
+
+
+SHARED = SharedSession()
+
+
+@dataclass(frozen=True)
+class Interfering(Broken):
+    """Only two runs at once disturb each other."""
+
+    def start(self, site: Site) -> Session:
+        SHARED.latest = 0.0
+        return SHARED
+
+
+@dataclass(frozen=True)
+class SelfChanging(Broken):
+    """A run changes its controller."""
+
+    last_seed: int = 0
+
+    def start(self, site: Site) -> Session:
+        object.__setattr__(self, "last_seed", site.seed)
+        return FixedTime().start(site)
+
+
+@dataclass(frozen=True)
+class ForgetfulCopy(Broken):
+    """Its pickled copy is another signal."""
+
+    greens: float = field(default=20.0, compare=False, repr=False)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {"name": self.name, "greens": 5.0}
+
+    def start(self, site: Site) -> Session:
+        return FixedTime(greens=self.greens).start(site)
+
+
+@dataclass
+class Unhashable:
+    """A dataclass that is not frozen."""
+
+    name: str = "broken"
+
+    def start(self, site: Site) -> Session:
+        return FixedTime().start(site)
+
+
+@dataclass(frozen=True)
+class Unpicklable(Broken):
+    """It holds a function that has no name to find it by."""
+
+    rule: Callable[[], int] = field(default_factory=lambda: lambda: 5)
+
+
+class NoValue:
+    """It compares by identity."""
+
+    name = "no-value"
+
+    def start(self, site: Site) -> Session:
+        return FixedTime().start(site)
+
+
+class Answering:
+    """A session that gives the same answer to every view."""
+
+    def __init__(self, answer: Any) -> None:
+        self.plan = Plan(period=1.0)
+        self.answer = answer
+
+    def decide(self, view: View) -> Any:
+        return self.answer
+
+
+@dataclass(frozen=True)
+class Says(Broken):
+    """It gives the same answer to every view."""
+
+    answer: Any = ()
+
+    def start(self, site: Site) -> Session:
+        return Answering(self.answer)
+
+
+class NeverD:
+    """A signal whose last head stays red."""
+
+    def __init__(self, site: Site) -> None:
+        self.signal = FixedTime().start(site)
+        self.plan = self.signal.plan
+
+    def decide(self, view: View) -> Iterable[Command]:
+        return [c for c in self.signal.decide(view) if not isinstance(c, Open) or c.lane != 3]
+
+
+@dataclass(frozen=True)
+class Starving(Broken):
+    """One lane never gets its turn."""
+
+    def start(self, site: Site) -> Session:
+        return NeverD(site)
+
+
+@dataclass(frozen=True)
+class Starts(Broken):
+    """It starts this."""
+
+    session: Any = None
+
+    def start(self, site: Site) -> Session:
+        session: Session = self.session
+        return session
+
+
+@dataclass(frozen=True)
+class NoPlan:
+    """A session without a plan."""
+
+    plan: str = "none"
+
+    def decide(self, view: View) -> Iterable[Command]:
+        return ()
+
+
+BROKEN = {
+    "leaks": (Leaking(), "same seed gave other trips"),
+    "leaks through a global": (GloballyLeaking(), "same seed gave other trips"),
+    "shares its session": (Interfering(), "same seed gave other trips"),
+    "changes itself": (SelfChanging(), "must not change its controller"),
+    "pickles to another": (ForgetfulCopy(), "pickled copy gave other trips"),
+    "unhashable": (Unhashable(), "not hashable"),
+    "unpicklable": (Unpicklable(), "not picklable"),
+    "no value": (NoValue(), "copy of it is not equal"),
+    "collides": (Unregulated(), "vehicles collided: at .* s vehicle"),
+    "never releases": (Says(), r"(\d+) of \1 vehicles were never served on 4 arms \(lanes a, b"),
+    "starves a lane": (Starving(), r"vehicles were never served on 4 arms \(lanes d\)"),
+    "unknown vehicle": (Says(answer=(Go(10**6),)), "this vehicle is not in the view"),
+    "unknown lane": (Says(answer=(Open(4),)), "there is no such lane"),
+    "past wake-up": (Says(answer=(Wake(0.0),)), "must be in the future"),
+    "no command": (Says(answer=("go",)), "this is not a command"),
+    "no answer": (Says(answer=None), "must answer with commands, got None"),
+    "no session": (Starts(), "must give a Session"),
+    "no plan": (Starts(session=NoPlan()), "must be a Plan"),
+    "no name": (Broken(name=""), "its name must be a text"),
+    "no controller": (5, "is not a Controller"),
+    "a class": (FixedTime, "is not a Controller"),
+}
+
+
+@pytest.mark.parametrize(("controller", "message"), BROKEN.values(), ids=BROKEN.keys())
+def test_whoever_breaks_the_contract_is_found(controller: Any, message: str) -> None:
+    with pytest.raises(ContractError, match=message):
+        check_controller(controller, arms=(4,), density=350.0, horizon=300.0)
+
+
+def test_a_broken_contract_is_a_failed_assertion_and_a_minisim_error() -> None:
+    with pytest.raises(AssertionError):
+        check_controller(Says())
+    with pytest.raises(minisim.MinisimError, match="controller 'broken'"):
+        check_controller(Says())
+
+
+def test_a_site_that_the_controller_refuses_is_its_own_error() -> None:
+    with pytest.raises(InputError, match="4 values for 3 lanes"):
+        check_controller(FixedTime(greens=(5, 5, 5, 5)))
+
+
+# Commands.
+
+VIEW = View(10.0, (Observed(3, 0, 1, 5.0, 5.0, 5.0), Observed(9, 2, 1, 5.0, 5.0, 5.0)))
+
+
+def test_valid_commands_pass() -> None:
+    valid = (
+        Go(3), Hold(9), Open(0), Close(3), Advise(9, 0.0), Advise(3, math.inf), Wake(10.1),
+    )  # fmt: skip
+    check_commands(valid, VIEW, small_scenario(4).site(0))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Go(4), Hold(-1), Advise(10, 5.0), Advise(3, -1.0), Advise(3, math.nan), Open(4), Close(-1),
+        Wake(10.0), Wake(math.nan), Wake(math.inf), (3,), None,
+    ],
+)  # fmt: skip
+def test_invalid_commands_do_not(command: Any) -> None:
+    with pytest.raises(ContractError, match=r"at 10\.0 s: "):
+        check_commands([command], VIEW, small_scenario(4).site(0))
+
+
+# Scenarios for tests.
+
+
+def test_a_drained_scenario_demands_only_at_first() -> None:
+    scenario = drained(4, density=350, demand_time=60.0)
+    arrivals: Arrivals = scenario.arrivals(1)
+    assert len(arrivals) > 5
+    assert arrivals.time.max() < 60.0
+    assert scenario.horizon > 600.0
+    assert scenario.site(1).demand == pytest.approx((350.0,) * 4)
+    assert hash(scenario) == hash(drained(4, density=350, demand_time=60.0))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [{"arms": 2}, {"arms": 4, "density": -1}, {"arms": 4, "drain": -1}, {"arms": 4, "dt": 0}],
+)
+def test_impossible_test_scenarios_are_errors(arguments: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        small_scenario(**arguments)
+    with pytest.raises(InputError):
+        SmallScenario(demand_time=0.0)

@@ -1,0 +1,216 @@
+"""Whatever value a public constructor is given: an object, or one clear `MinisimError`."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import scenarios
+from baselines import FixedTime, webster, webster_delay
+from baselines.signals import Phase, Program
+from dim import Dim, ExactPerception, HarmonyMatrix, Zones, decide, explain
+from minisim import simulate
+from minisim.arrivals import Arrivals, Demand, read_arrivals
+from minisim.control import Marking, Plan, Site, Unregulated
+from minisim.errors import MinisimError
+from minisim.geometry import Intersection
+from minisim.streams import stream
+from minisim.vehicle import VehicleType
+from scenarios.controllers import controller_named
+from scenarios.scenario import FAIR, Profile, Scenario, parse_split, profile_named
+from scenarios.sweep import Experiment
+
+BEARINGS = (0.0, 90.0, 180.0, 270.0)
+FOUR = Intersection(BEARINGS, arm_length=60.0)
+CAR = VehicleType()
+DEMAND = Demand(density=100.0)
+EMPTY = Arrivals(np.empty(0), np.empty(0, dtype=int), np.empty(0, dtype=int))
+SHORT = Scenario(name="short", intersection=FOUR, demand=DEMAND, profile=FAIR, horizon=5.0)
+
+
+class Case(NamedTuple):
+    """A public constructor and arguments that it accepts."""
+
+    make: Callable[..., Any]
+    valid: dict[str, Any]
+
+
+GEOMETRY = {"side": "left", "lane_width": 3.2, "junction_radius": 8.0, "arm_length": 200.0}
+TRAFFIC = {
+    "density": 100.0, "split": None, "turns": (1, 1, 1), "model": "poisson", "min_headway": 1.0,
+}  # fmt: skip
+RUN = {"profile": "fair", "horizon": 60.0, "recorded": None}
+
+CASES = {
+    "VehicleType": Case(VehicleType, {f.name: f.default for f in dataclasses.fields(VehicleType)}),
+    "Intersection": Case(Intersection, {"bearings": BEARINGS, **GEOMETRY}),
+    "Intersection.parse": Case(FOUR.parse, {"text": "a1"}),
+    "Demand": Case(Demand, TRAFFIC),
+    "Demand.draw": Case(
+        lambda duration, seed: DEMAND.draw(4, duration, seed), {"duration": 60.0, "seed": 1}
+    ),
+    "Arrivals": Case(Arrivals, {"time": [0.0, 1.0], "lane": [0, 1], "manoeuvre": [1, 1]}),
+    "stream": Case(stream, {"seed": 1, "name": "arrivals"}),
+    "Site": Case(
+        Site,
+        {"intersection": FOUR, "vehicle": CAR, "speed_limit": 14.0, "demand": (1.0,) * 4,
+         "dt": 0.1, "seed": 0},
+    ),
+    "Marking": Case(Marking, {"name": "red", "start": 30.0, "end": 8.0, "speed": 5.0}),
+    "Plan": Case(
+        Plan,
+        {"hold_distance": 2.0, "markings": (), "marks": (1.0,), "wake_on_clear": True,
+         "period": 1.0, "sight": 50.0, "lanes_open": False},
+    ),
+    "Profile": Case(
+        Profile,
+        {"name": "x", "vehicle": CAR, "speed_limit": 14.0, "depart_speed": None, "dt": 0.1},
+    ),
+    "Scenario": Case(
+        Scenario,
+        {"name": "x", "intersection": FOUR, "demand": DEMAND, "profile": FAIR, "horizon": 60.0,
+         "recorded": EMPTY},
+    ),
+    "three_way": Case(scenarios.three_way, {**GEOMETRY, **TRAFFIC, **RUN, "turns": (1, 1)}),
+    "four_way": Case(scenarios.four_way, {**GEOMETRY, **TRAFFIC, **RUN}),
+    "five_way": Case(
+        scenarios.five_way,
+        {**GEOMETRY, **TRAFFIC, **RUN, "turns": None, "junction_radius": 12.0},
+    ),
+    "regular": Case(scenarios.regular, {"n": 4, **GEOMETRY, **TRAFFIC, **RUN}),
+    "from_bearings": Case(
+        scenarios.from_bearings,
+        {"bearings": BEARINGS, "name": "x", **GEOMETRY, **TRAFFIC, **RUN},
+    ),
+    "profile_named": Case(profile_named, {"name": "fair"}),
+    "parse_split": Case(parse_split, {"text": "4:3:2:1"}),
+    "HarmonyMatrix": Case(HarmonyMatrix, {"n": 3, "values": np.zeros((6, 6), dtype=int)}),
+    "HarmonyMatrix.paper": Case(HarmonyMatrix.paper, {"n": 4}),
+    "HarmonyMatrix.from_geometry": Case(
+        HarmonyMatrix.from_geometry, {"intersection": FOUR, "vehicle": CAR, "clearance": 0.5}
+    ),
+    "decide": Case(
+        decide,
+        {"movements": ("a1", "b2"), "matrix": HarmonyMatrix.paper(4), "order": "size",
+         "priorities": (3, 2, 1, 0)},
+    ),
+    "explain": Case(
+        explain,
+        {"movements": ("a1", "b2"), "matrix": HarmonyMatrix.paper(4), "order": "lanes",
+         "priorities": None},
+    ),
+    "Zones": Case(Zones, {"red": 30.0, "yellow": 6.0, "green": 2.0, "red_speed": 5.0}),
+    "Dim": Case(
+        Dim,
+        {"order": "size", "commit": "stoppable", "gate": "clear", "priorities": None,
+         "zones": Zones(), "matrix": None, "perception": ExactPerception(), "period": None},
+    ),
+    "FixedTime": Case(
+        FixedTime,
+        {"greens": (5.0, 6.0), "amber": 2.0, "saturation_flow": 1500.0, "lost_time": 2.0,
+         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0, "name": "x"},
+    ),
+    "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
+    "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
+    "webster": Case(
+        webster,
+        {"rates": (100.0,) * 4, "saturation_flow": 1500.0, "lost_time_per_phase": 2.0,
+         "equal_greens": True, "min_green": 3.0, "max_cycle": 180.0},
+    ),
+    "webster_delay": Case(
+        webster_delay, {"rate": 100.0, "green": 10.0, "cycle": 60.0, "saturation_flow": 1500.0}
+    ),
+    "controller_named": Case(controller_named, {"name": "dim", "profile": "fair"}),
+    "Experiment": Case(Experiment, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
+    "simulate": Case(
+        simulate,
+        {"scenario": SHORT, "controller": Unregulated(), "seed": 1, "record": None,
+         "record_window": (0.0, 5.0), "on_collision": "record"},
+    ),
+}  # fmt: skip
+
+
+def numbers() -> st.SearchStrategy[Any]:
+    """Numbers of every type, with a liking for the edges."""
+    edges = [
+        0, -1, 1, 0.5, 3, math.nan, math.inf, -math.inf, -0.0, 5e-324, 1e-300, 1e308, 10**30,
+        10**400, -(10**400), True, False, 1j, np.float64("nan"), np.float32(2.5),
+        np.int8(3), np.uint64(2**63), np.bool_(True), Fraction(1, 3), Fraction(10**400),
+        Decimal("1.5"), Decimal("sNaN"),
+    ]  # fmt: skip
+    return st.sampled_from(edges) | st.floats() | st.integers() | st.fractions()
+
+
+def junk() -> st.SearchStrategy[Any]:
+    """Values of any kind, nested."""
+    words = ["", "a1", "four-way", "left", "poisson", "1e3", "nan", "4:3:2:1", "\0", "\ud800", b"a"]
+    things = [None, object(), int, len, ..., CAR, FOUR, DEMAND, EMPTY, SHORT, Unregulated()]
+    leaves = st.one_of(
+        numbers(), st.text(max_size=5), st.sampled_from(words), st.sampled_from(things)
+    )
+    arrays = st.sampled_from(
+        [np.array(1.0), np.zeros(4), np.zeros((2, 2)), np.array(["a"]), np.array([None]),
+         np.array([2.5 + 1j]), np.empty(0), np.arange(4, dtype=np.uint8)]
+    )  # fmt: skip
+    nested = st.recursive(
+        leaves,
+        lambda inner: st.one_of(
+            st.lists(inner, max_size=5),
+            st.lists(inner, max_size=5).map(tuple),
+            st.dictionaries(st.text(max_size=2) | st.integers(), inner, max_size=3),
+        ),
+        max_leaves=6,
+    )
+    return nested | arrays | st.lists(numbers(), min_size=3, max_size=5).map(tuple)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_valid_arguments_are_valid(name: str) -> None:
+    """Otherwise the property below would only ever see errors."""
+    CASES[name].make(**CASES[name].valid)
+
+
+#: Built once: making a strategy costs more than drawing from it.
+JUNK = junk()
+
+
+def try_to_make(name: str, arguments: dict[str, Any]) -> None:
+    message = "made"
+    try:
+        CASES[name].make(**arguments)
+    except MinisimError as error:
+        message = str(error)
+    assert 0 < len(message) < 2000
+
+
+@pytest.mark.parametrize("name", CASES)
+@given(data=st.data())
+def test_any_argument_gives_an_object_or_a_minisim_error(name: str, data: st.DataObject) -> None:
+    valid = CASES[name].valid
+    broken = data.draw(st.lists(st.sampled_from(sorted(valid)), min_size=1, max_size=2))
+    try_to_make(name, {**valid, **{field: data.draw(JUNK, label=field) for field in broken}})
+
+
+@pytest.mark.parametrize(
+    ("name", "field"), [(name, field) for name, case in CASES.items() for field in case.valid]
+)
+def test_integers_that_python_refuses_to_print_are_no_exception(name: str, field: str) -> None:
+    """`repr` of an integer of more than 4300 digits is a ValueError."""
+    for value in (10**5000, [10**5000], {"x": 10**5000}):
+        try_to_make(name, {**CASES[name].valid, field: value})
+
+
+@pytest.mark.parametrize("read", [read_arrivals, HarmonyMatrix.from_csv])
+@given(path=JUNK)
+def test_no_file_is_a_minisim_error(read: Callable[[Any], Any], path: Any) -> None:
+    with pytest.raises(MinisimError):
+        read(path)

@@ -1,0 +1,160 @@
+"""All vehicles agree, each on its own, whatever they see; checked against a plain model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dim import DecisionTable, Dim, HarmonyMatrix, decide
+from dim.agent import GATES, Agent, Rules
+from dim.decision import ORDERS
+from dim.perception import COMMITS, Reader
+from minisim.control import Go, Hold, Observed, Site, View, can_stop
+from scenarios import five_way, four_way, three_way
+
+SITES = {n: maker().site() for n, maker in [(3, three_way), (4, four_way), (5, five_way)]}
+LENGTH = 4.0
+
+
+@st.composite
+def views(draw: st.DrawFn, n: int) -> list[View]:
+    """A few views in a row: vehicles of a lane in order, driving, entering, leaving, standing.
+
+    Vehicle k of lane i has id 100·i + k in all views. Where they are is otherwise free, so that
+    every combination of participants and crossing vehicles can come.
+    """
+    wishes = draw(st.lists(st.integers(1, n - 1), min_size=5 * n, max_size=5 * n))
+    first = [0] * n
+    result = []
+    for time in range(draw(st.integers(1, 5))):
+        seen = []
+        for lane in range(n):
+            first[lane] = min(first[lane] + draw(st.sampled_from([0, 0, 1])), 4)
+            distance = draw(st.floats(-15.0, 9.0))
+            for k in range(first[lane], min(first[lane] + draw(st.integers(0, 3)), 5)):
+                speed = draw(st.sampled_from([0.0, 1.0, 2.5, 5.0]))
+                seen.append(
+                    Observed(100 * lane + k, lane, wishes[5 * lane + k], distance, speed, LENGTH)
+                )
+                distance += LENGTH + draw(st.floats(0.5, 5.0))
+        result.append(View(float(time), tuple(v for v in seen if v.distance <= 8.5)))
+    return result
+
+
+@st.composite
+def runs(draw: st.DrawFn) -> tuple[Site, Dim, list[View]]:
+    n = draw(st.sampled_from([3, 4, 5]))
+    dim = Dim(
+        order=draw(st.sampled_from(ORDERS)),
+        commit=draw(st.sampled_from(COMMITS)),
+        gate=draw(st.sampled_from(GATES)),
+        priorities=draw(st.none() | st.permutations(range(n)).map(tuple)),
+    )
+    return SITES[n], dim, draw(views(n))
+
+
+def is_crossing(vehicle: Observed, dim: Dim, b: float) -> bool:
+    if vehicle.distance < 0:
+        return True
+    if dim.commit == "paper":
+        return vehicle.distance < dim.zones.green / 2
+    return not can_stop(vehicle, b)
+
+
+def model(holding: set[int], view: View, dim: Dim, site: Site, matrix: HarmonyMatrix) -> set[int]:
+    """Algorithm 1 once more, for all vehicles at once and in the words of DESIGN §6."""
+    near = [v for v in view.vehicles if v.distance <= 8.0]
+    crossing = [v for v in near if is_crossing(v, dim, site.vehicle.deceleration)]
+    before = sorted((v for v in near if v.distance >= 0), key=lambda v: -v.distance)
+    front = {v.lane: v for v in before}.values()  # the nearest of each lane comes last
+    waiting = [v for v in front if v not in crossing]
+    going = {v.id for v in near if v.id in holding}
+    if dim.commit == "paper":
+        going |= {v.id for v in crossing}
+    if crossing and dim.gate == "clear":
+        return going
+    admitted = [
+        v
+        for v in waiting
+        if all(c.lane == v.lane or matrix[v.movement, c.movement] for c in crossing)
+    ]
+    chosen = decide([v.movement for v in admitted], matrix, dim.order, dim.ranks(site))
+    going -= {v.id for v in waiting}
+    return going | {v.id for v in admitted if v.movement in chosen}
+
+
+@given(runs())
+def test_the_session_follows_the_model(run: tuple[Site, Dim, list[View]]) -> None:
+    site, dim, shown = run
+    session, matrix = dim.start(site), dim.harmony(site)
+    told: set[int] = set()
+    holding: set[int] = set()
+    for view in shown:
+        commands = list(session.decide(view))
+        goes = {c.vehicle for c in commands if isinstance(c, Go)}
+        holds = {c.vehicle for c in commands if isinstance(c, Hold)}
+        near = {v.id for v in view.vehicles if v.distance <= 8.0}
+        assert goes <= near - told  # only changes are told,
+        assert holds <= near & told  # each once, to vehicles that are there
+        assert len(goes) + len(holds) == len({c for c in commands if isinstance(c, Go | Hold)})
+        told = (told | goes) - holds
+        holding = model(holding, view, dim, site, matrix)
+        assert told & near == holding
+        told &= near
+
+
+@given(runs())
+def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
+    """Each vehicle with a table, a reader and an agent of its own; nothing is shared."""
+    site, dim, shown = run
+    b, n, ranks = site.vehicle.deceleration, site.intersection.n, dim.ranks(site)
+    minds: dict[int, tuple[Agent, Reader]] = {}
+    session = dim.start(site)
+    told: set[int] = set()
+    for view in shown:
+        for command in session.decide(view):
+            if isinstance(command, Go):
+                told.add(command.vehicle)
+            elif isinstance(command, Hold):
+                told.discard(command.vehicle)
+        near = [v for v in view.vehicles if v.distance <= 8.0]
+        for v in near:
+            if v.id not in minds:
+                own_matrix = HarmonyMatrix.paper(n)
+                own_rules = Rules(DecisionTable(own_matrix, dim.order, ranks), dim.gate, dim.commit)
+                minds[v.id] = Agent(v.id, v.lane, own_rules), Reader(n, dim.zones, b, dim.commit)
+        percepts = {v.id: minds[v.id][1].read(view) for v in near}
+        assert len(set(percepts.values())) <= 1
+        going = {v.id for v in near if minds[v.id][0].decide(percepts[v.id])}
+        assert going == {v.id for v in near if v.id in told}
+        minds = {v.id: minds[v.id] for v in near}
+        told = going
+
+
+@given(runs())
+def test_whoever_starts_to_go_is_in_harmony_with_everyone_who_goes(
+    run: tuple[Site, Dim, list[View]],
+) -> None:
+    """With commit="stoppable", one view after the other: the new right of way is safe."""
+    site, dim, shown = run
+    dim = replace(dim, commit="stoppable")
+    matrix = dim.harmony(site)
+    for view in shown:
+        session = dim.start(site)
+        going = {c.vehicle for c in session.decide(view) if isinstance(c, Go)}
+        near = [v for v in view.vehicles if v.distance <= 8.0]
+        crossing = [v for v in near if is_crossing(v, dim, site.vehicle.deceleration)]
+        movers = [v for v in near if v.id in going]
+        for v in movers:
+            assert [other for other in movers if other.lane == v.lane] == [v]
+            for other in [*movers, *crossing]:
+                assert other.lane == v.lane or matrix[v.movement, other.movement]
+        if movers and crossing:
+            assert dim.gate == "harmonious"
+        for v in movers:  # in front of everyone of its lane who has not entered
+            ahead = [o for o in near if o.lane == v.lane and o.distance < v.distance]
+            assert all(o.distance < 0 for o in ahead)
+        if near and not crossing:
+            assert movers  # somebody goes: no deadlock

@@ -1,0 +1,191 @@
+"""Whole simulations over random junctions, demands and seeds: nobody collides, all are served."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from hypothesis import find, given, settings
+from hypothesis import strategies as st
+
+import minisim
+from baselines import FixedTime
+from dim import Dim
+from minisim.collision import touching
+from minisim.control import Controller, Plan, Unregulated
+from minisim.simulation import Run, Simulation
+from scenarios import Scenario, four_way
+from tests.runs import Fixed, digest, drained, replayed
+from tests.strategies import scenarios, vehicles
+
+#: Time to serve the arrivals of two minutes; far more than any fair share of the junction needs.
+PATIENCE = 3000.0
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def served_without_collision(scenario: Scenario, controller: Controller, seed: int) -> Run:
+    """Run to the last arrival; a collision raises. Checks what must hold of any run."""
+    run = minisim.simulate(drained(scenario, seed, PATIENCE), controller, seed=seed, record="all")
+    assert run.columns.arrived.all(), "somebody was never served"
+    trace = run.trace[np.lexsort((run.trace["tick"], run.trace["row"]))]
+    same = trace["row"][1:] == trace["row"][:-1]
+    assert (trace["v"] >= 0.0).all()
+    assert (np.diff(trace["s"])[same] >= 0.0).all(), "somebody reversed"
+    assert trace["a"].min(initial=0.0) >= -run.site.vehicle.max_deceleration
+    real = np.diff(trace["v"])[same] / run.site.dt
+    assert real.min(initial=0.0) >= -run.site.vehicle.max_deceleration - 1e-6
+    limit = run.site.speed_limit + run.site.vehicle.acceleration * run.site.dt
+    assert trace["v"].max(initial=0.0) <= limit
+    assert_no_overlap_in_lane(run)
+    return run
+
+
+def assert_no_overlap_in_lane(run: Run) -> None:
+    """On the approach, every front bumper is behind the rear bumper of the vehicle before it."""
+    trace = run.trace
+    manoeuvres = run.site.intersection.n - 1
+    approach = trace[trace["s"] < run.site.intersection.approach_length]
+    lane = run.rows["path"][approach["row"]] // manoeuvres
+    order = np.lexsort((-approach["s"], lane, approach["tick"]))
+    approach, lane = approach[order], lane[order]
+    together = (np.diff(approach["tick"]) == 0) & (np.diff(lane) == 0)
+    gaps = -np.diff(approach["s"]) - run.site.vehicle.length
+    assert (gaps[together] > 0.0).all()
+
+
+@given(scenarios(), seeds)
+@settings(max_examples=100)
+def test_dim_is_safe_and_serves_everybody(scenario: Scenario, seed: int) -> None:
+    served_without_collision(scenario, Dim(), seed)
+
+
+@given(scenarios(max_density=500.0), seeds, st.sampled_from(["size", "lanes"]))
+@settings(max_examples=100)
+def test_dim_harmonious_is_safe_and_serves_everybody(
+    scenario: Scenario, seed: int, order: str
+) -> None:
+    served_without_collision(scenario, Dim(gate="harmonious", order=order), seed)
+
+
+@given(scenarios(), seeds, st.floats(0.0, 4.0))
+@settings(max_examples=100)
+def test_fixed_time_is_safe_and_serves_everybody(
+    scenario: Scenario, seed: int, amber: float
+) -> None:
+    served_without_collision(scenario, FixedTime(amber=amber), seed)
+
+
+@given(scenarios(max_density=250.0), vehicles(), seeds, st.sampled_from(["clear", "harmonious"]))
+@settings(max_examples=60)
+def test_dim_is_safe_with_any_ordinary_vehicle(scenario, vehicle, seed: int, gate: str) -> None:
+    profile = dataclasses.replace(scenario.profile, vehicle=vehicle)
+    scenario = dataclasses.replace(scenario, profile=profile)
+    served_without_collision(scenario, Dim(gate=gate), seed)
+
+
+@given(scenarios(horizon=60.0), seeds, st.sampled_from(["clear", "harmonious"]))
+@settings(max_examples=30)
+def test_wake_ups_of_dim_lose_nothing(scenario: Scenario, seed: int, gate: str) -> None:
+    """Agents that look around at every step decide as those that are woken."""
+    scenario = drained(scenario, seed, 600.0)
+    woken = minisim.simulate(scenario, Dim(gate=gate), seed=seed)
+    always = minisim.simulate(scenario, Dim(gate=gate, period=scenario.profile.dt), seed=seed)
+    assert digest(woken) == digest(always)
+
+
+@given(scenarios(max_arms=5, max_density=300.0, horizon=40.0), seeds)
+@settings(max_examples=25)
+def test_broad_phase_never_misses_a_touch(scenario: Scenario, seed: int) -> None:
+    """Without any rule vehicles collide; pymunk, asked at every step, finds nothing more."""
+    sim = Simulation(scenario, Unregulated(), seed=seed, on_collision="record")
+    dt = scenario.profile.dt
+    while not sim.finished:
+        sim.advance(sim.time + dt)
+        rows, bodies = sim._near_bodies()
+        found = {tuple(sorted((_id(sim, rows[i]), _id(sim, rows[j])))) for i, j in touching(bodies)}
+        assert found <= {c.vehicles for c in sim.collisions}
+
+
+def _id(sim: Simulation, row: int) -> int:
+    return int(sim._vehicles["id"][row])
+
+
+@given(vehicles(), st.floats(0.0, 60.0), st.floats(5.0, 25.0), st.sampled_from([0.05, 0.1, 0.2]))
+@settings(max_examples=60)
+def test_a_platoon_stops_at_the_line_one_behind_the_other(
+    vehicle, hold_distance: float, speed: float, dt: float
+) -> None:
+    """The front bumper 0 … 0.3 m before the line, never beyond; nobody touches the one ahead."""
+    profile = dataclasses.replace(
+        four_way().profile, vehicle=vehicle, speed_limit=speed, dt=dt, name="random"
+    )
+    trips = [(1.5 * k, 0, 2) for k in range(6)]
+    scenario = replayed(four_way(profile=profile), *trips, horizon=240.0)
+    run = minisim.simulate(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
+    line = run.site.intersection.approach_length - hold_distance
+    assert run.trajectories["s_m"].max() <= line
+    first = run.trajectories.query("vehicle == 0").iloc[-1]
+    assert 0.0 <= line - first["s_m"] <= 0.3
+    assert first["speed_mps"] == 0.0
+    first_braking = run.trajectories.query("vehicle == 0")["acceleration_mps2"].min()
+    assert first_braking >= -vehicle.deceleration * (1 + 1e-6)
+    assert_no_overlap_in_lane(run)
+
+
+def test_motion_converges_with_the_step() -> None:
+    """Halving dt halves the distance to the finest solution: the ballistic scheme is first order
+    at the kinks of a queue (Treiber, Kanagaraj 2015)."""
+    trips = [(2.0 * k, 0, 2) for k in range(5)]
+    waits = {}
+    for dt in (0.2, 0.1, 0.05, 0.0125):
+        profile = dataclasses.replace(four_way(profile="fair").profile, dt=dt)
+        scenario = replayed(four_way(profile=profile), *trips, horizon=60.0)
+        run = minisim.simulate(scenario, Fixed(), record="all")
+        last = run.trajectories.query("vehicle == 4").set_index("time_s")["s_m"]
+        waits[dt] = last[last.index.isin([36.0, 38.0, 40.0, 44.0])].to_numpy()
+    errors = [np.abs(waits[dt] - waits[0.0125]).max() for dt in (0.2, 0.1, 0.05)]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 0.1
+
+
+# --- commit="paper": the finding -----------------------------------------------------------------
+
+#: Two vehicles on the paper's 4-arm junction, the smallest case: the one of lane d has the right of
+#: way and is just short of half the green zone when the one of lane a enters the yellow zone. The
+#: decision is made anew and takes the right of way from a vehicle that can no longer stop.
+COUNTEREXAMPLE = ((0.0, 3, 2), (0.8, 0, 2))
+
+
+def two_vehicles(commit: str, *trips: tuple[float, int, int]) -> Run:
+    scenario = replayed(four_way(), *trips, horizon=120.0)
+    return minisim.simulate(scenario, Dim(commit=commit), on_collision="record")
+
+
+def test_the_papers_commit_rule_lets_two_vehicles_collide() -> None:
+    (collision,) = two_vehicles("paper", *COUNTEREXAMPLE).collisions
+    assert collision.movements == ("d2", "a2")
+    assert min(collision.speeds) > 5.0, "both were going, neither had stopped"
+
+
+def test_the_stoppable_rule_is_safe_in_the_same_situation() -> None:
+    run = two_vehicles("stoppable", *COUNTEREXAMPLE)
+    assert run.collisions == ()
+    assert run.columns.arrived.all()
+
+
+def test_hypothesis_finds_a_collision_of_the_papers_rule() -> None:
+    """`find` raises NoSuchExample when there is none; what it returns is a pair in conflict."""
+    lanes = st.lists(st.integers(0, 3), min_size=2, max_size=2, unique=True)
+    pairs = st.tuples(lanes, st.tuples(st.integers(1, 3), st.integers(1, 3)), st.integers(0, 30))
+
+    def trips(pair):
+        (first, second), (one, other), tenths = pair
+        return (0.0, first, one), (tenths / 10, second, other)
+
+    found = find(
+        pairs,
+        lambda pair: bool(two_vehicles("paper", *trips(pair)).collisions),
+        settings=settings(max_examples=500),
+    )
+    assert two_vehicles("stoppable", *trips(found)).collisions == ()

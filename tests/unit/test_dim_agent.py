@@ -1,0 +1,146 @@
+"""Algorithm 1 for one vehicle, rule by rule, on hand-made percepts."""
+
+from __future__ import annotations
+
+import pytest
+
+from dim import DecisionTable, HarmonyMatrix
+from dim.agent import GATES, Agent, Rules
+from dim.perception import Percept
+from minisim.errors import InputError
+
+MATRIX = HarmonyMatrix.paper(4)
+TABLE = DecisionTable(MATRIX)
+
+
+def percept(participants: str = "", crossing: str = "") -> Percept:
+    """Participants and crossing vehicles by movement; the id of a vehicle is its lane's index,
+    plus 10 when it is crossing."""
+    taking_part, over_there = participants.split(), crossing.split()
+    return Percept(
+        tuple("abcd".index(m[0]) for m in taking_part),
+        tuple(10 + "abcd".index(m[0]) for m in over_there),
+        TABLE.case(taking_part),
+        sum(1 << MATRIX.index(m) for m in over_there),
+    )
+
+
+def agent(lane: str, *, goes: bool = False, crossing: bool = False, **rules: str) -> Agent:
+    index = "abcd".index(lane)
+    result = Agent(index + 10 * crossing, index, Rules(TABLE, **rules))
+    result.right_of_way = goes
+    return result
+
+
+def test_a_new_agent_waits() -> None:
+    assert agent("a").right_of_way is False
+
+
+def test_alone_it_goes() -> None:
+    assert agent("d").decide(percept("d2")) is True
+
+
+def test_the_clique_goes_and_the_others_wait() -> None:
+    scene = percept("a1 b2 c2 d2")
+    assert [agent(lane).decide(scene) for lane in "abcd"] == [True, True, False, False]
+
+
+def test_it_remembers_its_answer() -> None:
+    a = agent("a")
+    a.decide(percept("a1"))
+    assert a.right_of_way is True
+
+
+def test_a_new_decision_revokes() -> None:
+    c = agent("c")
+    assert c.decide(percept("c2")) is True
+    assert c.decide(percept("b2 c2 d2")) is False  # b2 d2 are two, c2 is alone
+    assert c.right_of_way is False
+    assert c.decide(percept("c2")) is True
+
+
+@pytest.mark.parametrize("goes", [False, True])
+def test_clear_gate_decisions_stand_while_anybody_crosses(goes: bool) -> None:
+    harmonious_or_not = [percept("a1", "c1"), percept("a1", "b3"), percept("a1 b2 d2", "a1")]
+    for scene in harmonious_or_not:
+        assert agent("a", goes=goes).decide(scene) is goes
+
+
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("goes", [False, True])
+def test_crossing_it_does_what_it_did(gate: str, goes: bool) -> None:
+    ego = agent("a", goes=goes, crossing=True, gate=gate)
+    assert ego.decide(percept("b1", "a2 c2")) is goes
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_past_half_of_the_green_zone_others_grant_it_the_right_of_way(gate: str) -> None:
+    ego = agent("a", crossing=True, gate=gate, commit="paper")
+    assert ego.decide(percept("b1", "a2")) is True
+
+
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("goes", [False, True])
+def test_behind_its_lanes_front_vehicle_it_does_what_it_did(goes: bool, gate: str) -> None:
+    """Also when that one is committed: then nobody of lane a takes part."""
+    for scene in (percept("a1 b1"), percept("b1", "a1"), percept("", "a1")):
+        follower = Agent(7, 0, Rules(TABLE, gate))
+        follower.right_of_way = goes
+        assert follower.decide(scene) is goes
+
+
+@pytest.mark.parametrize(
+    ("lane", "participants", "crossing", "goes"),
+    [
+        ("a", "a1", "c1", True),  # in harmony with the only one that crosses
+        ("a", "a2", "b1", False),
+        ("a", "a1", "b2 c2", True),  # in harmony with both
+        ("d", "d2", "b2 c2", False),  # with b2 only
+        ("b", "b1 c2", "a1", True),  # both admitted, and in harmony
+        ("c", "b1 c2", "a1", True),
+        ("b", "b2 c2", "a1", True),  # both admitted, in conflict: b comes first
+        ("c", "b2 c2", "a1", False),
+        ("a", "a1", "a1", True),  # behind a vehicle of its own lane it just follows
+        ("a", "a1", "a2 a3", True),
+        ("b", "b2", "a1 b1", True),  # in harmony with the one of another lane
+        ("a", "a3", "a1 c1", False),  # in conflict with it
+        ("a", "a2 c2 d2", "a1", True),  # d2 is kept out by a1; a2 and c2 are in harmony
+        ("c", "a2 c2 d2", "a1", True),
+        ("d", "a2 c2 d2", "a1", False),
+        ("a", "a3 c2", "a1", True),  # both admitted, in conflict: a comes first
+        ("c", "a3 c2", "a1", False),
+    ],
+)
+def test_harmonious_gate(lane: str, participants: str, crossing: str, goes: bool) -> None:
+    scene = percept(participants, crossing)
+    for before in (False, True):
+        ego = agent(lane, goes=before, gate="harmonious")
+        assert ego.decide(scene) is goes
+
+
+def test_gates_agree_while_nobody_crosses() -> None:
+    for participants in ("a1 b2 c2 d2", "a3 b3 c3 d3", "b2 c1", "d1"):
+        scene = percept(participants)
+        for lane in sorted({m[0] for m in participants.split()}):
+            answers = {agent(lane, gate=gate).decide(scene) for gate in GATES}
+            assert len(answers) == 1
+
+
+def test_the_order_of_the_table_counts() -> None:
+    by_lanes = Rules(DecisionTable(MATRIX, "lanes"))
+    scene = percept("a2 b1 d2")
+    assert [Agent(i, i, by_lanes).decide(scene) for i in (0, 1, 3)] == [True, False, False]
+    assert [agent(lane).decide(scene) for lane in "abd"] == [False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("table",), "table must be a DecisionTable"),
+        ((TABLE, "harmonius"), "unknown gate 'harmonius'.*did you mean 'harmonious'"),
+        ((TABLE, "clear", "never"), "unknown commit rule 'never'"),
+    ],
+)
+def test_rules_are_checked(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Rules(*arguments)  # type: ignore[arg-type]

@@ -1,0 +1,174 @@
+"""How a view is read: participants, crossing vehicles, and the two commit rules."""
+
+from __future__ import annotations
+
+import pytest
+
+from dim import DecisionTable, ExactPerception, HarmonyMatrix, Perception, Zones
+from dim.perception import Reader
+from minisim.control import COMMIT_MARGIN, Observed, View
+from minisim.errors import InputError
+from scenarios import four_way
+
+MATRIX = HarmonyMatrix.paper(4)
+TABLE = DecisionTable(MATRIX)
+STOPPABLE = Reader(4, Zones(), 2.0, "stoppable")
+PAPER = Reader(4, Zones(), 2.0, "paper")
+
+
+def car(vehicle: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
+    lane, manoeuvre = MATRIX.movements[MATRIX.index(movement)]
+    return Observed(vehicle, lane, manoeuvre, distance, speed, 4.0)
+
+
+def view(*cars: Observed) -> View:
+    return View(0.0, tuple(sorted(cars, key=lambda c: (c.lane, c.distance))))
+
+
+def occupied(*movements: str) -> int:
+    return sum(1 << MATRIX.index(m) for m in movements)
+
+
+def test_an_empty_view() -> None:
+    assert STOPPABLE.read(view()) == ((), (), 0, 0)
+
+
+def test_front_vehicles_between_yellow_start_and_junction_take_part() -> None:
+    percept = STOPPABLE.read(
+        view(
+            car(1, "a1", 8.0),  # at the start of the yellow zone
+            car(2, "b2", 2.0),  # at the hold line
+            car(3, "c3", 0.0),  # stands at the very end of the green zone
+            car(4, "d2", 8.1),  # not there yet
+        )
+    )
+    assert percept.participants == (1, 2, 3)
+    assert percept.crossing == ()
+    assert percept.case == TABLE.case(["a1", "b2", "c3"])
+    assert percept.occupied == 0
+
+
+def test_a_mark_passed_within_rounding_counts() -> None:
+    assert STOPPABLE.read(view(car(1, "a1", 8.0 + 1e-9))).participants == (1,)
+    assert STOPPABLE.read(view(car(1, "a1", 8.0 + 1e-3))).participants == ()
+
+
+def test_only_the_front_vehicle_of_a_lane_takes_part() -> None:
+    percept = STOPPABLE.read(view(car(1, "a1", 2.0), car(2, "a3", 7.5), car(3, "b1", 5.0)))
+    assert percept.participants == (1, 3)
+    assert percept.case == TABLE.case(["a1", "b1"])
+
+
+@pytest.mark.parametrize(
+    ("reader", "distance", "speed"),
+    [
+        (STOPPABLE, 2.0, 4.0),  # 4²/(2·2) = 4 > 2
+        (STOPPABLE, 0.01, 0.5),
+        (PAPER, 0.9, 0.0),
+        (PAPER, 0.9, 5.0),
+    ],
+)
+def test_a_committed_front_vehicle_blocks_its_lane_until_it_has_entered(
+    reader: Reader, distance: float, speed: float
+) -> None:
+    others = car(2, "a3", 7.0), car(3, "b1", 5.0)
+    percept = reader.read(view(car(1, "a1", distance, speed), *others))
+    assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"))
+    percept = reader.read(view(car(1, "a1", -0.01, speed), *others))
+    assert percept == ((2, 3), (1,), TABLE.case(["a3", "b1"]), occupied("a1"))
+
+
+def test_all_committed_vehicles_of_a_lane_are_crossing() -> None:
+    """6.25 m to stop at 5 m/s: neither of the two can."""
+    percept = STOPPABLE.read(view(car(1, "a1", 0.5, 5.0), car(2, "a2", 5.5, 5.0)))
+    assert percept == ((), (1, 2), 0, occupied("a1", "a2"))
+
+
+def test_behind_vehicles_in_the_junction_the_next_one_is_the_front_vehicle() -> None:
+    percept = STOPPABLE.read(
+        view(car(1, "a1", -12.0, 5.0), car(2, "a2", -3.0, 5.0), car(3, "a3", 4.0), car(4, "a1", 8))
+    )
+    assert percept.participants == (3,)
+    assert percept.crossing == (1, 2)
+    assert percept.case == TABLE.case(["a3"])
+    assert percept.occupied == occupied("a1", "a2")
+
+
+def test_the_same_movement_twice_occupies_once() -> None:
+    percept = STOPPABLE.read(view(car(1, "d3", -9.0, 5.0), car(2, "d3", -1.0, 5.0)))
+    assert percept.crossing == (1, 2)
+    assert percept.occupied == occupied("d3")
+
+
+def test_any_part_of_the_body_in_the_junction_is_crossing_moving_or_not() -> None:
+    for reader in (STOPPABLE, PAPER):
+        assert reader.read(view(car(1, "a1", -0.01))).crossing == (1,)
+        assert reader.read(view(car(1, "a1", -0.01, 5.0))).crossing == (1,)
+
+
+@pytest.mark.parametrize(
+    ("distance", "speed", "committed"),
+    [
+        (2.0, 0.0, False),
+        (0.05, 0.0, False),  # revoked, stands inside the margin: not committed
+        (0.0, 0.0, False),
+        (1.0 + COMMIT_MARGIN, 2.0, False),  # 2²/(2·2) = 1
+        (0.99 + COMMIT_MARGIN, 2.0, True),
+        (1.0 + COMMIT_MARGIN, 2.01, True),
+        (6.25 + COMMIT_MARGIN, 5.0, False),  # 5²/(2·2) = 6.25
+        (6.24 + COMMIT_MARGIN, 5.0, True),
+    ],
+)
+def test_commit_stoppable(distance: float, speed: float, committed: bool) -> None:
+    vehicle = car(1, "b2", distance, speed)
+    assert STOPPABLE.committed(vehicle) is committed
+    assert STOPPABLE.read(view(vehicle)).crossing == ((1,) if committed else ())
+
+
+@pytest.mark.parametrize("speed", [0.0, 5.0])
+@pytest.mark.parametrize(
+    ("distance", "committed"), [(2.0, False), (1.0, False), (0.99, True), (0.0, True)]
+)
+def test_commit_paper_is_half_of_the_green_zone(
+    distance: float, committed: bool, speed: float
+) -> None:
+    vehicle = car(1, "b2", distance, speed)
+    assert PAPER.committed(vehicle) is committed
+    assert PAPER.read(view(vehicle)).crossing == ((1,) if committed else ())
+
+
+@pytest.mark.parametrize("green", [COMMIT_MARGIN, 2.0, 5.0])
+@pytest.mark.parametrize("b", [1.0, 2.0, 4.5])
+def test_braking_for_the_hold_line_never_looks_committed(green: float, b: float) -> None:
+    """At v = √(2b·x) a vehicle x metres before the hold line just stops at it."""
+    reader = Reader(4, Zones(green=green), b, "stoppable")
+    for x in (0.0, 0.1, 1.0, 3.0, 6.0):
+        speed = (2 * b * x) ** 0.5 * (1 - 1e-9)
+        assert not reader.committed(car(1, "a1", green + x, speed)), x
+
+
+def test_outside_the_yellow_zone_nobody_counts() -> None:
+    percept = STOPPABLE.read(view(car(1, "a1", 8.4, 13.0)))
+    assert percept == ((), (), 0, 0)
+
+
+def test_exact_perception_is_the_view_itself() -> None:
+    see = ExactPerception().start(four_way().site())
+    seen = view(car(1, "a1", 3.0), car(2, "b1", 3.0))
+    assert see(seen, seen.vehicles[0]) is seen
+    assert isinstance(ExactPerception(), Perception)
+    assert ExactPerception() == ExactPerception()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((2, Zones(), 2.0, "paper"), "number of arms"),
+        ((4, "zones", 2.0, "paper"), "zones must be a Zones"),
+        ((4, Zones(), 0.0, "paper"), "deceleration"),
+        ((4, Zones(), 2.0, "papr"), "unknown commit rule 'papr'.*did you mean 'paper'"),
+    ],
+)
+def test_readers_are_checked(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Reader(*arguments)  # type: ignore[arg-type]

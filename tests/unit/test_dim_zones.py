@@ -1,0 +1,110 @@
+"""Road markings: where the limit holds, and that everybody can come down to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import pytest
+
+from dim import Zones
+from minisim.control import COMMIT_MARGIN, Marking, Site
+from minisim.errors import InputError
+from scenarios import FAIR, PAPER, four_way
+
+KMH = 1 / 3.6
+
+
+def site(speed_limit: float = PAPER.speed_limit, deceleration: float = 2.0) -> Site:
+    vehicle = dataclasses.replace(PAPER.vehicle, deceleration=deceleration)
+    return Site(four_way().intersection, vehicle, speed_limit, (350.0,) * 4)
+
+
+def test_the_papers_zones() -> None:
+    zones = Zones()
+    assert (zones.red, zones.yellow, zones.green) == (30, 6, 2)
+    assert zones.red_speed == pytest.approx(20 * KMH)
+    assert (zones.red_start, zones.yellow_start, zones.hold_distance) == (38, 8, 2)
+
+
+def test_the_papers_markings() -> None:
+    """From 40 to 20 km/h at 2 m/s² takes 23.15 m (the paper prints 23.14)."""
+    slowed = 38 - ((40 * KMH) ** 2 - (20 * KMH) ** 2) / (2 * 2.0)
+    assert slowed == pytest.approx(38 - 23.148, abs=1e-3)
+    assert [(m.name, m.start, m.end, m.speed) for m in Zones().markings(site())] == [
+        ("red", 38, pytest.approx(slowed), None),
+        ("red", pytest.approx(slowed), 8, pytest.approx(20 * KMH)),
+        ("yellow", 8, 2, pytest.approx(20 * KMH)),
+        ("green", 2, 0, pytest.approx(20 * KMH)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("zones", "limit", "deceleration", "names"),
+    [
+        (Zones(), FAIR.speed_limit, 4.5, "red red yellow green"),
+        (Zones(), 40 * KMH, 1.0, "red yellow green"),  # 46 m of braking in a zone of 30 m
+        (Zones(red=5), 40 * KMH, 2.0, "red yellow green"),
+        (Zones(red=0), 40 * KMH, 2.0, "yellow green"),
+        (Zones(red_speed=15.0), 40 * KMH, 2.0, "red yellow green"),  # nothing to slow down for
+        (Zones(red_speed=40 * KMH), 40 * KMH, 2.0, "red yellow green"),
+    ],
+)
+def test_markings_join_and_the_limit_holds_from_the_yellow_zone_on(
+    zones: Zones, limit: float, deceleration: float, names: str
+) -> None:
+    markings = zones.markings(site(limit, deceleration))
+    assert " ".join(m.name for m in markings) == names
+    assert markings[0].start == pytest.approx(zones.red_start)
+    assert markings[-1].end == 0
+    for one, other in itertools.pairwise(markings):
+        assert one.end == other.start
+    for marking in markings:
+        assert marking.speed in (None, zones.red_speed)
+        if marking.name != "red":
+            assert marking.speed == zones.red_speed
+
+
+@pytest.mark.parametrize("deceleration", [1.0, 2.0, 3.5, 4.5])
+@pytest.mark.parametrize("limit", [30 * KMH, 40 * KMH, 14.0])
+def test_braking_begins_at_the_red_zone_where_that_is_enough(
+    limit: float, deceleration: float
+) -> None:
+    zones = Zones()
+    limited = next(m for m in zones.markings(site(limit, deceleration)) if m.speed is not None)
+    braking = (limit**2 - zones.red_speed**2) / (2 * deceleration)
+    if braking <= zones.red:
+        assert limited.start + braking == pytest.approx(zones.red_start)
+    else:
+        assert limited.start == zones.yellow_start
+
+
+def test_a_speed_above_the_limit_is_painted_on_the_whole_red_zone() -> None:
+    red, *_ = Zones(red_speed=15.0).markings(site())
+    assert red == Marking("red", 38, 8, 15.0)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("red", -1),
+        ("red", float("nan")),
+        ("yellow", 0),
+        ("yellow", "6"),
+        ("green", 0),
+        ("green", COMMIT_MARGIN / 2),
+        ("green", float("inf")),
+        ("red_speed", 0),
+        ("red_speed", None),
+    ],
+)
+def test_zones_are_checked(field: str, value: object) -> None:
+    with pytest.raises(InputError, match=field.split("_")[0]):
+        Zones(**{field: value})  # type: ignore[arg-type]
+
+
+def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
+    place = site()  # approach lanes of 492.8 m, vehicles of 4 m
+    Zones(red=480.7).check(place)
+    with pytest.raises(InputError, match=r"489 m long, .* leave 488.8 m .* make arm_length longer"):
+        Zones(red=481).check(place)
