@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from minisim.errors import InputError, number, numbers
+from minisim.errors import InputError, instance, number, numbers
 
 #: Above this flow ratio the optimum cycle is of no use (it is infinite at 1): cap it.
 MAX_FLOW_RATIO = 0.95
@@ -70,6 +70,7 @@ def webster(
     n = len(flows)
     number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=60)
+    instance("equal_greens", equal_greens, bool)
     number("min_green [s]", min_green, above=0, high=600)
     number("max_cycle [s]", max_cycle, low=lost + n * min_green, high=3600)
 

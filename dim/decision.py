@@ -16,7 +16,7 @@ from itertools import combinations, pairwise
 import networkx as nx
 
 from dim.harmony import HarmonyMatrix
-from minisim.errors import InputError, choice, instance, integer, show
+from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.geometry import ARM_NAMES, Movement
 
 #: "size": the largest clique, among equals the one of the higher-priority lanes (the paper's
@@ -37,9 +37,8 @@ def lane_ranks(priorities: Iterable[int] | None, n: int) -> tuple[int, ...]:
     """
     if priorities is None:
         return tuple(range(n))
-    if isinstance(priorities, str | bytes) or not isinstance(priorities, Iterable):
-        raise InputError(f"priorities must be a sequence of lane ranks, got {show(priorities)}")
-    ranks = tuple(integer("lane rank", rank, low=0) for rank in priorities)
+    given = items("priorities", priorities, "lane ranks")
+    ranks = tuple(integer("lane rank", rank, low=0) for rank in given)
     if sorted(ranks) != list(range(n)):
         raise InputError(
             f"priorities of {n} lanes are the ranks 0 … {n - 1}, each once, got {show(ranks)}"
@@ -223,9 +222,8 @@ def decision_table(
 def _participants(movements: Iterable[Movement | str], matrix: HarmonyMatrix) -> Movements:
     """The movements by lane, checked."""
     instance("matrix", matrix, HarmonyMatrix)
-    if isinstance(movements, str) or not isinstance(movements, Iterable):
-        raise InputError(f"movements must be a sequence such as a1, b2, got {show(movements)}")
-    found = sorted(matrix.movements[matrix.index(m)] for m in movements)
+    given = items("participants", movements, "movements such as a1, b2")
+    found = sorted(matrix.movements[matrix.index(m)] for m in given)
     for one, other in pairwise(found):
         if one.origin == other.origin:
             raise InputError(

@@ -156,7 +156,7 @@ class Picture:
         scenario = self.run.scenario
         self._text(0.03, 8.5, 16, "left", weight="bold").set_text(self.title)
         self._text(0.03, 8.18, 12, "left", colour=style.MUTED).set_text(
-            f"{scenario.density:g} veh/h/lane · profile {scenario.profile_name} · "
+            f"{scenario.density:.0f} veh/h/lane · profile {scenario.profile_name} · "
             f"seed {self.run.seed}"
         )
         vehicles = (

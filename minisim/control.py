@@ -134,13 +134,15 @@ class View(NamedTuple):
     vehicles: tuple[Observed, ...]
 
 
-class Go(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Go:
     """Give one vehicle the right of way: its hold line no longer holds it."""
 
     vehicle: int
 
 
-class Hold(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Hold:
     """Take one vehicle's right of way: it stops at its hold line.
 
     Where comfortable braking no longer reaches the hold line, it stops before the junction if
@@ -150,26 +152,30 @@ class Hold(NamedTuple):
     vehicle: int
 
 
-class Open(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Open:
     """Give a whole lane the right of way (a green signal)."""
 
     lane: int
 
 
-class Close(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Close:
     """Take it back; vehicles with a `Go` of their own keep that."""
 
     lane: int
 
 
-class Advise(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Advise:
     """Cap one vehicle's speed at `speed` [m/s] until advised again; infinity lifts the cap."""
 
     vehicle: int
     speed: float
 
 
-class Wake(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Wake:
     """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
 
     time: float

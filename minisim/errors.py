@@ -113,16 +113,20 @@ def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
         raise InputError(f"{name} must be a {wanted}, got {show(value)}")
 
 
+def items(name: str, value: object, of: str) -> list[Any]:
+    """Return what `value`, any sequence but a string, holds (`of` says what), or raise."""
+    if not isinstance(value, str | bytes) and isinstance(value, Iterable):
+        try:
+            return list(value)
+        except TypeError:  # an array without dimensions says that it is iterable
+            pass
+    raise InputError(f"{name} must be a sequence of {of}, got {show(value)}")
+
+
 def numbers(name: str, value: object) -> tuple[float, ...]:
     """Return `value`, any sequence of finite numbers, as a tuple of floats, or raise."""
-    wanted = InputError(f"{name} must be a sequence of numbers, got {show(value)}")
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
-        raise wanted
-    try:
-        items = list(value)
-    except TypeError:  # an array without dimensions says that it is iterable
-        raise wanted from None
-    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(items))
+    found = items(name, value, "numbers")
+    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(found))
 
 
 def show(value: object) -> str:

@@ -146,14 +146,18 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             s, v, p = me["s"], me["v"], me["path"]
             released = is_open or me["go"] != 0
 
-            # The vehicle ahead in the lane, until its rear has left the shared path.
+            # The vehicle ahead in the lane, until its rear has left the shared path. When that one
+            # has turned off, one further ahead may still be on it.
             z = 0.0
-            if i > first and vehicles[i - 1]["status"] == DRIVING:
-                ahead = vehicles[i - 1]
+            for j in range(i - 1, first - 1, -1):
+                ahead = vehicles[j]
                 rear = ahead["s"] - law.length
-                if rear < branch[ahead["path"], p]:
+                if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
                     z = closeness(v, rear - s, ahead["v"], law)
                     overlap |= rear <= s
+                    break
+                if s >= ends[p, 0]:
+                    break
 
             # From the junction on, the last vehicle before it bound for the same exit lane. Both
             # are measured from there, so one that is still on another arc counts as if on this.

@@ -38,6 +38,7 @@ from minisim.errors import (
     integer,
     number,
     numbers,
+    show,
 )
 from minisim.recording import TRAJECTORY_COLUMNS
 from minisim.state import (
@@ -122,7 +123,8 @@ class Simulation:
     ) -> None:
         _check_scenario(scenario)
         if not isinstance(controller, Controller) or isinstance(controller, type):
-            raise InputError(f"controller must be a Controller such as Dim(), got {controller!r}")
+            given = show(controller)
+            raise InputError(f"controller must be a Controller such as Dim(), got {given}")
         self.scenario = scenario
         self.controller = controller
         self.seed = integer("seed", seed, low=0)
@@ -156,6 +158,7 @@ class Simulation:
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._wake_tick = NEVER
+        self._period_tick = 0 if self.plan.period is not None else NEVER
         self._started = False
         self._done = False
         self.tick = 0
@@ -198,14 +201,15 @@ class Simulation:
                 self._traced,
                 self._bodies,
                 self.tick,
-                min(target, self._wake_tick),
+                min(target, self._wake_tick, self._period_tick),
             )
             if reasons & kernel.TRACE_FULL:
                 self._keep_trace()
             if reasons & (kernel.TOUCH | kernel.GAP):
                 self._check_collisions()
             self._done = bool(reasons & kernel.DONE)
-            if reasons & (kernel.MARK | kernel.CLEAR) or self.tick >= self._wake_tick:
+            asked = self.tick >= min(self._wake_tick, self._period_tick)
+            if asked or reasons & (kernel.MARK | kernel.CLEAR):
                 self._decide()
 
     def run(self) -> Run:
@@ -252,27 +256,24 @@ class Simulation:
     def _decide(self) -> None:
         if self.tick >= self._wake_tick:
             self._wake_tick = NEVER
+        if self.plan.period is not None and self.tick >= self._period_tick:
+            self._period_tick = self.tick + max(1, first_tick(self.plan.period, self.site.dt))
         commands = list(self._session.decide(self.view()))
         for command in commands:
             self._apply(command)
-        if self.plan.period is not None:
-            self._wake_tick = self.tick + max(1, first_tick(self.plan.period, self.site.dt))
 
     def _apply(self, command: Command) -> None:
-        kind = type(command)
         try:
-            if kind is Go:
-                self._vehicles["go"][self._row_of(command)] = 1
-            elif kind is Hold:
-                self._vehicles["go"][self._row_of(command)] = 0
-            elif kind is Open or kind is Close:
-                lane = integer("lane", command[0], low=0, high=len(self._lanes) - 1)
-                self._lanes["open"][lane] = kind is Open
+            if isinstance(command, Go | Hold):
+                self._vehicles["go"][self._row_of(command.vehicle)] = isinstance(command, Go)
+            elif isinstance(command, Open | Close):
+                lane = integer("lane", command.lane, low=0, high=len(self._lanes) - 1)
+                self._lanes["open"][lane] = isinstance(command, Open)
             elif isinstance(command, Advise):
-                speed = math.inf if command.speed == math.inf else command.speed
+                speed = command.speed
                 if speed != math.inf:
                     speed = number("advised speed [m/s]", speed, low=0)
-                self._vehicles["advice"][self._row_of(command)] = speed
+                self._vehicles["advice"][self._row_of(command.vehicle)] = speed
             elif isinstance(command, Wake):
                 tick = first_tick(number("wake-up time [s]", command.time), self.site.dt)
                 if tick <= self.tick:
@@ -281,15 +282,14 @@ class Simulation:
                     )
                 self._wake_tick = tick
             else:
-                raise InputError(f"{command!r} is not a command")
+                raise InputError(f"{show(command)} is not a command")
         except InputError as error:
             raise ControllerError(
                 f"controller {self.controller.name!r} at {self.time:.1f} s: {error}"
             ) from error
 
-    def _row_of(self, command: Command) -> int:
-        vehicle = integer("vehicle", command[0], low=0, high=len(self._row) - 1)
-        row: int = self._row[vehicle]
+    def _row_of(self, vehicle: int) -> int:
+        row: int = self._row[integer("vehicle", vehicle, low=0, high=len(self._row) - 1)]
         return row
 
     def _check_collisions(self) -> None:
@@ -324,20 +324,19 @@ class Simulation:
 
     def _overlaps_in_lane(self) -> list[tuple[int, int]]:
         """Rows of the vehicles whose front has reached the rear of the one ahead."""
-        v, law = self._vehicles, self._law
-        exits = self._road.ends[:, 0]
-        driving = np.flatnonzero(v["status"] == DRIVING)
+        v, length = self._vehicles, self.site.vehicle.length
+        exits, branch = self._road.ends[:, 0], self._road.branch
         found = []
-        for i in driving.tolist():
+        for i in np.flatnonzero(v["status"] == DRIVING).tolist():
             p = v["path"][i]
-            j = i - 1
-            if j >= 0 and v["lane"][j] == v["lane"][i] and v["status"][j] == DRIVING:
-                rear = v["s"][j] - law.length
-                if rear <= v["s"][i] and rear < self._road.branch[v["path"][j], p]:
+            same_lane = np.flatnonzero((v["status"] == DRIVING) & (v["lane"] == v["lane"][i]))
+            for j in same_lane[same_lane < i].tolist():
+                rear = v["s"][j] - length
+                if rear <= v["s"][i] and rear < branch[v["path"][j], p]:
                     found.append((j, i))
             j = int(v["ahead"][i])
             if j >= 0 and v["status"][j] == DRIVING and v["s"][i] >= exits[p]:
-                rear = v["s"][j] - law.length - exits[v["path"][j]]
+                rear = v["s"][j] - length - exits[v["path"][j]]
                 if rear <= v["s"][i] - exits[p]:
                     found.append((j, i))
         return found
@@ -505,7 +504,7 @@ def simulate(
 def _check_scenario(scenario: object) -> None:
     needed = ("name", "profile_name", "density", "horizon", "depart_speed", "site", "arrivals")
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
-        raise InputError(f"scenario must be a Scenario such as four_way(), got {scenario!r}")
+        raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
 
 
 def _plan_of(session: object, controller: Controller) -> Plan:
@@ -513,7 +512,7 @@ def _plan_of(session: object, controller: Controller) -> Plan:
     if not isinstance(plan, Plan) or not isinstance(session, Session):
         raise ControllerError(
             f"controller {controller.name!r}: start() must return a Session with a Plan, "
-            f"got {session!r}"
+            f"got {show(session)}"
         )
     return plan
 
@@ -521,10 +520,10 @@ def _plan_of(session: object, controller: Controller) -> Plan:
 def _window(window: Iterable[float]) -> tuple[float, float]:
     instance("record_window", window, tuple)
     if not isinstance(window, tuple) or len(window) != 2:
-        raise InputError(f"record_window must be (from, to) in seconds, got {window!r}")
+        raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
     start, end = window
     end = end if end == math.inf else number("end of record_window [s]", end)
     start = number("start of record_window [s]", start, low=0)
     if end < start:
-        raise InputError(f"record_window must not end before it starts, got {window!r}")
+        raise InputError(f"record_window must not end before it starts, got {show(window)}")
     return numbers("record_window", (start,))[0], end

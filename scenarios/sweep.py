@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 from minisim.control import Controller
-from minisim.errors import InputError, MinisimError, instance, integer
+from minisim.errors import InputError, MinisimError, instance, integer, show
 from scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Experiment:
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, Scenario)
         if isinstance(self.controller, type) or not isinstance(self.controller, Controller):
-            raise InputError(f"controller must be a Controller, got {self.controller!r}")
+            raise InputError(f"controller must be a Controller, got {show(self.controller)}")
         integer("seed", self.seed, low=0)
 
 

@@ -14,6 +14,7 @@ import pytest
 import minisim
 from minisim.control import Controller
 from minisim.errors import InputError
+from minisim.geometry import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
 
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
@@ -63,11 +64,13 @@ def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
     )
     rows = run.trajectories
     intersection, length = run.site.intersection, run.site.vehicle.length
-    exits = {str(path.movement): path.exit for path in intersection.paths}
-    movement = rows["lane"] + rows["manoeuvre"].astype(str)
-    inside = (rows["s_m"] > intersection.approach_length + 1e-6) & (
-        rows["s_m"] - length < movement.map(exits) - 1e-6
+    exits = {path.movement: path.exit for path in intersection.paths}
+    movements = (
+        Movement(ARM_NAMES.index(lane), manoeuvre)
+        for lane, manoeuvre in zip(rows["lane"], rows["manoeuvre"], strict=True)
     )
+    past = rows["s_m"] - length - [exits[movement] for movement in movements]
+    inside = (rows["s_m"] > intersection.approach_length + 1e-6) & (past < -1e-6)
     counts = rows[inside].groupby("time_s")["vehicle"].nunique()
     assert len(counts) > 100
     assert counts.max() == 1

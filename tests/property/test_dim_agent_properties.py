@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import minisim
 from dim import DecisionTable, Dim, HarmonyMatrix, decide
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS
 from dim.perception import COMMITS, Reader
 from minisim.control import Go, Hold, Observed, Site, View, can_stop
-from scenarios import five_way, four_way, three_way
+from scenarios import Scenario, five_way, four_way, three_way
+from tests.runs import digest
 
 SITES = {n: maker().site() for n, maker in [(3, three_way), (4, four_way), (5, five_way)]}
 LENGTH = 4.0
@@ -158,3 +162,19 @@ def test_whoever_starts_to_go_is_in_harmony_with_everyone_who_goes(
             assert all(o.distance < 0 for o in ahead)
         if near and not crossing:
             assert movers  # somebody goes: no deadlock
+
+
+@pytest.mark.parametrize("maker", [three_way, four_way, five_way])
+@pytest.mark.parametrize("commit", COMMITS)
+@pytest.mark.parametrize("gate", GATES)
+def test_wake_ups_lose_nothing_in_dense_traffic(
+    gate: str, commit: str, maker: Callable[..., Scenario]
+) -> None:
+    """The same trips, and collisions of the paper's commit rule, as when looking all the time."""
+    scenario = maker(density=350, horizon=600.0)
+    dim = Dim(gate=gate, commit=commit)
+    woken, always = (
+        digest(minisim.simulate(scenario, controller, seed=1, on_collision="record"))
+        for controller in (dim, replace(dim, period=scenario.profile.dt))
+    )
+    assert woken == always

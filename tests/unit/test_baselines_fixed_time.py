@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -101,8 +102,8 @@ def test_a_site_that_it_cannot_serve_is_a_clear_error() -> None:
 
 
 def said(commands: Iterable[Command]) -> list[str]:
-    """Commands in words; they are tuples, and Open(1) == Close(1)."""
-    return [f"{type(command).__name__} {command[0]:g}" for command in commands]
+    """Commands in words; as a reader would say it."""
+    return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
 
 
 def drive(signal: FixedTime, until: float, dt: float = 0.1) -> dict[float, list[str]]:
@@ -114,7 +115,8 @@ def drive(signal: FixedTime, until: float, dt: float = 0.1) -> dict[float, list[
         commands = list(session.decide(View(tick * dt, ())))
         (wake,) = [c for c in commands if isinstance(c, Wake)]
         answers[round(tick * dt, 6)] = said(c for c in commands if c is not wake)
-        tick = int(np.ceil(wake.time / dt - 1e-6))
+        tick, before = int(np.ceil(wake.time / dt - 1e-6)), tick
+        assert tick > before
     return answers
 
 

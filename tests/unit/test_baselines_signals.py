@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from baselines.signals import Colour, Heads, Phase, Program, committed, stopping_sight
@@ -28,9 +30,9 @@ def heads_showing(*colours: Colour) -> Heads:
 
 
 def show(heads: Heads, vehicles: list[Observed], *wanted: Colour) -> list[str]:
-    """The answer in words; commands are tuples, and Open(1) == Close(1)."""
+    """The answer in words; as a reader would say it."""
     commands = heads.show(View(10.0, tuple(vehicles)), wanted)
-    return [f"{type(command).__name__} {command[0]:g}" for command in commands]
+    return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
 
 
 # Committed: 10 m/s needs 10²/9 = 11.11 m to stop, plus the margin.
