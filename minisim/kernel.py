@@ -39,17 +39,20 @@ def advance(
     trace: Records,
     traced: int,
     bodies: Floats,
+    observed: Records,
     tick: int,
     until: int,
-) -> tuple[int, int, int]:
+) -> tuple[int, int, int, int]:
     """Advance from `tick` to `until` at most; stop at the end of a step with a reason.
 
     Args:
         trace: recording, filled from line `traced` on.
         bodies: scratch, (k, 5): how many vehicles can be in and near the junction at once.
+        observed: filled with what a view shows at the end, see `observe`.
 
     Returns:
-        The tick reached, the reasons (bits, 0 at `until`), the lines recorded.
+        The tick reached, the reasons (bits, 0 at `until`), the lines recorded, the vehicles
+        observed.
     """
     reasons = 0
     while tick < until and reasons == 0:
@@ -59,7 +62,7 @@ def advance(
             traced = record(vehicles, lanes, road, law, trace, traced, tick)
             if traced + lanes[-1]["end"] > len(trace):
                 reasons |= TRACE_FULL
-    return tick, reasons, traced
+    return tick, reasons, traced, observe(vehicles, lanes, law, observed)
 
 
 @njit
@@ -149,7 +152,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             # The vehicle ahead in the lane, until its rear has left the shared path. When that one
             # has turned off, one further ahead may still be on it.
             z = 0.0
-            for j in range(i - 1, first - 1, -1):
+            j = i - 1
+            while j >= first:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
@@ -158,6 +162,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                     break
                 if s >= ends[p, 0]:
                     break
+                j -= 1
 
             # From the junction on, the last vehicle before it bound for the same exit lane. Both
             # are measured from there, so one that is still on another arc counts as if on this.
@@ -412,31 +417,23 @@ def record(
 
 
 @njit
-def observe(
-    vehicles: Records,
-    lanes: Records,
-    observed: Records,
-    entry: float,
-    sight: float,
-    length: float,
-    manoeuvres: int,
-) -> int:
+def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> int:
     """Fill `observed` with the vehicles of a view (`minisim.control.View`); their number."""
     count = 0
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["uncleared"], lanes[lane]["next"]):
             me = vehicles[i]
-            distance = entry - me["s"]
-            if distance > sight:
+            distance = law.entry - me["s"]
+            if distance > law.sight:
                 break
             if me["cleared"] != 0 or me["status"] != DRIVING:
                 continue
             seen = observed[count]
             seen["id"] = me["id"]
             seen["lane"] = lane
-            seen["manoeuvre"] = me["path"] % manoeuvres + 1
+            seen["manoeuvre"] = me["path"] % (len(lanes) - 1) + 1
             seen["distance"] = distance
             seen["speed"] = me["v"]
-            seen["length"] = length
+            seen["length"] = law.length
             count += 1
     return count

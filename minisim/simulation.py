@@ -155,6 +155,7 @@ class Simulation:
         self._traced = 0
         self._bodies = np.zeros((16 * self.site.intersection.n, 5))
         self._observed = np.zeros(len(self._vehicles) + 1, OBSERVED)
+        self._seen = 0
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
         self._wake_tick = NEVER
@@ -192,7 +193,7 @@ class Simulation:
             self._started = True
             self._decide()
         while self.tick < target and not self._done:
-            self.tick, reasons, self._traced = kernel.advance(
+            self.tick, reasons, self._traced, self._seen = kernel.advance(
                 self._vehicles,
                 self._lanes,
                 self._road,
@@ -200,6 +201,7 @@ class Simulation:
                 self._trace,
                 self._traced,
                 self._bodies,
+                self._observed,
                 self.tick,
                 min(target, self._wake_tick, self._period_tick),
             )
@@ -219,16 +221,7 @@ class Simulation:
 
     def view(self) -> View:
         """What a session would be shown now."""
-        count = kernel.observe(
-            self._vehicles,
-            self._lanes,
-            self._observed,
-            self._law.entry,
-            self._law.sight,
-            self._law.length,
-            self.site.intersection.n - 1,
-        )
-        return View(self.time, tuple(map(Observed._make, self._observed[:count].tolist())))
+        return View(self.time, tuple(map(Observed._make, self._observed[: self._seen].tolist())))
 
     def result(self) -> Run:
         """The result so far."""
