@@ -130,7 +130,7 @@ def webster_delay(
     """
     number("rate [veh/h]", rate, low=0, high=1e5)
     number("cycle [s]", cycle, above=0, high=1e5)
-    number("green [s]", green, above=0, high=cycle)
+    number("green [s]", green, low=0.1, high=cycle)
     number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     share = green / cycle
     x = rate / (saturation_flow * share)

@@ -26,6 +26,8 @@ MODELS = ("poisson", "exponential", "shifted")
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
 #: More than any lane can carry; beyond it a density is surely a typing error.
 MAX_DENSITY = 3600.0
+#: The longest duration and the latest demand time [s].
+MAX_TIME = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,8 @@ class Arrivals:
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if len(time) and (not np.isfinite(time).all() or time.min() < 0):
             raise InputError("demand times must be finite and not negative")
+        if len(time) and time.max() > MAX_TIME:
+            raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
         order = np.lexsort((lane, time))
         for name, column in (("time", time), ("lane", lane), ("manoeuvre", manoeuvre)):
             sorted_column = column[order]
@@ -131,7 +135,7 @@ class Demand:
         second, which ends the run when more vehicles come than there are manoeuvres; at 350
         veh/h/lane that touches 0.4 % of the lane-seconds.)
         """
-        number("duration [s]", duration, above=0, high=1e7)
+        number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
         rng = stream(seed, "arrivals")
         times = [self._lane_times(rate / 3600.0, duration, rng) for rate in self.rates(n)]
@@ -170,14 +174,18 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
             or manoeuvre that n arms do not have.
     """
     instance("arrivals file", path, (str, os.PathLike))
+    if n is not None:
+        integer("number of arms", n, low=3, high=len(ARM_NAMES))
     times, lanes, manoeuvres = [], [], []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
-            missing = [c for c in COLUMNS if c not in (reader.fieldnames or ())]
-            if missing:
+            header = list(reader.fieldnames or ())
+            wrong = [c for c in COLUMNS if header.count(c) != 1]
+            if wrong:
                 raise FileError(
-                    f"{path}: column {', '.join(missing)} missing; needed: {', '.join(COLUMNS)}"
+                    f"{path}: column {', '.join(wrong)} missing or twice; "
+                    f"needed once each: {', '.join(COLUMNS)}"
                 )
             for row in reader:
                 time, lane, manoeuvre = _parse_row(path, reader.line_num, row, n)
@@ -195,6 +203,7 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
 def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
     """Write an arrival table as `read_arrivals` reads it; raises `FileError`."""
     instance("arrivals file", path, (str, os.PathLike))
+    instance("arrivals", arrivals, Arrivals)
     arrivals.check(len(ARM_NAMES))
     try:
         with Path(path).open("w", newline="", encoding="utf-8") as file:
@@ -218,16 +227,18 @@ def _parse_row(
     time_text, lane_text, manoeuvre_text = (str(t).strip() for t in texts)
     lanes = ARM_NAMES[: n or len(ARM_NAMES)]
     try:
-        time = number("demand_time_s", float(time_text), low=0)
+        time = number("demand_time_s", float(time_text), low=0, high=MAX_TIME)
     except ValueError:
-        raise FileError(f"{where}: demand_time_s must be a number ≥ 0, got {time_text!r}") from None
+        raise FileError(
+            f"{where}: demand_time_s must be a number 0 … {MAX_TIME:g}, got {show(time_text)}"
+        ) from None
     if len(lane_text) != 1 or lane_text not in lanes:
-        raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {lane_text!r}")
+        raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {show(lane_text)}")
     try:
         manoeuvre = integer("manoeuvre", int(manoeuvre_text), low=1, high=len(lanes) - 1)
     except ValueError:
         raise FileError(
-            f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {manoeuvre_text!r}"
+            f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {show(manoeuvre_text)}"
         ) from None
     return time, lanes.index(lane_text), manoeuvre
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from minisim.errors import InputError, MinisimError, integer
+from minisim.errors import CollisionError, InputError, MinisimError, integer, number
 from minisim.version import __version__
 from scenarios.options import (
     Arrivals,
@@ -31,7 +31,7 @@ from scenarios.options import (
     Turns,
     build_scenario,
 )
-from scenarios.terminal import bar, show, show_json
+from scenarios.terminal import bar, drop_output, prepare_streams, show, show_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +80,12 @@ def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table, plot and GIF.")] = (
         Path("out")
     ),
-    seeds: Annotated[int, typer.Option(help="Runs a point; at least 2.")] = 5,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            help="Runs a point, 2 … 1000; 5 by default, 2 with --quick.", show_default=False
+        ),
+    ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(help="Processes to use; one a core by default.", show_default=False),
@@ -93,8 +98,9 @@ def demo(
     from scenarios.demo import Tour, demo_table, demo_title, run_tour, write_tables
     from scenarios.files import make_folder
 
-    tour = Tour.quick(seeds) if quick else Tour(seeds=seeds)
-    processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1)
+    runs = (2 if quick else 5) if seeds is None else integer("--seeds", seeds, low=2, high=1000)
+    tour = Tour.quick(runs) if quick else Tour(seeds=runs)
+    processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     folder = make_folder(out)
     with bar("starting"):
         film = tour.film()  # first, for it compiles the kernel once for all processes
@@ -124,7 +130,9 @@ def demo(
     "minisim run four-way --controller dim --density 300\n\n"
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
-    "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml"
+    "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
+    "[bold]Exit codes[/bold]\n\n"
+    "0 done; 1 a collision stopped the run, or stdout cannot be written; 2 bad input."
 )
 def run(
     scenario: ScenarioName,
@@ -156,31 +164,41 @@ def run(
             metavar="stop|record", help="Stop with a report, or note the collision and go on."
         ),
     ] = "stop",
+    safety: Annotated[
+        bool,
+        typer.Option(
+            "--safety/--no-safety",
+            help="Measure TTC and PET, which keeps all trajectories near the junction in memory "
+            "(some 36 MB per 1000 s).",
+        ),
+    ] = True,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from minisim.recording import write_fcd, write_trajectories, write_trips
     from minisim.safety import safety_summary
     from scenarios.controllers import controller_named
-    from scenarios.files import check_file, check_table
+    from scenarios.files import check_apart, check_fcd, check_table
 
+    check_apart({
+        "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
+    })  # fmt: skip
     for table in (trips, trajectories):
         if table is not None:
             check_table(table)
     if fcd is not None:
-        check_file(fcd)
+        check_fcd(fcd)
     what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     who = controller_named(controller, profile)
     everything = fcd is not None or trajectories is not None
-    result = _simulate(
-        what, who, seed, record="all" if everything else "junction", on_collision=on_collision
-    )
+    record = "all" if everything else "junction" if safety else None
+    result = _simulate(what, who, seed, record=record, on_collision=on_collision)
     summary = result.summary()
     with bar("measuring"):
-        summary["safety"] = safety_summary(_near_junction(result), result.site)
+        summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
         if trips is not None:
             write_trips(result.trips, trips)
         if trajectories is not None:
@@ -238,10 +256,12 @@ def harmony(
             "harmony": matrix.values.astype(int).tolist(),
         })  # fmt: skip
     else:
+        from rich.text import Text
+
         from scenarios.report import harmony_table
 
-        typer.echo(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
-        show(harmony_table(matrix))
+        title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
+        show(title, harmony_table(matrix))
 
 
 @app.command(
@@ -346,11 +366,14 @@ def animate(
     from figures.animate import frame_times, write_animation
     from figures.encode import animation_format
     from scenarios.controllers import controller_named
-    from scenarios.files import check_file
+    from scenarios.files import check_apart, check_file
     from scenarios.scenario import profile_named
 
+    check_apart({"--arrivals": arrivals, "--out": out})
     animation_format(out)
     check_file(out)
+    number("--start [s]", start, low=0, high=9e6)
+    number("--seconds", seconds, above=0, high=3600)
     frame_times(start, seconds, fps, profile_named(profile).dt)
     what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
@@ -368,12 +391,16 @@ def animate(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
-    Bad input is one line on stderr and 2, Ctrl-C is 130. Nothing on purpose is a traceback.
+    Bad input is one line on stderr and 2, a collision that stops a run or a stdout that cannot be
+    written is 1, Ctrl-C is 130. Nothing on purpose is a traceback.
     """
+    prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
+    except CollisionError as error:
+        return _fail(str(error), 1)
     except MinisimError as error:
         return _fail(str(error))
     except _USAGE_ERROR as error:
@@ -385,16 +412,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = 130
     except BrokenPipeError:
         # The reader of our output has gone (as `head` does): no more to say, and no complaint.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        drop_output()
         return 1
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        drop_output()
+        return _fail(f"cannot write to stdout: {error.strerror or error}", 1)
     if code == 130:
         typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
 
 
-def _fail(message: str) -> int:
+def _fail(message: str, code: int = 2) -> int:
     typer.echo(f"minisim: {' '.join(message.split())}", err=True)
-    return 2
+    return code
 
 
 def _simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:

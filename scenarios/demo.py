@@ -67,10 +67,10 @@ class Tour:
         number("film_seconds [s]", self.film_seconds, above=0)
 
     @classmethod
-    def quick(cls, seeds: int) -> Tour:
+    def quick(cls, seeds: int = 2) -> Tour:
         """A smoke test of a few seconds."""
         return cls(
-            densities=(150.0, 350.0), seeds=min(seeds, 2), horizon=600.0, film_start=120.0,
+            densities=(150.0, 350.0), seeds=seeds, horizon=600.0, film_start=120.0,
             film_seconds=10.0,
         )  # fmt: skip
 

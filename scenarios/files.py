@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.util
 import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
-from minisim.errors import FileError, MissingExtraError, choice
+from minisim.errors import FileError, InputError, MissingExtraError, choice
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 
@@ -40,6 +41,26 @@ def check_table(path: str | os.PathLike[str]) -> Path:
             "Parquet needs pyarrow: pip install 'minisim[parquet]' (or write .csv)"
         )
     return check_file(path)
+
+
+def check_fcd(path: str | os.PathLike[str]) -> Path:
+    """`check_file` for floating-car data; raises also for a suffix other than .xml."""
+    choice(f"suffix of {os.fspath(path)}:", Path(path).suffix.lower(), [".xml"])
+    return check_file(path)
+
+
+def check_apart(files: Mapping[str, Path | None]) -> None:
+    """Raise `InputError` when two options (name -> file) mean one file: it would be overwritten.
+
+    Links are followed.
+    """
+    seen: dict[str, str] = {}
+    for option, path in files.items():
+        if path is None:
+            continue
+        first = seen.setdefault(os.path.normcase(os.path.realpath(path)), option)
+        if first != option:
+            raise InputError(f"{first} and {option} name the same file {path}; give two files")
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

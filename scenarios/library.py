@@ -6,12 +6,14 @@ the profile by name.
 
 from __future__ import annotations
 
+import difflib
 import math
+import re
 from collections.abc import Sequence
 from typing import Any, Literal
 
 from minisim.arrivals import Arrivals, Demand
-from minisim.errors import InputError, choice, instance, integer, numbers
+from minisim.errors import InputError, instance, integer, numbers, show
 from minisim.geometry import Intersection
 from scenarios.scenario import Profile, Scenario, profile_named
 
@@ -110,8 +112,14 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     count = name.removesuffix("-way")
     if name.endswith("-way") and count.isascii() and count.isdigit() and len(count) <= 3:
         return regular(int(count), **options)
-    known = choice("scenario", name, [*makers, "custom", "6-way"])
-    raise InputError(f"unknown scenario {known!r}")
+    counts = [n for n in re.findall("[0-9]+", name) if len(n) <= 2 and 3 <= int(n) <= 12]
+    near = [f"{int(n)}-way" for n in counts] or difflib.get_close_matches(
+        name, [*makers, "custom"], n=1, cutoff=0.5
+    )
+    raise InputError(
+        f"unknown scenario {show(name)}; allowed: {', '.join(makers)}, N-way (such as 6-way), "
+        f"custom{f'; did you mean {near[0]!r}?' if near else ''}"
+    )
 
 
 def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scenario:

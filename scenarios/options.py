@@ -70,14 +70,22 @@ Bearings = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", "-s", help="Of the random arrivals.")]
+
+
+def _file_name(text: str) -> Path:
+    if not text:
+        raise typer.BadParameter("'' is no file name")
+    return Path(text)
+
+
 Arrivals = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE",
+        metavar="FILE", parser=_file_name,
         help="CSV of recorded arrivals (demand_time_s, lane, manoeuvre) to replay instead of "
         "drawing them.",
     ),
-]
+]  # fmt: skip
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
@@ -113,10 +121,15 @@ def build_scenario(
 
 
 def _numbers(option: str, text: str, separator: str, example: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(part) for part in text.split(separator))
-    except ValueError:
-        values = (math.nan,)
-    if not all(map(math.isfinite, values)):
-        raise InputError(f"{option} is written like {example}, got {text!r}")
-    return values
+    values = []
+    for part in text.split(separator):
+        try:
+            value = float(part)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(
+                f"{option} is written like {example}, got {text!r}: {part!r} is no finite number"
+            )
+        values.append(value)
+    return tuple(values)

@@ -46,12 +46,15 @@ def run_table(summary: Mapping[str, Any]) -> Table:
 
 
 def safety_line(summary: Mapping[str, Any]) -> Text:
-    """Collisions and the closest calls of one run."""
+    """Collisions and, where measured, the closest calls of one run."""
     safety = summary["safety"]
     collisions = summary["collisions"]
-    return Text.assemble(
-        "  collisions ",
-        (str(collisions), "bold red" if collisions else "bold green"),
+    line = Text.assemble(
+        "  collisions ", (str(collisions), "bold red" if collisions else "bold green")
+    )
+    if safety is None:
+        return line
+    return line + Text.assemble(
         "   minimum TTC ",
         (_seconds(safety["min_ttc_s"], " s"), "bold"),
         "   minimum PET ",

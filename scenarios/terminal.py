@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import json
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -13,6 +17,9 @@ from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
+
+#: One character for one, where the terminal's encoding lacks it: tables keep their columns.
+_PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
 
 class Bar:
@@ -50,6 +57,31 @@ def show(*renderables: Text | Table) -> None:
 def _width(console: Console, renderable: Text | Table) -> int:
     """Columns that it takes where there is room for everything."""
     return Measurement.get(console, console.options.update(max_width=10_000), renderable).maximum
+
+
+def prepare_streams() -> None:
+    """Let stdout and stderr take any text: into nowhere where closed, in plainer characters."""
+    codecs.register_error("minisim-plain", _plain)
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="minisim-plain")
+
+
+def drop_output() -> None:
+    """Send what is still to be written to stdout nowhere, for it cannot be written."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end].translate(_PLAIN)
+    return "".join(c if c.isascii() else "?" for c in text), error.end
 
 
 def show_json(value: Any) -> None:

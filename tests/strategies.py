@@ -57,15 +57,18 @@ def intersections(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> Inte
 @st.composite
 def vehicles(draw: st.DrawFn) -> VehicleType:
     """Passenger cars: 3 … 6 m long, 1.5 … 2 m wide, any ordinary way of driving."""
-    deceleration = draw(floats(1.5, 5.0))
+    acceleration, deceleration = draw(floats(0.8, 4.0)), draw(floats(1.5, 5.0))
+    needed = VehicleType(
+        acceleration=acceleration, deceleration=deceleration, max_deceleration=100.0
+    ).needed_braking
     return VehicleType(
         length=draw(floats(3.0, 6.0)),
         width=draw(floats(1.5, 2.0)),
-        acceleration=draw(floats(0.8, 4.0)),
+        acceleration=acceleration,
         deceleration=deceleration,
         headway=draw(floats(0.8, 2.0)),
         min_gap=draw(floats(1.0, 4.0)),
-        max_deceleration=draw(floats(max(6.0, deceleration), 10.0)),
+        max_deceleration=draw(floats(max(6.0, needed), 12.0)),
         model=draw(st.sampled_from(["idm", "iidm"])),
     )
 

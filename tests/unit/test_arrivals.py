@@ -261,7 +261,7 @@ def test_harmless_variants_are_read_alike(csv_file: Callable[[str], Path], text:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("x,a,1", "demand_time_s must be a number ≥ 0, got 'x'"),
+        ("x,a,1", "demand_time_s must be a number 0 … 1e.07, got 'x'"),
         ("-1,a,1", "demand_time_s"),
         ("nan,a,1", "demand_time_s"),
         ("1e999,a,1", "demand_time_s"),
@@ -325,3 +325,23 @@ def test_a_table_without_letters_for_its_lanes_is_not_half_written(tmp_path: Pat
     with pytest.raises(InputError, match="lane 12"):
         write_arrivals(table, path)
     assert not path.exists()
+
+
+def test_a_demand_time_beyond_every_horizon_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "far.csv"
+    path.write_text("demand_time_s,lane,manoeuvre\n1e300,a,1\n")
+    with pytest.raises(FileError, match=r"line 2: demand_time_s must be a number 0 … 1e\+07"):
+        read_arrivals(path, 4)
+    with pytest.raises(InputError, match="at most"):
+        Arrivals(np.array([1e300]), np.array([0]), np.array([1]))
+
+
+def test_a_column_twice_and_wrong_types_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "twice.csv"
+    path.write_text("demand_time_s,lane,manoeuvre,lane\n1,a,1,b\n")
+    with pytest.raises(FileError, match="lane missing or twice"):
+        read_arrivals(path, 4)
+    with pytest.raises(InputError, match="arrivals must be"):
+        write_arrivals(None, tmp_path / "x.csv")
+    with pytest.raises(InputError, match="number of arms"):
+        read_arrivals(path, "x")

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
 
-import minisim
+import minisim.simulation
 from dim import HarmonyMatrix
+from minisim.errors import InputError
 from minisim.trips import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
 from scenarios.controllers import CONTROLLERS, controller_named
+from scenarios.demo import Tour
 from scenarios.report import harmony_table
 from scenarios.terminal import show
 
@@ -40,10 +44,10 @@ def ok(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return captured.out
 
 
-def fails(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    code = main(arguments)
+def fails(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
+    returned = main(arguments)
     captured = capsys.readouterr()
-    assert (code, captured.out) == (2, "")
+    assert (returned, captured.out) == (code, "")
     assert captured.err.startswith("minisim: ")
     assert captured.err.count("\n") == 1, "one line"
     return captured.err
@@ -167,11 +171,28 @@ def test_collision_stops_the_run_and_writes_nothing(
 ) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
-    assert "touched" in fails(capsys, *arguments)
+    assert "touched" in fails(capsys, *arguments, code=1)
     assert list(tmp_path.iterdir()) == []
     out = ok(capsys, *arguments, "--on-collision", "record")
     assert " touched" in out
     assert trips.exists()
+
+
+def test_without_safety_nothing_is_recorded(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records, real = [], minisim.simulation.Simulation
+
+    def spy(*arguments: Any, **options: Any) -> Any:
+        records.append(options["record"])
+        return real(*arguments, **options)
+
+    monkeypatch.setattr("minisim.simulation.Simulation", spy)
+    with_safety = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json"))
+    without = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json", "--no-safety"))
+    assert records == ["junction", None]
+    assert without == {**with_safety, "safety": None}
+    assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
 
 
 # --- harmony and decide ----------------------------------------------------------------------
@@ -251,7 +272,15 @@ def test_animate_checks_before_it_simulates(
     assert "ffmpeg" in fails(capsys, "animate", "four-way", "-o", f"{here}/film.mp4")
     missing = fails(capsys, "animate", "four-way", "-o", f"{here}/no/film.gif")
     assert f"no folder {here}/no" in missing
-    assert "fps" in fails(capsys, "animate", "four-way", "-o", f"{here}/f.gif", "--fps", "11")
+    for option, value in (("--fps", "11"), ("--start", "1e300"), ("--seconds", "1e300")):
+        message = fails(capsys, "animate", "four-way", "-o", f"{here}/f.gif", option, value)
+        assert option.lstrip("-") in message
+    recorded = tmp_path / "f.gif"
+    recorded.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
+    again = f"{here}/../{tmp_path.name}/f.gif"
+    same = fails(capsys, "animate", "four-way", "--arrivals", str(recorded), "-o", again)
+    assert "--arrivals and --out name the same file" in same
+    assert recorded.read_text().startswith("demand_time_s")
 
 
 def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -270,6 +299,27 @@ def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         assert film.n_frames == 100
 
 
+def test_demo_takes_the_seeds_it_is_given(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(tour: Tour) -> None:
+        raise InputError(f"{tour.seeds} seeds")
+
+    monkeypatch.setattr(Tour, "film", stop)
+    here = str(tmp_path)
+    assert "7 seeds" in fails(capsys, "demo", "--quick", "--seeds", "7", "--out", here)
+    assert "2 seeds" in fails(capsys, "demo", "--quick", "--out", here)
+    assert "5 seeds" in fails(capsys, "demo", "--out", here)
+
+
+@pytest.mark.parametrize(("option", "value"), [("--jobs", "100000"), ("--seeds", "1001")])
+def test_a_demo_that_cannot_start_makes_no_folder(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, option: str, value: str
+) -> None:
+    assert option in fails(capsys, "demo", option, value, "--out", str(tmp_path / "new"))
+    assert list(tmp_path.iterdir()) == []
+
+
 # --- errors ----------------------------------------------------------------------------------
 
 BAD = [
@@ -277,11 +327,15 @@ BAD = [
     (("run",), "SCENARIO"),
     (("run", "four-way", "--fo"), "--fo"),
     (("run", "for-way"), "did you mean 'four-way'"),
+    (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
     (("run", "2-way"), "3 … 12"),
     (("run", "custom"), "needs bearings"),
     (("run", "custom", "--bearings", "0,10,90"), "at least 30°"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "0,nan,90"),
+    (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
+    (("run", "four-way", "--split", "1:1:inf:1"), "'inf' is no finite number"),
+    (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
     (("run", "four-way", "-p", "pape"), "did you mean 'paper'"),
@@ -301,7 +355,8 @@ BAD = [
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
     (("run", "four-way", "--trips", "t.xlsx"), ".csv, .parquet"),
     (("run", "four-way", "--trips", str(ROOT)), "allowed"),
-    (("run", "four-way", "--fcd", str(ROOT)), "folder"),
+    (("run", "four-way", "--fcd", str(ROOT)), "allowed"),
+    (("run", "four-way", "--fcd", "fcd.csv"), "allowed: .xml"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
     (("decide", "four-way"), "MOVEMENTS"),
@@ -312,7 +367,7 @@ BAD = [
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
-    (("demo", "--seeds", "1"), "at least 2"),
+    (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--jobs", "0"), "--jobs"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
 ]
@@ -337,6 +392,26 @@ def test_one_bad_output_writes_none(capsys: pytest.CaptureFixture[str], tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("--trips", "--trajectories"), ("--trips", "--fcd"), ("--arrivals", "--trips")],
+)
+def test_no_file_is_written_twice_or_over_an_input(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    first: str, second: str,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
+    monkeypatch.chdir(tmp_path)
+    file, link = tmp_path / "a.csv", tmp_path / "link.csv"
+    file.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
+    link.symlink_to(file)
+    before = file.read_text()
+    for other in ("a.csv", "./a.csv", str(link)):
+        message = fails(capsys, "run", "four-way", first, str(file), second, other)
+        assert f"{first} and {second} name the same file" in message
+    assert file.read_text() == before
+
+
 def test_ctrl_c_is_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
@@ -355,6 +430,45 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         assert process.stderr is not None
         process.stdout.close()
         assert process.stderr.read() == b""
+
+
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run `minisim …` as a shell does, with its redirections."""
+    script = "from scenarios.cli import main; raise SystemExit(main())"
+    return subprocess.run(
+        ["sh", "-c", command.replace("minisim", '"$0" -c "$1"', 1), sys.executable, script],
+        cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    "command",
+    ["run three-way --horizon 20", "run three-way --horizon 20 --json", "--help", "--version",
+     "harmony five-way --csv"],
+)  # fmt: skip
+def test_a_full_disk_is_one_line(command: str) -> None:
+    done = shell(f"minisim {command} > /dev/full")
+    assert done.stderr == "minisim: cannot write to stdout: No space left on device\n"
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_closed_streams_are_no_error(closed: str) -> None:
+    for command in ("harmony three-way --csv", "--help"):
+        done = shell(f"minisim {command} {closed}")
+        assert (done.returncode, done.stderr) == (0, "")
+    assert shell(f"minisim harmony 2-way {closed}").returncode == 2
+
+
+def test_a_terminal_without_unicode_gets_plain_characters() -> None:
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+    table = shell("minisim harmony three-way", **plain)
+    assert (table.returncode, table.stderr) == (0, "")
+    assert "x harmony, . conflict" in table.stdout
+    decision = shell("minisim decide four-way a1 b2", PYTHONIOENCODING="ascii")
+    assert (decision.returncode, decision.stderr) == (0, "")
+    assert "a1-b2" in decision.stdout
 
 
 # --- controllers -----------------------------------------------------------------------------
