@@ -437,7 +437,7 @@ class Run:
         columns: the trips as arrays.
         record: what was recorded of the trajectories.
         trace, rows: the recording, and each row's vehicle id and path.
-        host: what moved the vehicles, as named in the provenance.
+        host: what moved the vehicles, for the provenance: `host` and what else to name.
     """
 
     scenario: ScenarioLike
@@ -450,7 +450,7 @@ class Run:
     record: str | None
     trace: Records
     rows: Records
-    host: Mapping[str, str] = field(default_factory=dict)
+    host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
 
     @cached_property
     def trips(self) -> pd.DataFrame:
@@ -466,6 +466,7 @@ class Run:
             "density": self.scenario.density,
             "seed": self.seed,
             "horizon_s": self.scenario.horizon,
+            "host": self.host["host"],
             **summarise(self.columns, self.site.intersection.n),
             "collisions": len(self.collisions),
         }
@@ -569,6 +570,7 @@ def _plan_of(session: object, controller: Controller) -> Plan:
 
 
 def checked_window(window: Iterable[float]) -> tuple[float, float]:
+    """Return a `record_window`, or raise `InputError`."""
     instance("record_window", window, tuple)
     if not isinstance(window, tuple) or len(window) != 2:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")

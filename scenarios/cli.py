@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from minisim.errors import InputError, MinisimError, integer
+from minisim.errors import InputError, MinisimError, choice, integer
 from minisim.version import __version__
 from scenarios.options import (
     Arrivals,
@@ -23,11 +23,15 @@ from scenarios.options import (
     Bearings,
     ControllerName,
     Density,
+    Gui,
+    Host,
+    KeepFiles,
     ProfileName,
     ScenarioName,
     Seed,
     Side,
     Split,
+    SumoModel,
     Turns,
     build_scenario,
 )
@@ -39,6 +43,7 @@ if TYPE_CHECKING:
     from minisim.simulation import Run
     from scenarios.scenario import Scenario
 
+HOSTS = ("minisim", "sumo")
 COMMANDS = ("demo", "run", "harmony", "decide", "animate")
 
 #: What typer raises for a wrong command line: the parent of its public `BadParameter`.
@@ -124,7 +129,8 @@ def demo(
     "minisim run four-way --controller dim --density 300\n\n"
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
-    "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml"
+    "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
+    "minisim run four-way -c dim -d 200 --profile fair --host sumo"
 )
 def run(
     scenario: ScenarioName,
@@ -156,6 +162,10 @@ def run(
             metavar="stop|record", help="Stop with a report, or note the collision and go on."
         ),
     ] = "stop",
+    host: Host = "minisim",
+    sumo_model: SumoModel = None,
+    gui: Gui = False,
+    keep_files: KeepFiles = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
@@ -175,9 +185,15 @@ def run(
     )  # fmt: skip
     who = controller_named(controller, profile)
     everything = fcd is not None or trajectories is not None
-    result = _simulate(
-        what, who, seed, record="all" if everything else "junction", on_collision=on_collision
-    )
+    options = {"record": "all" if everything else "junction", "on_collision": on_collision}
+    sumo = {"model": sumo_model, "gui": gui or None, "keep_files": keep_files}
+    asked = {name: value for name, value in sumo.items() if value is not None}
+    if choice("host", host, HOSTS) == "sumo":
+        result = _simulate_in_sumo(what, who, seed, **options, **asked)
+    elif asked:
+        raise InputError("--sumo-model, --gui and --keep-files need --host sumo")
+    else:
+        result = _simulate(what, who, seed, **options)
     summary = result.summary()
     with bar("measuring"):
         summary["safety"] = safety_summary(_near_junction(result), result.site)
@@ -408,6 +424,13 @@ def _simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) ->
             simulation.advance(scenario.horizon * part / parts)
             progress(part, parts)
     return simulation.run()
+
+
+def _simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
+    from minisim.sumo import simulate
+
+    with bar("simulating in SUMO") as progress:
+        return simulate(scenario, controller, seed, progress=progress, **options)
 
 
 def _near_junction(run: Run) -> pd.DataFrame:

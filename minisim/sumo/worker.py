@@ -38,10 +38,12 @@ from minisim.geometry import Movement
 from minisim.state import NEVER, STOP_MARGIN, TRACE, Law, Records, Road, first_tick
 from minisim.sumo.network import Network
 
-#: SUMO keeps a safe gap (1) and the maximal acceleration (2); it does not care for right of way,
-#: neither before the junction (no 8) nor inside (32). Braking (4) is limited by minisim.
-#: (SUMO, TraCI/Change Vehicle State, speed mode.)
-SPEED_MODE = 1 + 2 + 32
+#: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
+#: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
+#: junction it follows whoever comes from the same lane or leaves by the same. That also makes it
+#: yield to whoever crosses, where the controller alone is to say who goes: so it ignores all in
+#: the junction (32) as long as somebody drives there who neither shares lane nor exit.
+FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
 #: SUMO knows no desired speed of zero [m/s]; a vehicle told to stop is commanded to.
 LEAST_SPEED = 0.01
@@ -98,12 +100,14 @@ class Ended(NamedTuple):
         tick: reached.
         done: whether everybody has arrived.
         collisions: each pair of vehicles once.
+        positions: `s` of the vehicles still on the road [m], by id.
         trace: what was recorded.
     """
 
     tick: int
     done: bool
     collisions: tuple[Collision, ...]
+    positions: dict[int, float]
     trace: Records
 
 
@@ -117,8 +121,8 @@ class Car:
     """A vehicle; `minisim.state.VEHICLE` explains the values."""
 
     __slots__ = (
-        "a", "advice", "commanded", "desired", "factor", "go", "id", "lane", "mark", "name",
-        "path", "row", "s", "section", "v",
+        "a", "advice", "commanded", "desired", "factor", "go", "id", "ignoring", "lane", "mark",
+        "name", "path", "row", "s", "section", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records) -> None:
@@ -133,7 +137,7 @@ class Car:
         self.go = False
         self.advice = math.inf
         self.desired = math.inf  # as SUMO was told last
-        self.commanded = False
+        self.commanded = self.ignoring = False
 
 
 class Worker:
@@ -156,6 +160,7 @@ class Worker:
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
         ]
+        self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
         self._cars = {
             car.id: car for row, record in enumerate(job.vehicles) for car in [Car(row, record)]
         }
@@ -178,15 +183,20 @@ class Worker:
         while self._tick < job.horizon and not self._done and not self._stopped:
             if passed or self._tick >= min(self._wake_tick, self._period_tick):
                 self._decide()
-            for lane in self._lanes:
-                for car in lane:
-                    self._steer(car)
+            self._steer_all()
             self._libsumo.simulationStep()
             self._tick += 1
             passed = self._observe()
             self._collide()
         return Ended(
-            self._tick, self._done, tuple(self._collisions.values()), np.array(self._trace, TRACE)
+            tick=self._tick,
+            done=self._done,
+            collisions=tuple(self._collisions.values()),
+            positions={
+                int(name): self._locate(self._cars[int(name)])
+                for name in self._libsumo.vehicle.getIDList()
+            },
+            trace=np.array(self._trace, TRACE),
         )
 
     @property
@@ -228,6 +238,19 @@ class Worker:
             case Wake(time):
                 self._wake_tick = first_tick(time, self._job.law.dt)
 
+    def _steer_all(self) -> None:
+        entry = self._job.law.entry
+        inside = {car.path for lane in self._lanes for car in lane if car.s >= entry}
+        for lane in self._lanes:
+            for car in lane:
+                self._steer(car)
+                held = car.s < entry and not self._released(car)
+                ignoring = held or not inside.isdisjoint(self._crossing[car.path])
+                if ignoring != car.ignoring:
+                    mode = IGNORING if ignoring else FOLLOWING
+                    self._libsumo.vehicle.setSpeedMode(car.name, mode)
+                    car.ignoring = ignoring
+
     def _steer(self, car: Car) -> None:
         """Tell SUMO what the road ahead asks of one vehicle in the next step."""
         law = self._job.law
@@ -237,11 +260,9 @@ class Worker:
         free = acc = self._free(v, v0)
         k = section + 1
         while kernel.braking_begins(v, starts[k] - s, law):
-            acc = min(
-                acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law)
-            )
+            acc = min(acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1
-        if s < law.entry and not (car.go or self._open[car.lane]) and near(v, law.hold - s, law):
+        if s < law.entry and not self._released(car) and near(v, law.hold - s, law):
             acc = min(acc, kernel.hold(v, s, law))
         # SUMO drops to a lower desired speed at once; the law brakes.
         self._desire(car, max(v0, v + free * law.dt) if v > v0 else v0)
@@ -251,6 +272,9 @@ class Worker:
             car.commanded = True
         elif car.commanded:
             self._release(car)
+
+    def _released(self, car: Car) -> bool:
+        return car.go or self._open[car.lane]
 
     def _free(self, v: float, v0: float) -> float:
         """Acceleration of the model on an empty road."""
@@ -286,7 +310,7 @@ class Worker:
     def _watch(self, car: Car) -> None:
         sumo = self._libsumo
         sumo.vehicle.subscribe(car.name, [sumo.VAR_DISTANCE, sumo.VAR_SPEED])
-        sumo.vehicle.setSpeedMode(car.name, SPEED_MODE)
+        sumo.vehicle.setSpeedMode(car.name, FOLLOWING)
         car.v = sumo.vehicle.getSpeed(car.name)
         self._watched[car.name] = car
         self._lanes[car.lane].append(car)
@@ -314,16 +338,20 @@ class Worker:
         law, network = self._job.law, self._job.network
         inside = travelled + law.length - network.approach[p]
         if inside <= 0.0:
-            return law.entry + inside
+            return float(law.entry + inside)
         if inside <= network.inside[p]:
-            return law.entry + inside * self._stretch[p]
-        return self._exit[p] + inside - network.inside[p]
+            return float(law.entry + inside * self._stretch[p])
+        return float(self._exit[p] + inside - network.inside[p])
+
+    def _locate(self, car: Car) -> float:
+        """`s` of any vehicle on the road [m], watched or not."""
+        return self._position(car.path, self._libsumo.vehicle.getDistance(car.name))
 
     def _clear(self, car: Car) -> None:
         """Its rear has left the junction: nobody but SUMO steers it any more."""
         self._lanes[car.lane].remove(car)
-        starts, speeds = self._limits[car.path]
-        self._desire(car, speeds[car.section] * car.factor)
+        limit = self._limits[car.path][1][car.section]
+        self._desire(car, min(limit * car.factor, car.advice))
         if car.commanded:
             self._release(car)
         if self._job.law.record_from == NEVER:
@@ -338,7 +366,7 @@ class Worker:
             and car.s >= law.record_start
             and past <= law.record_past
         ):
-            released = car.go or self._open[car.lane]
+            released = self._released(car)
             self._trace.append((self._tick, car.row, car.s, car.v, car.a, released))
 
     def _collide(self) -> None:
@@ -354,13 +382,28 @@ class Worker:
             (
                 car.id,
                 str(movements[car.path]),
-                self._position(car.path, vehicle.getDistance(car.name)),
+                self._locate(car),
                 vehicle.getSpeed(car.name),
             )
             for car in cars
         )
         time = round(self._tick * self._job.law.dt, 6)
         return Collision(time, *zip(first, second, strict=True))
+
+
+def _crossing(path: int, movements: tuple[Movement, ...]) -> frozenset[int]:
+    """The paths that share neither lane nor exit with this one."""
+    n = max(m.origin for m in movements) + 1
+
+    def exit_of(movement: Movement) -> int:
+        return (movement.origin + movement.manoeuvre) % n
+
+    mine = movements[path]
+    return frozenset(
+        q
+        for q, other in enumerate(movements)
+        if other.origin != mine.origin and exit_of(other) != exit_of(mine)
+    )
 
 
 def near(v: float, distance: float, law: Law) -> bool:
