@@ -352,7 +352,8 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
                         time = tick * job.law.dt
                         _send(child, answer(asked))
                     case Failed(reason):
-                        raise SumoError(f"SUMO failed{_when(version, time)}: {reason}")
+                        said = _last_words(complaints)
+                        raise SumoError(f"SUMO failed{_when(version, time)}: {reason}{said}")
                     case Ended() as ended:
                         child.wait()
                         return version, ended

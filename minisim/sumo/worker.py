@@ -264,9 +264,8 @@ class Worker:
             k += 1
         if s < law.entry and not self._released(car) and near(v, law.hold - s, law):
             acc = min(acc, kernel.hold(v, s, law))
-        # SUMO drops to a lower desired speed at once; the law brakes.
-        self._desire(car, max(v0, v + free * law.dt) if v > v0 else v0)
-        if acc < free or v > v0:
+        self._desire(car, max(v0, v))  # SUMO would drop to a lower one at once; the law brakes
+        if acc < free or v > v0 or v0 < LEAST_SPEED:
             speed = v + max(acc, -law.b_max) * law.dt
             self._libsumo.vehicle.setSpeed(car.name, max(speed, 0.0))
             car.commanded = True
