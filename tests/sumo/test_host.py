@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import os
@@ -42,7 +41,6 @@ from minisim.errors import (
     ControllerError,
     FileError,
     InputError,
-    MissingExtraError,
     SumoError,
 )
 from minisim.geometry import Intersection
@@ -384,31 +382,6 @@ def test_other_junctions_run(arms: int, side: str) -> None:
 
 
 # --- what can go wrong -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("package", ["libsumo", "sumo"])
-def test_without_the_extra_the_install_command_is_told(
-    monkeypatch: pytest.MonkeyPatch, package: str
-) -> None:
-    monkeypatch.setitem(sys.modules, package, None)
-    assert importlib.util.find_spec(package) is None
-    with pytest.raises(MissingExtraError, match=rf"{package}: pip install 'minisim\[sumo\]'"):
-        simulate(single(), Unregulated())
-
-
-def test_minisim_runs_without_the_extra() -> None:
-    code = (
-        "import sys\n"
-        "for name in ('libsumo', 'sumo', 'sumolib', 'traci'): sys.modules[name] = None\n"
-        "import minisim.sumo\n"
-        "from scenarios.cli import main\n"
-        "assert main(['run', 'four-way', '--horizon', '20']) == 0\n"
-        "sys.exit(main(['run', 'four-way', '--horizon', '20', '--host', 'sumo']))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "pip install 'minisim[sumo]'" in done.stderr
-    assert done.stderr.count("\n") == 1
 
 
 def test_what_netconvert_says_is_passed_on_and_its_files_kept(
