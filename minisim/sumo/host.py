@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,10 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
-from minisim.arrivals import Arrivals
-from minisim.control import Command, Controller, Site, View
+from minisim.control import Command, Controller, View
 from minisim.errors import (
     FileError,
     InputError,
@@ -30,7 +26,6 @@ from minisim.errors import (
     choice,
     instance,
 )
-from minisim.geometry import ARM_NAMES, Floats
 from minisim.simulation import (
     AFTERMATH,
     ON_COLLISION,
@@ -43,16 +38,22 @@ from minisim.simulation import (
     checked_window,
     collision_error,
 )
-from minisim.state import Records, build_law, build_road, build_vehicles, first_tick
-from minisim.sumo.network import NETWORK, build_network, sumo_environment, tag, write_xml
-from minisim.sumo.worker import Asked, Ended, Failed, Job, Started
-from minisim.trips import Trips
+from minisim.state import build_law, build_road, build_vehicles, first_tick
+from minisim.sumo.files import (
+    CONFIGURATION,
+    TRIPS,
+    read_trips,
+    write_configuration,
+    write_routes,
+)
+from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
+from minisim.sumo.network import build_network, sumo_environment
 
 #: SUMO's car-following models that a run may use.
 MODELS = ("IDM", "Krauss")
 
-ROUTES, CONFIGURATION, TRIPS = "minisim.rou.xml", "minisim.sumocfg", "tripinfo.xml"
-LOG, STDERR = "sumo.log", "stderr.txt"
+#: What the child writes on stderr.
+STDERR = "stderr.txt"
 
 INSTALL = "pip install 'minisim[sumo]'"
 
@@ -155,7 +156,7 @@ def _run(request: _Request) -> Run:
                 partial(request.replay, ended.collisions[0].time),
             )  # fmt: skip
         end = (job.horizon if ended.done else ended.tick) * job.law.dt
-        columns = _read_trips(folder / TRIPS, beginning.arrivals, job, ended, end)
+        columns = read_trips(folder, beginning.arrivals, job, ended, end)
     return Run(
         scenario=request.scenario,
         controller=request.controller,
@@ -213,6 +214,8 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
 def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) -> Job:
     """Write all of SUMO's files, and put together what its process needs."""
     site, arrivals, _, plan = beginning
+    if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
+        raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
     if request.model == "IDM" and site.vehicle.model != "idm":
         raise InputError(
             f"SUMO has no car-following model {site.vehicle.model!r}: give the vehicles the "
@@ -228,8 +231,8 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
     )
     vehicles = build_vehicles(site, arrivals)
     network = build_network(site.intersection, site.speed_limit, folder, home)
-    write_xml(folder / ROUTES, "routes", _routes(site, vehicles, request.model, depart_speed))
-    write_xml(folder / CONFIGURATION, "configuration", _options(site.dt, int(request.seed)))
+    write_routes(folder, site, vehicles, request.model, depart_speed)
+    write_configuration(folder, site.dt, int(request.seed))
     return Job(
         command=_command(request.gui),
         folder=str(folder),
@@ -244,64 +247,6 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         horizon=first_tick(min(request.scenario.horizon, request.until), site.dt),
         stop_on_collision=request.on_collision == "stop",
     )
-
-
-def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | None) -> Iterator[str]:
-    """The vehicle type, a route a movement, and the vehicles in order of demand."""
-    kind = site.vehicle
-    yield tag(
-        "vType",
-        {
-            "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
-            "minGap": kind.min_gap, "accel": kind.acceleration, "decel": kind.deceleration,
-            "emergencyDecel": kind.max_deceleration, "tau": kind.headway,
-            "maxSpeed": 2.0 * site.speed_limit,  # the fastest driver's
-            "speedFactor": 1, "speedDev": 0,
-            **({"delta": kind.exponent} if model == "IDM" else {"sigma": 0}),
-        },
-    )  # fmt: skip
-    for path in site.intersection.paths:
-        edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
-        yield tag("route", {"id": path.movement, "edges": edges})
-    movements = site.intersection.movements
-    for i in np.lexsort((vehicles["id"], vehicles["demand_tick"])).tolist():
-        yield tag(
-            "vehicle",
-            {
-                "id": vehicles["id"][i],
-                "type": "car",
-                "route": movements[vehicles["path"][i]],
-                "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": kind.length,
-                "departSpeed": "max" if depart_speed is None else depart_speed,
-                "speedFactor": f"{vehicles['factor'][i]:.9f}",
-            },
-        )
-
-
-def _options(dt: float, seed: int) -> Iterator[str]:
-    """SUMO's configuration; `sumo -c` shows the scenario without its controller."""
-    options = {
-        "net-file": NETWORK,
-        "route-files": ROUTES,
-        "tripinfo-output": TRIPS,
-        "tripinfo-output.write-unfinished": "true",
-        "tripinfo-output.write-undeparted": "true",
-        "precision": 6,
-        "log": LOG,
-        "begin": 0,
-        "step-length": dt,
-        "step-method.ballistic": "true",
-        "seed": seed % 2**31,
-        # Nobody is taken off the road, for waiting or for a collision; "none" would look for none.
-        "time-to-teleport": -1,
-        "collision.action": "warn",
-        "collision.check-junctions": "true",
-        "collision.mingap-factor": 0,
-        "no-step-log": "true",
-        "duration-log.disable": "true",
-    }
-    return (tag(name, {"value": value}) for name, value in options.items())
 
 
 def _command(gui: bool) -> tuple[str, ...]:
@@ -400,62 +345,3 @@ def _last_words(complaints: IO[bytes]) -> str:
     lines = complaints.read().decode(errors="replace").split("\n")
     words = "; ".join(line.strip() for line in lines[-8:] if line.strip())
     return f": {words}" if words else ""
-
-
-def _read_trips(file: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
-    """SUMO's trips of a run that has reached `end` [s], in demand order.
-
-    Only the time loss is ours (`_time_loss`). Since version 1.28 SUMO's own leaves out what a
-    vehicle loses while it accelerates for a higher limit, and it knows no markings.
-
-    Raises:
-        SumoError: there are no trips, or not those of the arrivals.
-    """
-    values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
-    try:
-        for trip in ET.parse(file).getroot().iter("tripinfo"):
-            values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
-    except (OSError, ET.ParseError, LookupError, ValueError) as error:
-        raise SumoError(f"SUMO's trips cannot be read: {error}") from error
-    if np.isnan(values).any():
-        missing = int(np.isnan(values).any(axis=1).argmax())
-        raise SumoError(f"SUMO's trips do not tell of vehicle {missing}")
-    depart, arrival, waiting = values.T
-    # SUMO inserts once more at the very end: a vehicle without a step is not on the road yet.
-    departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
-    arrived = departed & (arrival >= 0.0)
-    travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)
-    return Trips(
-        end=end,
-        demand_time=arrivals.time,
-        depart=np.where(departed, depart, np.nan),
-        arrival=np.where(arrived, arrival, np.nan),
-        lane=arrivals.lane.copy(),
-        manoeuvre=arrivals.manoeuvre.copy(),
-        exit_lane=(arrivals.lane + arrivals.manoeuvre) % job.lanes,
-        waiting_time=np.where(departed, waiting, 0.0),
-        travel_time=travel,
-        time_loss=np.where(departed, _time_loss(travel, job, ended), 0.0),
-        depart_delay=np.maximum(np.where(departed, depart, end) - arrivals.time, 0.0),
-        departed=departed,
-        arrived=arrived,
-    )
-
-
-_ATTRIBUTES = ("depart", "arrival", "waitingTime")
-
-
-def _time_loss(travel: Floats, job: Job, ended: Ended) -> Floats:
-    """Travel time less what the same way takes at its limits [s], in demand order.
-
-    The integral of 1 − v/v_allowed, as minisim sums it up step by step; an arrival is known to a
-    step.
-    """
-    loss = np.zeros(len(travel))
-    for row in job.vehicles:
-        i, p = int(row["id"]), int(row["path"])
-        start = np.maximum(job.road.section_start[p], job.law.length)
-        start = np.minimum(start, ended.positions.get(i, job.road.ends[p, 1]))
-        ideal = np.diff(start) / job.road.section_speed[p, :-1] / row["factor"]
-        loss[i] = max(travel[i] - math.fsum(ideal.tolist()), 0.0)
-    return loss

@@ -17,7 +17,7 @@ import os
 import pickle
 import sys
 from collections.abc import Iterator
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -31,12 +31,11 @@ from minisim.control import (
     Hold,
     Observed,
     Open,
-    Plan,
     Wake,
 )
 from minisim.geometry import Movement
-from minisim.state import NEVER, STOP_MARGIN, TRACE, Law, Records, Road, first_tick
-from minisim.sumo.network import Network
+from minisim.state import NEVER, STOP_MARGIN, TRACE, Law, Records, first_tick
+from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
 
 #: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
 #: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
@@ -45,76 +44,11 @@ from minisim.sumo.network import Network
 #: the junction (32) as long as somebody drives there who neither shares lane nor exit.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
+#: Lines of a recording that are kept as Python objects.
+TRACE_LINES = 100_000
+
 #: SUMO knows no desired speed of zero [m/s]; a vehicle told to stop is commanded to.
 LEAST_SPEED = 0.01
-
-
-class Job(NamedTuple):
-    """All that the process needs.
-
-    Attributes:
-        command: that starts SUMO.
-        folder: to start it in.
-        model: car-following model, "IDM" or "Krauss".
-        plan: of the session.
-        road, law: of the run, with its limits, marks and lines.
-        network: lengths in SUMO.
-        vehicles: as `minisim.state.build_vehicles` has them.
-        lanes: how many.
-        names: of the movements.
-        horizon: tick at which to stop.
-        stop_on_collision: whether the first collision ends the run.
-    """
-
-    command: tuple[str, ...]
-    folder: str
-    model: str
-    plan: Plan
-    road: Road
-    law: Law
-    network: Network
-    vehicles: Records
-    lanes: int
-    movements: tuple[Movement, ...]
-    horizon: int
-    stop_on_collision: bool
-
-
-class Started(NamedTuple):
-    """SUMO runs; `version` is its own."""
-
-    version: str
-
-
-class Asked(NamedTuple):
-    """A wake-up: what the session is to be shown. The answer is a list of commands."""
-
-    tick: int
-    vehicles: tuple[Observed, ...]
-
-
-class Ended(NamedTuple):
-    """The run is over.
-
-    Attributes:
-        tick: reached.
-        done: whether everybody has arrived.
-        collisions: each pair of vehicles once.
-        positions: `s` of the vehicles still on the road [m], by id.
-        trace: what was recorded.
-    """
-
-    tick: int
-    done: bool
-    collisions: tuple[Collision, ...]
-    positions: dict[int, float]
-    trace: Records
-
-
-class Failed(NamedTuple):
-    """SUMO refused, with its own words."""
-
-    reason: str
 
 
 class Car:
@@ -168,7 +102,8 @@ class Worker:
         self._lanes: list[list[Car]] = [[] for _ in range(job.lanes)]
         self._open = [job.plan.lanes_open] * job.lanes
         self._collisions: dict[tuple[int, int], Collision] = {}
-        self._trace: list[tuple[int, int, float, float, float, bool]] = []
+        self._lines: list[tuple[int, int, float, float, float, bool]] = []
+        self._traces: list[Records] = []
         self._arrived = 0
         self._wake_tick = NEVER
         self._period_tick = 0 if job.plan.period is not None else NEVER
@@ -196,7 +131,7 @@ class Worker:
                 int(name): self._locate(self._cars[int(name)])
                 for name in self._libsumo.vehicle.getIDList()
             },
-            trace=np.array(self._trace, TRACE),
+            trace=np.concatenate([*self._traces, np.array(self._lines, TRACE)]),
         )
 
     @property
@@ -366,7 +301,10 @@ class Worker:
             and past <= law.record_past
         ):
             released = self._released(car)
-            self._trace.append((self._tick, car.row, car.s, car.v, car.a, released))
+            self._lines.append((self._tick, car.row, car.s, car.v, car.a, released))
+            if len(self._lines) == TRACE_LINES:  # an array takes a quarter of the memory
+                self._traces.append(np.array(self._lines, TRACE))
+                self._lines.clear()
 
     def _collide(self) -> None:
         """Note each pair that SUMO finds touching, once."""
