@@ -170,6 +170,18 @@ def test_foes_where_netconvert_draws_the_lines(geometries: int) -> None:
     assert counts["junctions"] >= geometries
 
 
+def test_corridors_that_nearly_touch_are_our_conflict_alone() -> None:
+    """On narrow lanes a near turn passes the far turn that comes back at less than that."""
+    narrow = Intersection((0.0, 90.0, 180.0, 270.0), lane_width=2.8, junction_radius=5.8)
+    with tempfile.TemporaryDirectory() as name:
+        as_hosted(narrow, Path(name))
+        oracle = read_oracle(narrow, Path(name) / network.NETWORK)
+    found = list(classes(narrow, oracle))
+    near = {pair.split(" ")[0] for kind, pair in found if kind == NEAR}
+    assert near == {"a1–b3", "b1–c3", "c1–d3", "a3–d1"}
+    assert "unclassified" not in dict(found)
+
+
 def test_the_far_turns_of_the_paper_are_the_ones_that_the_radius_decides() -> None:
     """The paper's matrix lets a3 and c3, b3 and d3 go together; SUMO's default radius does not."""
     four = Intersection((0.0, 90.0, 180.0, 270.0))

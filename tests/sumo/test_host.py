@@ -519,6 +519,21 @@ def test_sumo_has_no_improved_idm() -> None:
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 
 
+def test_sumo_steps_in_whole_milliseconds() -> None:
+    with pytest.raises(InputError, match=r"SUMO counts in milliseconds; it cannot step 0\.0333"):
+        simulate(small_scenario(dt=0.0333), Unregulated())
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.25])
+def test_other_steps_drive_alike(dt: float) -> None:
+    """Above 0.37 s SUMO's IDM cuts a step into several."""
+    scenario = single(scenario=replace(FAIR_FOUR, profile=replace(FAIR, dt=dt)))
+    ours, theirs = both(scenario, Dim(), record="all")
+    position, speed = furthest_apart(ours, theirs)
+    assert position < 0.01
+    assert speed < 0.01
+
+
 def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot write to folder"):
