@@ -17,10 +17,10 @@ help:  ## show this list
 demo: $(VENV)/.installed  ## the tour: DIM beside a fixed-time signal, table, plot and animation
 	$(BIN)/minisim demo --out out
 
-test: $(VENV)/.installed-dev  ## the tests, without the slow ones
+test: $(VENV)/.installed-sumo  ## the tests, without the slow ones
 	$(TEST) -m "not slow"
 
-test-all: $(VENV)/.installed-dev  ## all tests, properties on more examples
+test-all: $(VENV)/.installed-sumo  ## all tests, properties on more examples
 	$(TEST) --hypothesis-profile thorough
 
 lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts

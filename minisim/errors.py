@@ -57,6 +57,10 @@ class MissingExtraError(MinisimError):
     """An optional dependency is needed and not installed."""
 
 
+class SumoError(MinisimError):
+    """SUMO, or a tool that comes with it, refused or died."""
+
+
 def number(
     name: str,
     value: object,

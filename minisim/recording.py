@@ -218,12 +218,13 @@ def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64])
 def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple[list[str], Floats]:
     """Each row's lane in SUMO's style and the position on it [m]."""
     paths = site.intersection.paths
-    names = np.array([_lane_names(p.movement, p.exit_arm) for p in paths])
+    names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
     starts = np.array([(0.0, p.entry, p.exit) for p in paths])
     section = (s[:, None] >= starts[movement, 1:]).sum(axis=1)
     return names[movement, section].tolist(), s - starts[movement, section]
 
 
-def _lane_names(movement: Movement, exit_arm: int) -> tuple[str, str, str]:
+def lane_names(movement: Movement, exit_arm: int) -> tuple[str, str, str]:
+    """Names of a movement's approach lane, its way through the junction and its exit lane."""
     approach, leave = ARM_NAMES[movement.origin], ARM_NAMES[exit_arm]
     return f"{approach}_in_0", f":C_{movement}_0", f"{leave}_out_0"

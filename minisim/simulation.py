@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -96,6 +96,69 @@ class ScenarioLike(Protocol):
         """The arrival table."""
 
 
+class Beginning(NamedTuple):
+    """A run that is about to begin, whoever hosts it: checked, and the session started."""
+
+    site: Site
+    arrivals: Arrivals
+    session: Session
+    plan: Plan
+
+
+def begin(scenario: ScenarioLike, controller: Controller, seed: int) -> Beginning:
+    """Check what is to be run, draw the arrivals and start the controller's session.
+
+    Raises:
+        InputError: no scenario, controller or seed, or a scenario that the controller cannot
+            serve.
+        ControllerError: the controller gave no session.
+    """
+    _check_scenario(scenario)
+    if not isinstance(controller, Controller) or isinstance(controller, type):
+        given = show(controller)
+        raise InputError(f"controller must be a Controller such as Dim(), got {given}")
+    site = scenario.site(integer("seed", seed, low=0))
+    arrivals = scenario.arrivals(seed)
+    arrivals.check(site.intersection.n)
+    session = controller.start(site)
+    return Beginning(site, arrivals, session, _plan_of(session, controller))
+
+
+def ask(
+    session: Session, view: View, tick: int, *, controller: Controller, site: Site, vehicles: int
+) -> list[Command]:
+    """Show a session its view at `tick` of a run of so many vehicles; returns its commands.
+
+    Raises:
+        ControllerError: it answered with something that cannot be carried out.
+    """
+    commands = list(session.decide(view))
+    try:
+        for command in commands:
+            _check_command(command, tick, site, vehicles)
+    except InputError as error:
+        raise ControllerError(
+            f"controller {controller.name!r} at {view.time:.1f} s: {error}"
+        ) from error
+    return commands
+
+
+def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
+    if isinstance(command, Go | Hold | Advise):
+        integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
+        if isinstance(command, Advise) and command.speed != math.inf:
+            number("advised speed [m/s]", command.speed, low=0)
+    elif isinstance(command, Open | Close):
+        integer("lane", command.lane, low=0, high=site.intersection.n - 1)
+    elif isinstance(command, Wake):
+        if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
+            raise InputError(
+                f"wake-up time {command.time:g} s is not after {round(tick * site.dt, 6):g} s"
+            )
+    else:
+        raise InputError(f"{show(command)} is not a command")
+
+
 class Simulation:
     """One run: vehicles on their paths, advanced under a controller.
 
@@ -121,31 +184,23 @@ class Simulation:
         record_window: tuple[float, float] = (0.0, math.inf),
         on_collision: str = "stop",
     ) -> None:
-        _check_scenario(scenario)
-        if not isinstance(controller, Controller) or isinstance(controller, type):
-            given = show(controller)
-            raise InputError(f"controller must be a Controller such as Dim(), got {given}")
+        self.site, arrivals, self._session, self.plan = begin(scenario, controller, seed)
         self.scenario = scenario
         self.controller = controller
-        self.seed = integer("seed", seed, low=0)
+        self.seed = int(seed)
         if record is not None:
             choice("record", record, RECORDS)
         self.record = record
         self._stop_on_collision = choice("on_collision", on_collision, ON_COLLISION) == "stop"
 
-        self.site = scenario.site(seed)
-        arrivals = scenario.arrivals(seed)
-        arrivals.check(self.site.intersection.n)
         self._demand_time = arrivals.time
-        self._session = controller.start(self.site)
-        self.plan = _plan_of(self._session, controller)
         self._road = build_road(self.site, self.plan)
         self._law = build_law(
             self.site,
             self.plan,
             depart_speed=scenario.depart_speed,
             record=record,
-            record_window=_window(record_window),
+            record_window=checked_window(record_window),
         )
         self._vehicles = build_vehicles(self.site, arrivals)
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
@@ -251,39 +306,23 @@ class Simulation:
             self._wake_tick = NEVER
         if self.plan.period is not None and self.tick >= self._period_tick:
             self._period_tick = self.tick + max(1, first_tick(self.plan.period, self.site.dt))
-        commands = list(self._session.decide(self.view()))
+        commands = ask(
+            self._session, self.view(), self.tick,
+            controller=self.controller, site=self.site, vehicles=len(self._vehicles),
+        )  # fmt: skip
         for command in commands:
             self._apply(command)
 
     def _apply(self, command: Command) -> None:
-        try:
-            if isinstance(command, Go | Hold):
-                self._vehicles["go"][self._row_of(command.vehicle)] = isinstance(command, Go)
-            elif isinstance(command, Open | Close):
-                lane = integer("lane", command.lane, low=0, high=len(self._lanes) - 1)
+        match command:
+            case Go(vehicle) | Hold(vehicle):
+                self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
+            case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
-            elif isinstance(command, Advise):
-                speed = command.speed
-                if speed != math.inf:
-                    speed = number("advised speed [m/s]", speed, low=0)
-                self._vehicles["advice"][self._row_of(command.vehicle)] = speed
-            elif isinstance(command, Wake):
-                tick = first_tick(number("wake-up time [s]", command.time), self.site.dt)
-                if tick <= self.tick:
-                    raise InputError(
-                        f"wake-up time {command.time:g} s is not after {self.time:g} s"
-                    )
-                self._wake_tick = tick
-            else:
-                raise InputError(f"{show(command)} is not a command")
-        except InputError as error:
-            raise ControllerError(
-                f"controller {self.controller.name!r} at {self.time:.1f} s: {error}"
-            ) from error
-
-    def _row_of(self, vehicle: int) -> int:
-        row: int = self._row[integer("vehicle", vehicle, low=0, high=len(self._row) - 1)]
-        return row
+            case Advise(vehicle, speed):
+                self._vehicles["advice"][self._row[vehicle]] = speed
+            case Wake(time):
+                self._wake_tick = first_tick(time, self.site.dt)
 
     def _check_collisions(self) -> None:
         """Ask pymunk which bodies touch; in a lane the gap tells."""
@@ -299,7 +338,9 @@ class Simulation:
                 self._collisions[collision.vehicles] = collision
                 new.append(collision)
         if new and self._stop_on_collision:
-            raise _collision_error(new, self)
+            raise collision_error(
+                new, self.scenario, self.controller, self.seed, partial(_replay, self)
+            )
 
     def _near_bodies(self) -> tuple[list[int], list[Body]]:
         """Rows and bodies of all vehicles in and near the junction."""
@@ -351,24 +392,31 @@ class Simulation:
         self._traced = 0
 
 
-def _collision_error(collisions: list[Collision], stopped: Simulation) -> CollisionError:
+def _replay(stopped: Simulation, seconds: float = 10.0) -> Run:
+    """Run again up to a little after the collision; records the last `seconds` before it."""
+    again = Simulation(
+        stopped.scenario,
+        stopped.controller,
+        seed=stopped.seed,
+        record="all",
+        record_window=(max(0.0, stopped.time - seconds), math.inf),
+        on_collision="record",
+    )
+    again.advance(stopped.time + AFTERMATH)
+    return again.result()
+
+
+def collision_error(
+    collisions: Sequence[Collision],
+    scenario: ScenarioLike,
+    controller: Controller,
+    seed: int,
+    replay: Callable[..., Run],
+) -> CollisionError:
     """What stopped a run, with a `replay` that records what led to it."""
-
-    def replay(seconds: float = 10.0) -> Run:
-        again = Simulation(
-            stopped.scenario,
-            stopped.controller,
-            seed=stopped.seed,
-            record="all",
-            record_window=(max(0.0, stopped.time - seconds), math.inf),
-            on_collision="record",
-        )
-        again.advance(stopped.time + AFTERMATH)
-        return again.result()
-
     what = "; ".join(str(collision) for collision in collisions)
-    where = f"scenario {stopped.scenario.name}, controller {stopped.controller.name}"
-    return CollisionError(f"{what} ({where}, seed {stopped.seed})", tuple(collisions), replay)
+    where = f"scenario {scenario.name}, controller {controller.name}"
+    return CollisionError(f"{what} ({where}, seed {seed})", tuple(collisions), replay)
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,6 +430,7 @@ class Run:
         columns: the trips as arrays.
         record: what was recorded of the trajectories.
         trace, rows: the recording, and each row's vehicle id and path.
+        host: what moved the vehicles, for the provenance: `host` and what else to name.
     """
 
     scenario: ScenarioLike
@@ -394,6 +443,7 @@ class Run:
     record: str | None
     trace: Records
     rows: Records
+    host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
 
     @cached_property
     def trips(self) -> pd.DataFrame:
@@ -409,6 +459,7 @@ class Run:
             "density": self.scenario.density,
             "seed": self.seed,
             "horizon_s": self.scenario.horizon,
+            "host": self.host["host"],
             **summarise(self.columns, self.site.intersection.n),
             "collisions": len(self.collisions),
         }
@@ -423,6 +474,7 @@ class Run:
             "scenario": repr(self.scenario),
             "controller": repr(self.controller),
             "seed": str(self.seed),
+            **self.host,
         }
 
     @cached_property
@@ -510,7 +562,8 @@ def _plan_of(session: object, controller: Controller) -> Plan:
     return plan
 
 
-def _window(window: Iterable[float]) -> tuple[float, float]:
+def checked_window(window: Iterable[float]) -> tuple[float, float]:
+    """Return a `record_window`, or raise `InputError`."""
     instance("record_window", window, tuple)
     if not isinstance(window, tuple) or len(window) != 2:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")

@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from minisim.errors import CollisionError, InputError, MinisimError, integer, number
+from minisim.errors import (
+    CollisionError,
+    InputError,
+    MinisimError,
+    choice,
+    integer,
+    number,
+)
 from minisim.version import __version__
 from scenarios.options import (
     Arrivals,
@@ -23,11 +30,15 @@ from scenarios.options import (
     Bearings,
     ControllerName,
     Density,
+    Gui,
+    Host,
+    KeepFiles,
     ProfileName,
     ScenarioName,
     Seed,
     Side,
     Split,
+    SumoModel,
     Turns,
     build_scenario,
 )
@@ -39,6 +50,7 @@ if TYPE_CHECKING:
     from minisim.simulation import Run
     from scenarios.scenario import Scenario
 
+HOSTS = ("minisim", "sumo")
 COMMANDS = ("demo", "run", "harmony", "decide", "animate")
 
 #: What typer raises for a wrong command line: the parent of its public `BadParameter`.
@@ -131,6 +143,7 @@ def demo(
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
+    "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
     "[bold]Exit codes[/bold]\n\n"
     "0 done; 1 a collision stopped the run, or stdout cannot be written; 2 bad input."
 )
@@ -172,6 +185,10 @@ def run(
             "(some 36 MB per 1000 s).",
         ),
     ] = True,
+    host: Host = "minisim",
+    sumo_model: SumoModel = None,
+    gui: Gui = False,
+    keep_files: KeepFiles = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
@@ -194,8 +211,18 @@ def run(
     )  # fmt: skip
     who = controller_named(controller, profile)
     everything = fcd is not None or trajectories is not None
-    record = "all" if everything else "junction" if safety else None
-    result = _simulate(what, who, seed, record=record, on_collision=on_collision)
+    options = {
+        "record": "all" if everything else "junction" if safety else None,
+        "on_collision": on_collision,
+    }
+    sumo = {"model": sumo_model, "gui": gui or None, "keep_files": keep_files}
+    asked = {name: value for name, value in sumo.items() if value is not None}
+    if choice("host", host, HOSTS) == "sumo":
+        result = _simulate_in_sumo(what, who, seed, **options, **asked)
+    elif asked:
+        raise InputError("--sumo-model, --gui and --keep-files need --host sumo")
+    else:
+        result = _simulate(what, who, seed, **options)
     summary = result.summary()
     with bar("measuring"):
         summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
@@ -440,6 +467,13 @@ def _simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) ->
             simulation.advance(scenario.horizon * part / parts)
             progress(part, parts)
     return simulation.run()
+
+
+def _simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
+    from minisim.sumo import simulate
+
+    with bar("simulating in SUMO") as progress:
+        return simulate(scenario, controller, seed, progress=progress, **options)
 
 
 def _near_junction(run: Run) -> pd.DataFrame:

@@ -86,6 +86,26 @@ Arrivals = Annotated[
         "drawing them.",
     ),
 ]  # fmt: skip
+Host = Annotated[
+    str,
+    typer.Option(
+        metavar="minisim|sumo",
+        help="Who moves the vehicles: minisim, or SUMO under the same controller "
+        "(pip install 'minisim\\[sumo]').",
+    ),
+]
+SumoModel = Annotated[
+    str | None,
+    typer.Option(
+        metavar="IDM|Krauss", help="SUMO's car-following model; IDM by default.",
+        show_default=False,
+    ),
+]  # fmt: skip
+Gui = Annotated[bool, typer.Option("--gui", help="Show the run in sumo-gui.")]
+KeepFiles = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Keep SUMO's network, routes, log and trips there."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 

@@ -28,6 +28,7 @@ def run_title(summary: Mapping[str, Any]) -> Text:
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
         f": {summary['density']:g} veh/h/lane, profile {summary['profile']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s",
+        "" if summary["host"] == "minisim" else f", host {summary['host']}",
     )
 
 

@@ -1,0 +1,14 @@
+"""SUMO as a second host of the same controllers (extra `sumo`).
+
+    from minisim.sumo import simulate
+
+    run = simulate(four_way(density=350), Dim(), seed=1)  # the same Run as minisim.simulate's
+
+This package is the only one that knows SUMO.
+"""
+
+from __future__ import annotations
+
+from minisim.sumo.host import MODELS, simulate
+
+__all__ = ["MODELS", "simulate"]

@@ -1,0 +1,149 @@
+"""SUMO's files: the vehicles and options that it reads, the trips that it writes."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from minisim.arrivals import Arrivals
+from minisim.control import Site
+from minisim.errors import SumoError
+from minisim.geometry import ARM_NAMES, Floats
+from minisim.state import Records
+from minisim.sumo.messages import Ended, Job
+from minisim.sumo.network import NETWORK, tag, write_xml
+from minisim.trips import Trips
+
+ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
+TRIPS, LOG = "tripinfo.xml", "sumo.log"
+
+
+def write_routes(
+    folder: Path, site: Site, vehicles: Records, model: str, depart_speed: float | None
+) -> None:
+    """Write the vehicle type, a route a movement, and the vehicles in order of demand."""
+    write_xml(folder / ROUTES, "routes", _routes(site, vehicles, model, depart_speed))
+
+
+def write_configuration(folder: Path, dt: float, seed: int) -> None:
+    """Write SUMO's options; `sumo -c` shows the scenario without its controller."""
+    write_xml(folder / CONFIGURATION, "configuration", _options(dt, seed))
+
+
+def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | None) -> Iterator[str]:
+    kind = site.vehicle
+    yield tag(
+        "vType",
+        {
+            "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
+            "minGap": kind.min_gap, "accel": kind.acceleration, "decel": kind.deceleration,
+            "emergencyDecel": kind.max_deceleration, "tau": kind.headway,
+            "maxSpeed": 2.0 * site.speed_limit,  # the fastest driver's
+            "speedFactor": 1, "speedDev": 0,
+            **({"delta": kind.exponent} if model == "IDM" else {"sigma": 0}),
+        },
+    )  # fmt: skip
+    for path in site.intersection.paths:
+        edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
+        yield tag("route", {"id": path.movement, "edges": edges})
+    movements = site.intersection.movements
+    for i in np.lexsort((vehicles["id"], vehicles["demand_tick"])).tolist():
+        yield tag(
+            "vehicle",
+            {
+                "id": vehicles["id"][i],
+                "type": "car",
+                "route": movements[vehicles["path"][i]],
+                "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
+                "departPos": kind.length,
+                "departSpeed": "max" if depart_speed is None else depart_speed,
+                "speedFactor": f"{vehicles['factor'][i]:.9f}",
+            },
+        )
+
+
+def _options(dt: float, seed: int) -> Iterator[str]:
+    options = {
+        "net-file": NETWORK,
+        "route-files": ROUTES,
+        "tripinfo-output": TRIPS,
+        "tripinfo-output.write-unfinished": "true",
+        "tripinfo-output.write-undeparted": "true",
+        "precision": 6,
+        "log": LOG,
+        "begin": 0,
+        "step-length": dt,
+        "step-method.ballistic": "true",
+        "seed": seed % 2**31,
+        # Nobody is taken off the road, for waiting or for a collision; "none" would look for none.
+        "time-to-teleport": -1,
+        "collision.action": "warn",
+        "collision.check-junctions": "true",
+        "collision.mingap-factor": 0,
+        "no-step-log": "true",
+        "duration-log.disable": "true",
+    }
+    return (tag(name, {"value": value}) for name, value in options.items())
+
+
+def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
+    """SUMO's trips of a run that has reached `end` [s], in demand order.
+
+    Only the time loss is ours (`_time_loss`). Since version 1.28 SUMO's own leaves out what a
+    vehicle loses while it accelerates for a higher limit, and it knows no markings.
+
+    Raises:
+        SumoError: there are no trips, or not those of the arrivals.
+    """
+    values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
+    try:
+        for trip in ET.parse(folder / TRIPS).getroot().iter("tripinfo"):
+            values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
+    except (OSError, ET.ParseError, LookupError, ValueError) as error:
+        raise SumoError(f"SUMO's trips cannot be read: {error}") from error
+    if np.isnan(values).any():
+        missing = int(np.isnan(values).any(axis=1).argmax())
+        raise SumoError(f"SUMO's trips do not tell of vehicle {missing}")
+    depart, arrival, waiting = values.T
+    # SUMO inserts once more at the very end: a vehicle without a step is not on the road yet.
+    departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
+    arrived = departed & (arrival >= 0.0)
+    travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)
+    return Trips(
+        end=end,
+        demand_time=arrivals.time,
+        depart=np.where(departed, depart, np.nan),
+        arrival=np.where(arrived, arrival, np.nan),
+        lane=arrivals.lane.copy(),
+        manoeuvre=arrivals.manoeuvre.copy(),
+        exit_lane=(arrivals.lane + arrivals.manoeuvre) % job.lanes,
+        waiting_time=np.where(departed, waiting, 0.0),
+        travel_time=travel,
+        time_loss=np.where(departed, _time_loss(travel, job, ended), 0.0),
+        depart_delay=np.maximum(np.where(departed, depart, end) - arrivals.time, 0.0),
+        departed=departed,
+        arrived=arrived,
+    )
+
+
+_ATTRIBUTES = ("depart", "arrival", "waitingTime")
+
+
+def _time_loss(travel: Floats, job: Job, ended: Ended) -> Floats:
+    """Travel time less what the same way takes at its limits [s], in demand order.
+
+    The integral of 1 − v/v_allowed, as minisim sums it up step by step; an arrival is known to a
+    step.
+    """
+    loss = np.zeros(len(travel))
+    for row in job.vehicles:
+        i, p = int(row["id"]), int(row["path"])
+        start = np.maximum(job.road.section_start[p], job.law.length)
+        start = np.minimum(start, ended.positions.get(i, job.road.ends[p, 1]))
+        ideal = np.diff(start) / job.road.section_speed[p, :-1] / row["factor"]
+        loss[i] = max(travel[i] - math.fsum(ideal.tolist()), 0.0)
+    return loss

@@ -1,0 +1,347 @@
+"""`simulate` in SUMO: builds what it needs, hosts the session, and reads the trips back."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import IO, Any
+
+from minisim.control import Command, Controller, View
+from minisim.errors import (
+    FileError,
+    InputError,
+    MissingExtraError,
+    SumoError,
+    choice,
+    instance,
+)
+from minisim.simulation import (
+    AFTERMATH,
+    ON_COLLISION,
+    RECORDS,
+    Beginning,
+    Run,
+    ScenarioLike,
+    ask,
+    begin,
+    checked_window,
+    collision_error,
+)
+from minisim.state import build_law, build_road, build_vehicles, first_tick
+from minisim.sumo.files import (
+    CONFIGURATION,
+    TRIPS,
+    read_trips,
+    write_configuration,
+    write_routes,
+)
+from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
+from minisim.sumo.network import build_network, sumo_environment
+
+#: SUMO's car-following models that a run may use.
+MODELS = ("IDM", "Krauss")
+
+#: What the child writes on stderr.
+STDERR = "stderr.txt"
+
+INSTALL = "pip install 'minisim[sumo]'"
+
+#: What the child runs. Its messages have to come from the module, not from `__main__`.
+CHILD = "from minisim.sumo.worker import main; main()"
+
+#: Called with the steps done and all steps.
+Progress = Callable[[int, int], None]
+
+
+def simulate(
+    scenario: ScenarioLike,
+    controller: Controller,
+    seed: int = 0,
+    *,
+    model: str = "IDM",
+    record: str | None = None,
+    record_window: tuple[float, float] = (0.0, math.inf),
+    on_collision: str = "stop",
+    keep_files: str | os.PathLike[str] | None = None,
+    gui: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a scenario under a controller in SUMO, as `minisim.simulate` does in minisim.
+
+    The same arrivals, vehicles, geometry, limits and commands; SUMO follows leaders, integrates,
+    inserts, measures the trips and finds collisions. libsumo runs in a process of its own.
+
+    Args:
+        scenario: what to simulate.
+        controller: who decides; its session runs here, in the caller's process.
+        seed: of the arrivals and of SUMO.
+        model: SUMO's car-following model, "IDM" or "Krauss" (without its random part).
+        record: None, "junction" or "all": keep trajectories. Their x and y are positions on
+            minisim's paths, which SUMO's network repeats.
+        record_window: from and to [s].
+        on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
+        keep_files: folder for the network, the routes, the configuration, SUMO's log and its
+            trips; by default they are temporary.
+        gui: show it in sumo-gui.
+        progress: called at every wake-up, with the steps done and the steps up to the horizon.
+
+    Raises:
+        MissingExtraError: SUMO is not installed.
+        InputError: a value that is not allowed, or a scenario that the controller cannot serve.
+        SumoError: SUMO refused or died; the message tells why as far as it is known.
+        CollisionError: two bodies touched, unless collisions are only recorded.
+        ControllerError: the controller broke its contract.
+    """
+    return _run(
+        _Request(
+            scenario=scenario, controller=controller, seed=seed, model=model, record=record,
+            record_window=record_window, on_collision=on_collision, keep_files=keep_files,
+            gui=gui, progress=progress,
+        )
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Request:
+    """The arguments of `simulate`; a replay of a collision ends at `until` [s]."""
+
+    scenario: ScenarioLike
+    controller: Controller
+    seed: int
+    model: str
+    record: str | None
+    record_window: tuple[float, float]
+    on_collision: str
+    keep_files: str | os.PathLike[str] | None
+    gui: bool
+    progress: Progress | None
+    until: float = math.inf
+
+    def replay(self, time: float, seconds: float = 10.0) -> Run:
+        """Run again up to a little after `time`; records the last `seconds` before it."""
+        again = replace(
+            self, record="all", record_window=(max(0.0, time - seconds), math.inf),
+            on_collision="record", keep_files=None, gui=False, progress=None,
+            until=time + AFTERMATH,
+        )  # fmt: skip
+        return _run(again)
+
+
+def _run(request: _Request) -> Run:
+    home = sumo_home()
+    choice("SUMO model", request.model, MODELS)
+    if request.record is not None:
+        choice("record", request.record, RECORDS)
+    choice("on_collision", request.on_collision, ON_COLLISION)
+    if request.gui:
+        _check_display()
+    beginning = begin(request.scenario, request.controller, request.seed)
+    with _folder(request.keep_files) as folder:
+        job = _prepare(request, beginning, folder, home)
+        version, ended = _host(job, home, _session(request, beginning, job))
+        if ended.collisions and job.stop_on_collision:
+            raise collision_error(
+                ended.collisions, request.scenario, request.controller, int(request.seed),
+                partial(request.replay, ended.collisions[0].time),
+            )  # fmt: skip
+        end = (job.horizon if ended.done else ended.tick) * job.law.dt
+        columns = read_trips(folder, beginning.arrivals, job, ended, end)
+    return Run(
+        scenario=request.scenario,
+        controller=request.controller,
+        seed=int(request.seed),
+        site=beginning.site,
+        plan=beginning.plan,
+        collisions=ended.collisions,
+        columns=columns,
+        record=request.record,
+        trace=ended.trace,
+        rows=job.vehicles[["id", "path"]].copy(),
+        host={"host": "sumo", "sumo": version, "sumo_model": request.model},
+    )
+
+
+def sumo_home() -> Path:
+    """SUMO's folder.
+
+    Raises:
+        MissingExtraError: SUMO is not installed, with the command that installs it.
+    """
+    for package in ("sumo", "libsumo"):
+        if importlib.util.find_spec(package) is None:
+            raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
+    import sumo
+
+    return Path(sumo.SUMO_HOME)
+
+
+def _check_display() -> None:
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise SumoError("sumo-gui needs a display, and there is none here; run without the GUI")
+
+
+@contextmanager
+def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
+    """Where SUMO's files go: a folder to keep, made where it is missing, or one that vanishes."""
+    if keep is None:
+        with tempfile.TemporaryDirectory(prefix="minisim-sumo-") as name:
+            yield Path(name)
+        return
+    instance("keep_files", keep, (str, os.PathLike))
+    folder = Path(keep).absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / TRIPS).unlink(missing_ok=True)  # of an earlier run
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"cannot write to folder {keep}: {reason}") from error
+    yield folder
+
+
+def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) -> Job:
+    """Write all of SUMO's files, and put together what its process needs."""
+    site, arrivals, _, plan = beginning
+    if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
+        raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
+    if request.model == "IDM" and site.vehicle.model != "idm":
+        raise InputError(
+            f"SUMO has no car-following model {site.vehicle.model!r}: give the vehicles the "
+            "model 'idm', or choose SUMO's Krauss"
+        )
+    depart_speed = request.scenario.depart_speed
+    law = build_law(
+        site,
+        plan,
+        depart_speed=depart_speed,
+        record=request.record,
+        record_window=checked_window(request.record_window),
+    )
+    vehicles = build_vehicles(site, arrivals)
+    network = build_network(site.intersection, site.speed_limit, folder, home)
+    write_routes(folder, site, vehicles, request.model, depart_speed)
+    write_configuration(folder, site.dt, int(request.seed))
+    return Job(
+        command=_command(request.gui),
+        folder=str(folder),
+        model=request.model,
+        plan=plan,
+        road=build_road(site, plan),
+        law=law,
+        network=network,
+        vehicles=vehicles,
+        lanes=site.intersection.n,
+        movements=site.intersection.movements,
+        horizon=first_tick(min(request.scenario.horizon, request.until), site.dt),
+        stop_on_collision=request.on_collision == "stop",
+    )
+
+
+def _command(gui: bool) -> tuple[str, ...]:
+    if gui:
+        return ("sumo-gui", "-c", CONFIGURATION, "--start", "true", "--quit-on-end", "true")
+    return ("sumo", "-c", CONFIGURATION)
+
+
+def _session(request: _Request, beginning: Beginning, job: Job) -> Callable[[Asked], list[Command]]:
+    """What answers the worker: the controller's session."""
+    dt = beginning.site.dt
+
+    def answer(asked: Asked) -> list[Command]:
+        if request.progress is not None:
+            request.progress(asked.tick, job.horizon)
+        view = View(round(asked.tick * dt, 6), asked.vehicles)
+        return ask(
+            beginning.session, view, asked.tick,
+            controller=request.controller, site=beginning.site, vehicles=len(job.vehicles),
+        )  # fmt: skip
+
+    return answer
+
+
+def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tuple[str, Ended]:
+    """Run the job in a process of its own; returns SUMO's version and the result.
+
+    Raises:
+        SumoError: the process refused or died. The caller stays as it was.
+    """
+    environment = sumo_environment(home) | {
+        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+        "MINISIM_JIT": "0",  # compiled functions are slow to call one vehicle at a time
+    }
+    version, time = "", 0.0
+    with (Path(job.folder) / STDERR).open("w+b") as complaints:
+        child = subprocess.Popen(
+            [sys.executable, "-P", "-c", CHILD], env=environment,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints,
+        )  # fmt: skip
+        try:
+            _send(child, job)
+            while True:
+                match _receive(child):
+                    case Started(version):
+                        pass
+                    case Asked(tick) as asked:
+                        time = tick * job.law.dt
+                        _send(child, answer(asked))
+                    case Failed(reason):
+                        said = _last_words(complaints)
+                        raise SumoError(f"SUMO failed{_when(version, time)}: {reason}{said}")
+                    case Ended() as ended:
+                        child.wait()
+                        return version, ended
+        except (EOFError, BrokenPipeError, pickle.UnpicklingError):
+            code = child.wait()
+            said = _last_words(complaints)
+            raise SumoError(
+                f"SUMO's process died{_when(version, time)} ({_cause(code)}){said}"
+            ) from None
+        finally:
+            child.kill()
+            child.communicate()
+
+
+def _send(child: subprocess.Popen[bytes], message: object) -> None:
+    if child.stdin is None:
+        raise EOFError
+    pickle.dump(message, child.stdin)
+    child.stdin.flush()
+
+
+def _receive(child: subprocess.Popen[bytes]) -> Any:
+    if child.stdout is None:
+        raise EOFError
+    return pickle.load(child.stdout)
+
+
+def _when(version: str, time: float) -> str:
+    return f" after {time:.1f} s of simulated time" if version else " before the first step"
+
+
+def _cause(code: int) -> str:
+    if code < 0:
+        try:
+            return signal.Signals(-code).name
+        except ValueError:
+            return f"signal {-code}"
+    return f"exit code {code}"
+
+
+def _last_words(complaints: IO[bytes]) -> str:
+    """The end of what it wrote, in one line."""
+    complaints.seek(0)
+    lines = complaints.read().decode(errors="replace").split("\n")
+    words = "; ".join(line.strip() for line in lines[-8:] if line.strip())
+    return f": {words}" if words else ""

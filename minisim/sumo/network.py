@@ -1,0 +1,175 @@
+"""The junction as a SUMO network, built by netconvert, with our geometry to the millimetre.
+
+netconvert would cut the roads and bend the turns by its own rules. Given the shape of the
+junction and of every turn, it takes ours: entries, exits and arcs lie where minisim has them. What
+is left is read back (`Network`), so a position in SUMO is exact in `s` whatever netconvert did.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from minisim.errors import FileError, SumoError
+from minisim.geometry import ARM_NAMES, Intersection
+from minisim.recording import lane_names
+
+NODES, EDGES, CONNECTIONS = "minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"
+NETWORK = "minisim.net.xml"
+
+#: Decimals of what is written and read [m].
+DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Network:
+    """The lengths that SUMO's lanes got, in the order of `Intersection.movements` [m].
+
+    Attributes:
+        approach: of each movement's approach lane.
+        inside: of its way through the junction.
+    """
+
+    approach: tuple[float, ...]
+    inside: tuple[float, ...]
+
+
+def build_network(
+    intersection: Intersection, speed_limit: float, folder: Path, home: Path
+) -> Network:
+    """Write the network into `folder`.
+
+    Nobody has to give way on it: a hosted controller is the only rule (`pass`, and no place to
+    wait inside the junction). Turns have the road's speed limit, since the host slows vehicles
+    for them.
+
+    Args:
+        intersection: its geometry.
+        speed_limit: of the roads [m/s].
+        folder: where to write.
+        home: SUMO's folder, with `bin/netconvert`.
+
+    Raises:
+        SumoError: netconvert refuses, with its own words.
+    """
+    write_xml(folder / NODES, "nodes", _nodes(intersection))
+    write_xml(folder / EDGES, "edges", _edges(intersection, speed_limit))
+    write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
+    command = [str(home / "bin" / "netconvert")]
+    command += ["--node-files", NODES, "--edge-files", EDGES, "--connection-files", CONNECTIONS]
+    command += ["--output-file", NETWORK, "--no-turnarounds", "true"]
+    command += ["--lefthand", str(intersection.side == "left").lower()]
+    command += ["--offset.disable-normalization", "true", "--precision", str(DIGITS)]
+    command += ["--junctions.limit-turn-speed", "-1"]
+    run_tool(command, folder, home)
+    return read_network(intersection, folder / NETWORK)
+
+
+def run_tool(command: list[str], folder: Path, home: Path) -> None:
+    """Run one of SUMO's programs in `folder`; raises `SumoError` with what it says."""
+    name = Path(command[0]).name
+    try:
+        done = subprocess.run(
+            command, cwd=folder, env=sumo_environment(home), check=False,
+            capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except OSError as error:
+        raise SumoError(f"cannot start {name}: {error.strerror or error}") from error
+    if done.returncode:
+        said = done.stderr.strip() or done.stdout.strip() or "it said nothing"
+        raise SumoError(f"{name} failed (exit code {done.returncode}): {said}")
+
+
+def sumo_environment(home: Path) -> dict[str, str]:
+    """The environment of SUMO's processes; only they get to see its folder."""
+    return {**os.environ, "SUMO_HOME": str(home)}
+
+
+def read_network(intersection: Intersection, file: Path) -> Network:
+    """Read the lengths of a network; raises `SumoError` where it is not that of `intersection`."""
+    root = ET.parse(file).getroot()
+    length = {lane.get("id"): float(lane.get("length", "nan")) for lane in root.iter("lane")}
+    onward = {(c.get("from"), c.get("to")): c.get("via") for c in root.iter("connection")}
+    approach, inside = [], []
+    for path in intersection.paths:
+        first, _, last = lane_names(path.movement, path.exit_arm)
+        via = onward.get((first[:-2], last[:-2]))
+        if first not in length or via is None:
+            raise SumoError(f"netconvert made no way for movement {path.movement}")
+        way = 0.0
+        while via is not None:  # an internal junction would cut the way in two
+            way += length[via]
+            via = onward.get((via.rpartition("_")[0], last[:-2]))
+        approach.append(length[first])
+        inside.append(way)
+    return Network(tuple(approach), tuple(inside))
+
+
+def write_xml(file: Path, root: str, lines: Iterable[str]) -> None:
+    """Write lines of XML between the tags of `root`; raises `FileError`."""
+    text = "\n".join([f"<{root}>", *(f"    {line}" for line in lines), f"</{root}>", ""])
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot write {file}: {error.strerror or error}") from error
+
+
+def tag(name: str, attributes: Mapping[str, object]) -> str:
+    """One element; the values are ours and need no escaping."""
+    return " ".join([f"<{name}", *(f'{key}="{value}"' for key, value in attributes.items())]) + "/>"
+
+
+def _nodes(intersection: Intersection) -> Iterable[str]:
+    yield tag(
+        "node", {"id": "C", "x": 0, "y": 0, "type": "priority", "shape": _outline(intersection)}
+    )
+    for arm in intersection.arms:
+        x, y = (intersection.arm_length * u for u in arm.outward)
+        yield tag("node", {"id": arm.name, "x": f"{x:.9f}", "y": f"{y:.9f}", "type": "dead_end"})
+
+
+def _edges(intersection: Intersection, speed_limit: float) -> Iterable[str]:
+    for arm in intersection.arms:
+        for name, origin, target in (("in", arm.name, "C"), ("out", "C", arm.name)):
+            yield tag(
+                "edge",
+                {
+                    "id": f"{arm.name}_{name}", "from": origin, "to": target, "numLanes": 1,
+                    "speed": repr(speed_limit), "width": repr(intersection.lane_width),
+                },
+            )  # fmt: skip
+
+
+def _connections(intersection: Intersection) -> Iterable[str]:
+    for path in intersection.paths:
+        yield tag(
+            "connection",
+            {
+                "from": f"{ARM_NAMES[path.movement.origin]}_in",
+                "to": f"{ARM_NAMES[path.exit_arm]}_out",
+                "fromLane": 0, "toLane": 0, "pass": "true", "keepClear": "false",
+                "contPos": 0,  # no internal junction
+                "shape": _points(path.points),
+            },
+        )  # fmt: skip
+
+
+def _outline(intersection: Intersection) -> str:
+    """The junction's border: a straight edge across each arm where its lanes begin and end."""
+    corners = []
+    for arm in intersection.arms:
+        outward = np.array(arm.outward)
+        right = np.array([outward[1], -outward[0]]) * intersection.lane_width
+        middle = outward * intersection.junction_radius
+        corners += [middle - right, middle + right]
+    return _points(corners)
+
+
+def _points(points: Iterable[Iterable[float]]) -> str:
+    return " ".join(",".join(f"{x:.{DIGITS}f}" for x in point) for point in points)

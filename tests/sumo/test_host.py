@@ -1,0 +1,595 @@
+"""SUMO as a host: the same controllers, commands and errors as in minisim."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+import minisim
+from baselines import FixedTime
+from dim import Dim
+from minisim.control import (
+    Advise,
+    Command,
+    Controller,
+    Go,
+    Hold,
+    Open,
+    Plan,
+    Session,
+    Site,
+    Unregulated,
+    View,
+    Wake,
+)
+from minisim.errors import (
+    CollisionError,
+    ControllerError,
+    FileError,
+    InputError,
+    SumoError,
+)
+from minisim.geometry import Intersection
+from minisim.simulation import Run
+from minisim.sumo import host, network, simulate
+from minisim.testing import check_controller, small_scenario
+from minisim.vehicle import VehicleType
+from scenarios import four_way
+from scenarios.cli import main
+from scenarios.scenario import FAIR, Scenario
+from tests.runs import Fixed, replayed
+from tests.strategies import intersections, share
+
+FAIR_FOUR = four_way(100, profile="fair")
+
+
+def single(manoeuvre: int = 2, horizon: float = 120.0, scenario: Scenario = FAIR_FOUR) -> Scenario:
+    """One vehicle on lane a."""
+    return replayed(scenario, (0.0, 0, manoeuvre), horizon=horizon)
+
+
+def states(run: Run, vehicle: int) -> dict[int, tuple[float, float]]:
+    """Position [m] and speed [m/s] of a vehicle at each tick."""
+    lines = run.trace[run.rows["id"][run.trace["row"]] == vehicle].tolist()
+    return {tick: (s, v) for tick, _, s, v, *_ in lines}
+
+
+def furthest_apart(first: Run, second: Run, vehicle: int = 0) -> tuple[float, float]:
+    """Largest difference of a vehicle's position [m] and speed [m/s] over common ticks."""
+    a, b = states(first, vehicle), states(second, vehicle)
+    common = sorted(a.keys() & b.keys())
+    assert len(common) >= 0.95 * len(a)
+    difference = np.abs([np.subtract(a[tick], b[tick]) for tick in common])
+    return tuple(difference.max(axis=0).tolist())
+
+
+def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Run]:
+    """The same run under minisim and under SUMO."""
+    return (
+        minisim.simulate(scenario, controller, **options),
+        simulate(scenario, controller, **options),
+    )
+
+
+# --- the contract -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
+)
+def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None:
+    check_controller(controller, arms=(4,), horizon=60.0, host="sumo")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
+)
+def test_controllers_keep_their_contract_on_other_junctions(controller: Controller) -> None:
+    check_controller(controller, arms=(3, 5), horizon=120.0, host=simulate)
+
+
+# --- the same physics where nobody is in the way ---------------------------------------------
+
+
+@pytest.mark.parametrize("controller", [Unregulated(), Dim()], ids=lambda c: c.name)
+@pytest.mark.parametrize("manoeuvre", [1, 2, 3])
+def test_a_vehicle_alone_drives_alike(controller: Controller, manoeuvre: int) -> None:
+    """Markings, turns and free acceleration: one law in both hosts, to 2 mm.
+
+    SUMO's way through the junction is the polyline, minisim's the arc: 1.4 mm at the exit.
+    """
+    ours, theirs = both(single(manoeuvre), controller, record="all")
+    position, speed = furthest_apart(ours, theirs)
+    assert position < 0.002
+    assert speed < 0.001
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time)
+    assert theirs.columns.time_loss == pytest.approx(ours.columns.time_loss, abs=0.1)
+
+
+@pytest.mark.parametrize("hold_distance", [0.0, 2.0, 40.0])
+def test_a_held_vehicle_stops_at_its_line(hold_distance: float) -> None:
+    ours, theirs = both(single(), Fixed(Plan(hold_distance=hold_distance)), record="all")
+    position, speed = furthest_apart(ours, theirs)
+    assert position < 0.03  # SUMO ends a step at standstill, minisim stops within it
+    assert speed < 0.2
+    (s, v) = states(theirs, 0)[1200]
+    line = theirs.site.intersection.approach_length - hold_distance
+    assert v == 0.0
+    assert 0.0 <= line - s <= 0.3
+    assert theirs.columns.waiting_time == pytest.approx(ours.columns.waiting_time, abs=0.3)
+    assert not theirs.columns.arrived.any()
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Commands at set times, on a period of a second."""
+
+    script: dict[float, tuple[Command, ...]] = field(default_factory=dict, hash=False)
+    plan: Plan = field(default_factory=lambda: Plan(period=1.0, sight=400.0))
+    seen: list[View] = field(default_factory=list, compare=False, hash=False, repr=False)
+    name: str = "timed"
+
+    def start(self, site: Site) -> Session:
+        return _TimedSession(self)
+
+
+class _TimedSession:
+    def __init__(self, timed: Timed) -> None:
+        self.plan, self._timed = timed.plan, timed
+
+    def decide(self, view: View) -> Iterable[Command]:
+        self._timed.seen.append(view)
+        return self._timed.script.get(view.time, ())
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        {0.0: (Go(0),)},
+        {0.0: (Go(0),), 10.0: (Advise(0, 6.0),), 20.0: (Advise(0, math.inf),)},
+        {0.0: (Go(0),), 10.0: (Advise(0, 0.0),), 30.0: (Advise(0, 9.0),)},
+        {0.0: (Go(0),), 34.0: (Hold(0),), 60.0: (Open(0),)},
+        {50.0: (Open(0),)},
+    ],
+    ids=["go", "advise", "advise standstill", "revoke, hard braking", "open"],
+)
+def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
+    ours, theirs = both(single(), Timed(script), record="all")
+    position, _ = furthest_apart(ours, theirs)
+    assert position < 0.1
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.2)
+
+
+def test_a_revoked_vehicle_brakes_harder_than_comfortably_to_stay_out() -> None:
+    """At 34.0 s it is 11.8 m before the junction with 14 m/s: 8.5 m/s² are needed."""
+    run = simulate(single(), Timed({0.0: (Go(0),), 34.0: (Hold(0),)}), record="all")
+    trace = run.trace
+    assert -9.0 - 1e-6 <= trace["a"].min() < -8.0
+    assert trace["v"][-1] == 0.0
+    assert trace["s"][-1] <= run.site.intersection.approach_length
+
+
+def test_sessions_see_the_same() -> None:
+    """Marks, clearing, order, ids and numbers of the views; SUMO rounds nothing."""
+    plan = Plan(
+        marks=(100.0, 30.0, 0.0), wake_on_clear=True, sight=120.0, lanes_open=True, period=7.3
+    )
+    scenario = replayed(
+        FAIR_FOUR, (0.0, 0, 2), (2.0, 1, 2), (4.0, 2, 2), (6.0, 3, 2), (18.0, 3, 1), horizon=120.0
+    )
+    views = []
+    for run in (minisim.simulate, simulate):
+        timed = Timed(plan=plan)
+        run(scenario, timed)
+        views.append(timed.seen)
+    ours, theirs = views
+    assert [view.time for view in theirs] == [view.time for view in ours]
+    assert any(len(view.vehicles) > 2 for view in ours)
+    for mine, its in zip(ours, theirs, strict=True):
+        assert [v[:3] for v in its.vehicles] == [v[:3] for v in mine.vehicles]
+        for a, b in zip(mine.vehicles, its.vehicles, strict=True):
+            assert b.distance == pytest.approx(a.distance, abs=0.01)
+            assert b.speed == pytest.approx(a.speed, abs=0.01)
+
+
+def test_wake_rings_once() -> None:
+    timed = Timed({0.0: (Wake(3.14),)}, plan=Plan(lanes_open=True))
+    simulate(single(horizon=20.0), timed)
+    assert [view.time for view in timed.seen] == [0.0, 3.2]
+
+
+# --- trips, collisions, records --------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def busy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run, Path]:
+    """A queue that reaches back to the road entries, with unfinished and undeparted vehicles."""
+    folder = tmp_path_factory.mktemp("kept")
+    scenario = small_scenario(
+        4, density=900.0, demand_time=240.0, arm_length=150.0,
+        vehicle=VehicleType(speed_deviation=0.1),
+    )  # fmt: skip
+    ours = minisim.simulate(scenario, Dim(), seed=2, record="junction")
+    theirs = simulate(scenario, Dim(), seed=2, record="junction", keep_files=folder)
+    return ours, theirs, folder
+
+
+def test_trips_are_those_of_the_arrivals(busy: tuple[Run, Run, Path]) -> None:
+    ours, theirs, _ = busy
+    columns = ["demand_time_s", "lane", "manoeuvre", "exit_lane"]
+    assert theirs.trips[columns].equals(ours.trips[columns])
+    assert list(theirs.trips) == list(ours.trips)
+    assert theirs.trips.dtypes.equals(ours.trips.dtypes)
+
+
+def test_trips_are_sumos(busy: tuple[Run, Run, Path]) -> None:
+    _, run, folder = busy
+    trips = run.trips
+    written = list(ET.parse(folder / "tripinfo.xml").getroot().iter("tripinfo"))
+    assert len(written) == len(trips)
+    undeparted = 0
+    for trip in written:
+        row = trips.loc[int(trip.attrib["id"])]
+        if float(trip.attrib["depart"]) < 0.0:
+            undeparted += 1
+            assert math.isnan(row["depart_s"])
+            continue
+        assert row["depart_s"] == pytest.approx(float(trip.attrib["depart"]))
+        assert row["depart_delay_s"] == pytest.approx(row["depart_s"] - row["demand_time_s"])
+        if float(trip.attrib["arrival"]) < 0.0:
+            assert np.isnan(
+                row[["arrival_s", "waiting_time_s", "travel_time_s"]].astype(float)
+            ).all()
+        else:
+            assert row["arrival_s"] == pytest.approx(float(trip.attrib["arrival"]))
+            assert row["travel_time_s"] == pytest.approx(float(trip.attrib["duration"]))
+            assert row["waiting_time_s"] == pytest.approx(float(trip.attrib["waitingTime"]))
+    assert undeparted > 0
+    assert run.summary()["unfinished"] > undeparted
+
+
+def test_the_complete_means_count_the_unfinished(busy: tuple[Run, Run, Path]) -> None:
+    ours, theirs, _ = busy
+    a, b = ours.summary(), theirs.summary()
+    assert b["trips"] == a["trips"]
+    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s"):
+        assert b["complete"][name] == pytest.approx(a["complete"][name], rel=0.15)
+
+
+def test_waiting_is_time_at_a_tenth_of_a_metre_a_second_or_less() -> None:
+    run = simulate(small_scenario(4, demand_time=90.0, drain=300.0), Dim(), record="all")
+    assert run.columns.waiting_time.max() > 5.0
+    for vehicle, waited in enumerate(run.columns.waiting_time):
+        after_insertion = sorted(states(run, vehicle).items())[1:]
+        slow = sum(v <= 0.1 for _, (_, v) in after_insertion)
+        assert waited == pytest.approx(0.1 * slow, abs=1e-6)
+
+
+def test_trajectories_reach_as_far_as_minisims(busy: tuple[Run, Run, Path]) -> None:
+    ours, theirs, _ = busy
+    assert list(theirs.trajectories) == list(ours.trajectories)
+    for column in ("s_m", "x_m", "y_m"):
+        for end in (np.min, np.max):
+            reached, wanted = end(theirs.trajectories[column]), end(ours.trajectories[column])
+            assert reached == pytest.approx(wanted, abs=1.5)
+    assert 0.0 < theirs.trajectories["right_of_way"].mean() < 1.0
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    scenario = small_scenario(4, demand_time=60.0, drain=200.0)
+    first, second = (simulate(scenario, Dim(), seed=3, model="Krauss") for _ in range(2))
+    assert first.trips.equals(second.trips)
+
+
+def test_provenance_names_sumo() -> None:
+    run = simulate(single(horizon=5.0), Unregulated(), model="Krauss")
+    assert run.provenance["host"] == run.summary()["host"] == "sumo"
+    assert run.provenance["sumo"].startswith("SUMO 1.")
+    assert run.provenance["sumo_model"] == "Krauss"
+    assert run.provenance["seed"] == "0"
+
+
+def test_krauss_brakes_and_waits_too() -> None:
+    ours, theirs = both(small_scenario(4, demand_time=90.0, drain=300.0), FixedTime())
+    krauss = simulate(ours.scenario, FixedTime(), model="Krauss")
+    assert not krauss.collisions
+    assert krauss.columns.arrived.all()
+    for run in (theirs, krauss):
+        assert run.summary()["waiting_time_s"] == pytest.approx(
+            ours.summary()["waiting_time_s"], rel=0.15
+        )
+
+
+#: Straight on from a and b at the same time: they meet in the middle.
+CROSSING = replayed(FAIR_FOUR, (0.0, 0, 2), (0.0, 1, 2), horizon=120.0)
+
+
+def test_sumo_obeys_a_controller_that_lets_collide() -> None:
+    ours, theirs = both(CROSSING, Unregulated(), on_collision="record")
+    (mine,), (its,) = ours.collisions, theirs.collisions
+    assert its.vehicles == mine.vehicles
+    assert its.movements == mine.movements
+    assert its.time == pytest.approx(mine.time, abs=0.31)
+    assert its.positions == pytest.approx(mine.positions, abs=4.5)
+    assert its.speeds == pytest.approx((14.0, 14.0))
+    assert theirs.columns.travel_time == pytest.approx([71.1, 71.1])
+
+
+def test_a_collision_stops_the_run_with_a_replay() -> None:
+    with pytest.raises(CollisionError, match=r"vehicle 0 .a2.* and vehicle 1 .b2.*touched") as info:
+        simulate(CROSSING, Unregulated())
+    run = info.value.replay(3.0)
+    assert run.collisions == info.value.collisions
+    times = run.trajectories["time_s"]
+    (collision,) = run.collisions
+    assert times.min() == pytest.approx(collision.time - 3.0, abs=0.11)
+    assert times.max() == pytest.approx(collision.time + 2.0, abs=0.11)
+
+
+def test_a_turning_leader_is_followed_and_merging_vehicles_do_not_touch() -> None:
+    scenario = replayed(
+        FAIR_FOUR, (0.0, 0, 1), (1.5, 0, 2), (0.0, 3, 3), (1.0, 1, 1), horizon=120.0
+    )
+    run = simulate(scenario, Unregulated(), on_collision="record")
+    assert not run.collisions
+    assert run.columns.arrived.all()
+
+
+# --- the network -----------------------------------------------------------------------------
+
+
+@share(1 / 6)
+@given(intersections())
+def test_any_geometry_becomes_the_same_network(intersection: Intersection) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        made = network.build_network(intersection, 14.0, Path(folder), host.sumo_home())
+        root = ET.parse(Path(folder) / network.NETWORK).getroot()
+    assert made.approach == pytest.approx(
+        [intersection.approach_length] * len(made.approach), abs=1e-4
+    )
+    arcs = [path.exit - path.entry for path in intersection.paths]
+    # An inscribed polyline of 32 chords is shorter by (θ/32)²/24, at most 0.04 % (θ = π).
+    assert made.inside == pytest.approx(arcs, rel=1e-3, abs=1e-3)
+    requests = list(root.iter("request"))
+    assert len(requests) == len(arcs)
+    assert all(set(request.attrib["response"]) == {"0"} for request in requests)
+
+
+@pytest.mark.parametrize("arms", [3, 5, 6])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_other_junctions_run(arms: int, side: str) -> None:
+    scenario = small_scenario(arms, demand_time=30.0, drain=300.0, side=side)
+    ours, theirs = both(scenario, Dim(gate="harmonious"))
+    assert theirs.columns.arrived.all()
+    assert theirs.summary()["travel_time_s"] == pytest.approx(
+        ours.summary()["travel_time_s"], rel=0.03
+    )
+
+
+# --- what can go wrong -----------------------------------------------------------------------
+
+
+def test_what_netconvert_says_is_passed_on_and_its_files_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(network, "_outline", lambda intersection: "here and there")
+    with pytest.raises(SumoError, match=r"netconvert failed \(exit code 1\): .*shape.*node 'C'"):
+        simulate(single(), Unregulated(), keep_files=tmp_path / "new" / "folder")
+    kept = {file.name for file in (tmp_path / "new" / "folder").iterdir()}
+    assert kept == {"minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"}
+
+
+def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(host, "sumo_home", lambda: tmp_path)
+    with pytest.raises(SumoError, match="cannot start netconvert: No such file"):
+        simulate(single(), Unregulated())
+
+
+@pytest.fixture
+def children(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
+    """The worker processes that a test starts."""
+    started: list[subprocess.Popen[bytes]] = []
+    popen = subprocess.Popen
+
+    def starting(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+        child = popen(*arguments, **options)
+        started.append(child)
+        return child
+
+    monkeypatch.setattr(host.subprocess, "Popen", starting)
+    return started
+
+
+@dataclass(frozen=True)
+class Saboteur:
+    """Calls something at 10 s."""
+
+    act: Any
+    name: str = "saboteur"
+
+    def start(self, site: Site) -> Session:
+        return _SaboteurSession(self.act)
+
+
+class _SaboteurSession:
+    plan = Plan(period=1.0, lanes_open=True)
+
+    def __init__(self, act: Any) -> None:
+        self._act = act
+
+    def decide(self, view: View) -> Iterable[Command]:
+        return (self._act() or ()) if view.time >= 10.0 else ()
+
+
+@pytest.mark.parametrize("death", [signal.SIGKILL, signal.SIGSEGV])
+def test_when_sumo_dies_the_caller_lives(
+    children: list[subprocess.Popen[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    death: signal.Signals,
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    saboteur = Saboteur(lambda: os.kill(children[-1].pid, death))
+    with pytest.raises(
+        SumoError, match=rf"SUMO's process died after 10.0 s of simulated time \({death.name}\)"
+    ):
+        simulate(single(), saboteur)
+    assert children[-1].poll() == -death
+    assert not list(tmp_path.iterdir()), "nothing is left behind"
+    assert simulate(single(), Unregulated()).columns.arrived.all()
+
+
+def boom() -> None:
+    raise ZeroDivisionError("boom")
+
+
+@pytest.mark.parametrize(
+    ("act", "error", "message"),
+    [
+        (boom, ZeroDivisionError, "boom"),
+        (lambda: (Go(7),), ControllerError, r"'saboteur' at 10.0 s: vehicle must be .* 0 … 0"),
+        (lambda: (Open(4),), ControllerError, r"at 10.0 s: lane must be .* 0 … 3"),
+        (lambda: (Wake(10.0),), ControllerError, "wake-up time 10 s is not after 10 s"),
+        (lambda: ("go",), ControllerError, "'go' is not a command"),
+    ],
+    ids=["exception", "vehicle", "lane", "wake", "nonsense"],
+)
+def test_a_broken_controller_is_told_as_in_minisim(
+    children: list[subprocess.Popen[bytes]], act: Any, error: type[Exception], message: str
+) -> None:
+    for run in (minisim.simulate, simulate):
+        with pytest.raises(error, match=message):
+            run(single(), Saboteur(act))
+    assert children[-1].poll() is not None, "no process is left behind"
+
+
+def test_what_sumo_refuses_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "_command", lambda gui: ("sumo", "--no-such-option"))
+    with pytest.raises(SumoError, match=r"before the first step: .*no-such-option"):
+        simulate(single(), Unregulated())
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="how Linux finds displays")
+def test_the_gui_needs_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(SumoError, match="sumo-gui needs a display, and there is none"):
+        simulate(single(), Unregulated(), gui=True)
+    monkeypatch.setenv("DISPLAY", ":4711")
+    with pytest.raises(SumoError, match="unable to open display :4711"):
+        simulate(single(), Unregulated(), gui=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"model": "idm"}, "unknown SUMO model 'idm'; allowed: IDM, Krauss"),
+        ({"record": "some"}, "unknown record 'some'"),
+        ({"on_collision": "explode"}, "unknown on_collision"),
+        ({"keep_files": 3}, "keep_files must be a str or PathLike"),
+        ({"record_window": (5.0, 1.0)}, "must not end before it starts"),
+        ({"seed": -1}, "seed must be an integer of at least 0"),
+    ],
+)
+def test_wrong_arguments_are_told(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(single(), Unregulated(), **options)
+
+
+def test_sumo_has_no_improved_idm() -> None:
+    profile = replace(FAIR, vehicle=VehicleType(model="iidm"))
+    scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
+    with pytest.raises(InputError, match="SUMO has no car-following model 'iidm'"):
+        simulate(scenario, Unregulated())
+    assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
+
+
+def test_sumo_steps_in_whole_milliseconds() -> None:
+    with pytest.raises(InputError, match=r"SUMO counts in milliseconds; it cannot step 0\.0333"):
+        simulate(small_scenario(dt=0.0333), Unregulated())
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.25])
+def test_other_steps_drive_alike(dt: float) -> None:
+    """Above 0.37 s SUMO's IDM cuts a step into several."""
+    scenario = single(scenario=replace(FAIR_FOUR, profile=replace(FAIR, dt=dt)))
+    ours, theirs = both(scenario, Dim(), record="all")
+    position, speed = furthest_apart(ours, theirs)
+    assert position < 0.01
+    assert speed < 0.01
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="cannot write to folder"):
+        simulate(single(), Unregulated(), keep_files=tmp_path / "file" / "folder")
+
+
+def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SUMO_HOME", raising=False)
+    before = dict(os.environ)
+    assert simulate(single(), Unregulated()).columns.arrived.all()
+    assert dict(os.environ) == before
+    assert "libsumo" not in sys.modules
+
+
+# --- the command line ------------------------------------------------------------------------
+
+RUN = ("run", "four-way", "-p", "fair", "-d", "300", "--horizon", "120")
+
+
+def test_the_command_line_hosts_in_sumo(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main([*RUN, "--json", "--host", "sumo", "--keep-files", str(tmp_path / "kept")]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (tmp_path / "kept" / "minisim.net.xml").is_file()
+    assert main([*RUN, "--json"]) == 0
+    ours = json.loads(capsys.readouterr().out)
+    assert (ours["host"], printed["host"]) == ("minisim", "sumo")
+    assert printed.keys() == ours.keys()
+    assert printed["trips"] == ours["trips"]
+    assert printed["travel_time_s"] == pytest.approx(ours["travel_time_s"], rel=0.03)
+
+
+def test_the_command_line_prints_a_table_of_sumos_run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    trips = tmp_path / "trips.csv"
+    options = ("-c", "fixed-time", "--host", "sumo", "--sumo-model", "Krauss")
+    assert main([*RUN, *options, "--trips", str(trips)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert "host sumo" in captured.out
+    assert len(trips.read_text().splitlines()) > 10
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--host", "vissim"), "unknown host 'vissim'; allowed: minisim, sumo"),
+        (("--gui",), "--gui and --keep-files need --host sumo"),
+        (("--sumo-model", "IDM"), "need --host sumo"),
+        (("--host", "sumo", "--sumo-model", "CACC"), "unknown SUMO model 'CACC'"),
+    ],
+)
+def test_wrong_options_are_one_line(
+    capsys: pytest.CaptureFixture[str], options: tuple[str, ...], message: str
+) -> None:
+    assert main([*RUN, *options]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert (captured.out, captured.err.count("\n")) == ("", 1)

@@ -1,0 +1,39 @@
+"""Without the extra `sumo` everything else works, and who asks for SUMO is told what to install."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from minisim.control import Unregulated
+from minisim.errors import MissingExtraError
+from minisim.sumo import simulate
+from minisim.testing import check_controller, small_scenario
+
+INSTALL = r"needs the package \w+: pip install 'minisim\[sumo\]'"
+
+
+@pytest.mark.parametrize("package", ["libsumo", "sumo"])
+def test_the_install_command_is_told(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    monkeypatch.setitem(sys.modules, package, None)  # Python's own way to block an import
+    with pytest.raises(MissingExtraError, match=INSTALL):
+        simulate(small_scenario(), Unregulated())
+    with pytest.raises(MissingExtraError, match=INSTALL):
+        check_controller(Unregulated(), host="sumo")
+
+
+def test_the_rest_works_without_the_extra() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('libsumo', 'sumo', 'sumolib', 'traci'): sys.modules[name] = None\n"
+        "import minisim.sumo\n"
+        "from scenarios.cli import main\n"
+        "assert main(['run', 'four-way', '--horizon', '20']) == 0\n"
+        "sys.exit(main(['run', 'four-way', '--horizon', '20', '--host', 'sumo']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'minisim[sumo]'" in done.stderr
+    assert done.stderr.count("\n") == 1, "one line"
