@@ -192,20 +192,26 @@ class Worker:
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
         v0 = min(speeds[section] * car.factor, car.advice)
-        free = acc = self._free(v, v0)
         k = section + 1
+        slower = kernel.braking_begins(v, starts[k] - s, law)
+        held = s < law.entry and not self._released(car) and near(v, law.hold - s, law)
+        # SUMO would drop to a lower desired speed at once; the law brakes.
+        self._desire(car, max(v0, v))
+        if not (slower or held or v > v0 or v0 < LEAST_SPEED):
+            self._hand_back(car)
+            return
+        free = acc = self._free(v, v0)
         while kernel.braking_begins(v, starts[k] - s, law):
             acc = min(acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1
-        if s < law.entry and not self._released(car) and near(v, law.hold - s, law):
+        if held:
             acc = min(acc, kernel.hold(v, s, law))
-        self._desire(car, max(v0, v))  # SUMO would drop to a lower one at once; the law brakes
         if acc < free or v > v0 or v0 < LEAST_SPEED:
             speed = v + max(acc, -law.b_max) * law.dt
             self._libsumo.vehicle.setSpeed(car.name, max(speed, 0.0))
             car.commanded = True
-        elif car.commanded:
-            self._release(car)
+        else:
+            self._hand_back(car)
 
     def _released(self, car: Car) -> bool:
         return car.go or self._open[car.lane]
@@ -223,9 +229,10 @@ class Worker:
             self._libsumo.vehicle.setMaxSpeed(car.name, speed)
             car.desired = speed
 
-    def _release(self, car: Car) -> None:
-        self._libsumo.vehicle.setSpeed(car.name, -1.0)
-        car.commanded = False
+    def _hand_back(self, car: Car) -> None:
+        if car.commanded:
+            self._libsumo.vehicle.setSpeed(car.name, -1.0)
+            car.commanded = False
 
     def _observe(self) -> bool:
         """Read the new state; whether a front has passed a mark, or a rear left the junction."""
@@ -286,8 +293,7 @@ class Worker:
         self._lanes[car.lane].remove(car)
         limit = self._limits[car.path][1][car.section]
         self._desire(car, min(limit * car.factor, car.advice))
-        if car.commanded:
-            self._release(car)
+        self._hand_back(car)
         if self._job.law.record_from == NEVER:
             self._libsumo.vehicle.unsubscribe(car.name)
             del self._watched[car.name]
