@@ -86,17 +86,29 @@ def speed_towards(v: float, v_target: float, distance: float, b: float, dt: floa
     return math.sqrt(disc) - half
 
 
+#: Weights of v'·dt against the ballistic rule, for `advanced`.
+BALLISTIC, SEMI_IMPLICIT = 0.5, 1.0
+
+
 @njit_inline
-def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
+def advanced(s: float, v: float, acc: float, dt: float, weight: float) -> tuple[float, float]:
     """Position and speed after one step of constant acceleration; a vehicle never reverses.
 
-    A vehicle that would reverse stops where its speed reaches zero.
-    Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10.
+    s + v·dt + weight·acc·dt²: the weight 1/2 is the ballistic rule, 1 is SUMO's default, the
+    semi-implicit Euler rule s + v'·dt. A vehicle that would reverse stops where its speed reaches
+    zero.
+    Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10; SUMO's `step-method`.
     """
     v_new = v + acc * dt
     if v_new < 0.0:
         return s - v * v / (2.0 * acc), 0.0
-    return s + v * dt + 0.5 * acc * dt * dt, v_new
+    return s + v * dt + weight * acc * dt * dt, v_new
+
+
+@njit_inline
+def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
+    """`advanced` by the ballistic rule."""
+    return advanced(s, v, acc, dt, BALLISTIC)
 
 
 @njit
@@ -115,3 +127,38 @@ def insertion_speed(
     root = math.sqrt(a * b)
     half = 0.5 * v_leader - root * headway
     return half + math.sqrt(half * half + 2.0 * root * room)
+
+
+@njit_inline
+def cruise_control(v: float, v0: float, gain: float, a: float, b: float) -> float:
+    """Acceleration that a cruise control asks of the engine, gain·(v0 − v) within [−b, a] [m/s²].
+
+    Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without integral term; SUMO's
+    `MSCFModel_CC::_cc`.
+    """
+    u = gain * (v0 - v)
+    return min(max(u, -b), a)
+
+
+@njit_inline
+def distance_control(
+    v: float, gap: float, v_leader: float, headway: float, gain: float, spacing: float
+) -> float:
+    """Acceleration that an ACC asks of the engine behind a leader [m/s²].
+
+    −((v − v_leader) + gain·(headway·v + spacing − gap)) / headway: in equilibrium the gap is
+    headway·v + spacing. Like SUMO, callers measure `gap` beyond the vehicle's `min_gap`.
+    Source: Rajamani 2006, eq. 6.18; SUMO's `MSCFModel_CC::_acc`.
+    """
+    return -((v - v_leader) + gain * (headway * v + spacing - gap)) / headway
+
+
+@njit_inline
+def engine_lag(a: float, u: float, lag: float, dt: float) -> float:
+    """Acceleration of the next step when the engine, now at `a`, is asked for `u` [m/s²].
+
+    First-order lag by the implicit Euler rule: α·u + (1 − α)·a with α = dt/(lag + dt).
+    Source: SUMO's `FirstOrderLagModel` (Plexe; Segata et al., VNC 2014).
+    """
+    alpha = dt / (lag + dt)
+    return alpha * u + (1.0 - alpha) * a

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import (
-    ballistic,
+    advanced,
     gap_ratio,
     idm,
     iidm,
     insertion_speed,
     speed_towards,
 )
+from minisim.engine import accelerate_engines
 from minisim.jit import njit, njit_inline
 from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
 
@@ -71,7 +72,12 @@ def step(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats
     reasons = 0
     if insert(vehicles, lanes, road, law, tick):
         reasons |= MARK
-    if accelerate(vehicles, lanes, road, law):
+    if law.powered:
+        overlap = accelerate_engines(vehicles, lanes, road, law)
+        hold_engines(vehicles, lanes, law)
+    else:
+        overlap = accelerate(vehicles, lanes, road, law)
+    if overlap:
         reasons |= GAP
     reasons |= move(vehicles, lanes, road, law, tick + 1)
     if may_touch(vehicles, lanes, road, law, bodies):
@@ -93,7 +99,7 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         i = lanes[lane]["next"]
         if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
             continue
-        s, p = law.length, vehicles[i]["path"]
+        s, p = law.length + law.slack, vehicles[i]["path"]
         section = 0
         while s >= road.section_start[p, section + 1]:
             section += 1
@@ -107,9 +113,12 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
             rear = vehicles[j]["s"] - law.length
-            safe = insertion_speed(
-                rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
-            )
+            if law.powered:  # SUMO's rule for its CC model: any speed will do
+                safe = math.inf if rear - s >= law.min_gap else -1.0
+            else:
+                safe = insertion_speed(
+                    rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
+                )
             if safe < 0.0:
                 continue
             v = min(v, safe)
@@ -243,6 +252,18 @@ def hold(v: float, s: float, law: Law) -> float:
 
 
 @njit
+def hold_engines(vehicles: Records, lanes: Records, law: Law) -> None:
+    """Stop vehicles with an engine at their hold line where they have no right of way."""
+    for lane in range(len(lanes)):
+        if lanes[lane]["open"] != 0:
+            continue
+        for i in range(lanes[lane]["front"], lanes[lane]["next"]):
+            me = vehicles[i]
+            if me["status"] == DRIVING and me["go"] == 0 and me["s"] < law.entry:
+                me["a"] = max(min(me["a"], hold(me["v"], me["s"], law)), -law.b_max)
+
+
+@njit
 def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
     """Move everybody by one step, book waiting and loss, and collect the reasons to return."""
     reasons = 0
@@ -254,7 +275,8 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
             if vehicles[i]["status"] != DRIVING:
                 continue
             p = vehicles[i]["path"]
-            s, v = ballistic(vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["a"], law.dt)
+            before, acc = vehicles[i]["s"], vehicles[i]["a"]
+            s, v = advanced(before, vehicles[i]["v"], acc, law.dt, law.weight)
             vehicles[i]["s"] = s
             vehicles[i]["v"] = v
             if v <= WAITING_SPEED:
@@ -274,13 +296,18 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
             if i == lanes[lane]["front"]:
                 exit_arm = int(ends[p, 2])
                 lanes[lane]["front"] = i + 1
+                vehicles[i]["entered"] = tick
                 vehicles[i]["ahead"] = lanes[exit_arm]["last"]
                 lanes[exit_arm]["last"] = i
-            if vehicles[i]["cleared"] == 0 and s - law.length >= ends[p, 0]:
+            if law.powered and before < ends[p, 0] <= s:
+                exit_arm = int(ends[p, 2])
+                vehicles[i]["ahead"] = lanes[exit_arm]["tail"]
+                lanes[exit_arm]["tail"] = i
+            if vehicles[i]["cleared"] == 0 and s >= max(ends[p, 0] + law.length, law.leave):
                 vehicles[i]["cleared"] = 1
                 if law.wake_on_clear:
                     reasons |= CLEAR
-            if s >= ends[p, 1]:
+            if s >= ends[p, 1] - law.slack:
                 vehicles[i]["status"] = ARRIVED
                 vehicles[i]["arrival_tick"] = tick
         while (
@@ -435,5 +462,6 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen["distance"] = distance
             seen["speed"] = me["v"]
             seen["length"] = law.length
+            seen["demand_time"] = me["demand_tick"] * law.dt
             count += 1
     return count

@@ -14,12 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import Arrivals
+from minisim.carfollowing import BALLISTIC, SEMI_IMPLICIT
 from minisim.control import Plan, Site
+from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
-from minisim.geometry import Path
+from minisim.geometry import Intersection, Path
 from minisim.streams import stream
+from minisim.vehicle import EngineVehicle, VehicleType
 
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
 #: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
@@ -50,6 +54,8 @@ VEHICLE = np.dtype(
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
+        ("entered", np.int64),  # tick of entering the junction (engine only)
+        ("stopping", np.int64),  # advised to stand in the step before (engine only)
         ("depart_tick", np.int64),
         ("arrival_tick", np.int64),
         ("waiting_ticks", np.int64),
@@ -66,6 +72,7 @@ LANE = np.dtype(
         ("uncleared", np.int64),  # first row not yet clear of the junction
         ("open", np.int64),
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
+        ("tail", np.int64),  # last row that entered the exit lane of this arm (engine only)
     ]
 )
 
@@ -90,6 +97,7 @@ OBSERVED = np.dtype(
         ("distance", np.float64),
         ("speed", np.float64),
         ("length", np.float64),
+        ("demand_time", np.float64),
     ]
 )
 
@@ -105,6 +113,8 @@ class Road(NamedTuple):
         section_speed: (p, k) limit from there on [m/s].
         branch: (p, p) [m], see `Intersection.branch`.
         marks: (j,) `s` of the wake-up marks, ascending, the last one infinite [m].
+        meetings: (p, p, 3), see `minisim.crossings.meetings` (engine only, else empty).
+        waits: (p, 2): waiting position past the entry and sagitta [m] (engine only, else empty).
     """
 
     ends: Floats
@@ -114,12 +124,30 @@ class Road(NamedTuple):
     section_speed: Floats
     branch: Floats
     marks: Floats
+    meetings: Floats
+    waits: Floats
+
+
+class Engine(NamedTuple):
+    """The scalars of `minisim.vehicle.EngineVehicle` (SI units)."""
+
+    cruise_speed: float
+    cruise_gain: float
+    a: float
+    b: float
+    headway: float
+    spacing_gain: float
+    spacing: float
+    lag: float
+    a_max: float
+    radar: float
 
 
 class Law(NamedTuple):
     """The scalars of a run: car following, lines and switches (SI units)."""
 
     dt: float
+    weight: float  # of acceleration in a step's distance, see `carfollowing.advanced`
     a: float
     b: float
     b_max: float
@@ -127,10 +155,14 @@ class Law(NamedTuple):
     min_gap: float
     delta: float
     improved: bool
+    powered: bool  # vehicles have an `engine`
+    engine: Engine
     length: float
     width: float
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
+    leave: float  # s until which a vehicle stays in view at least
+    slack: float  # inserted so far past its length, arrived so far before the end of the road
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # negative: the highest safe one
     wake_on_clear: bool
@@ -151,6 +183,7 @@ def build_road(site: Site, plan: Plan) -> Road:
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
+    powered = isinstance(site.vehicle, EngineVehicle)
     marks = sorted(intersection.approach_length - distance for distance in plan.marks)
     return Road(
         ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
@@ -160,7 +193,15 @@ def build_road(site: Site, plan: Plan) -> Road:
         section_speed=speed,
         branch=np.array(intersection.branch(site.vehicle)),
         marks=np.array([*marks, np.inf]),
+        meetings=meetings(intersection) if powered else np.zeros((0, 0, 3)),
+        waits=_waits(intersection, site.vehicle) if powered else np.zeros((0, 2)),
     )
+
+
+def _waits(intersection: Intersection, vehicle: VehicleType) -> Floats:
+    ways = intersection.ways or ()
+    wait = [way.wait for way in ways] or [0.0] * len(intersection.paths)
+    return np.stack([np.array(wait), sagittas(intersection, vehicle.length)], axis=-1)
 
 
 def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
@@ -202,6 +243,7 @@ def build_law(
     near = record == "junction"
     return Law(
         dt=site.dt,
+        weight=SEMI_IMPLICIT if isinstance(vehicle, EngineVehicle) else BALLISTIC,
         a=vehicle.acceleration,
         b=vehicle.deceleration,
         b_max=vehicle.max_deceleration,
@@ -209,10 +251,14 @@ def build_law(
         min_gap=vehicle.min_gap,
         delta=vehicle.exponent,
         improved=vehicle.model == "iidm",
+        powered=isinstance(vehicle, EngineVehicle),
+        engine=_engine(vehicle),
         length=vehicle.length,
         width=vehicle.width,
         entry=entry,
         hold=entry - plan.hold_distance,
+        leave=entry + plan.reach,
+        slack=POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0,
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -222,6 +268,27 @@ def build_law(
         record_past=RECORD_PAST if near else math.inf,
     )
 
+
+def _engine(vehicle: VehicleType) -> Engine:
+    if not isinstance(vehicle, EngineVehicle):
+        return Engine(*(0.0,) * len(Engine._fields))
+    return Engine(
+        cruise_speed=vehicle.cruise_speed,
+        cruise_gain=vehicle.cruise_gain,
+        a=vehicle.cruise_acceleration,
+        b=vehicle.cruise_deceleration,
+        headway=vehicle.headway,
+        spacing_gain=vehicle.spacing_gain,
+        spacing=vehicle.spacing,
+        lag=vehicle.lag,
+        a_max=vehicle.engine_acceleration,
+        radar=vehicle.radar,
+    )
+
+
+#: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
+#: and counts it as arrived this far before the end of the road.
+POSITION_EPS = 0.1
 
 #: Reach of a recording of the junction alone, before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
@@ -269,4 +336,5 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
     lanes["last"] = -1
+    lanes["tail"] = -1
     return lanes
