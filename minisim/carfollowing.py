@@ -86,29 +86,27 @@ def speed_towards(v: float, v_target: float, distance: float, b: float, dt: floa
     return math.sqrt(disc) - half
 
 
-#: Weights of v'·dt against the ballistic rule, for `advanced`.
-BALLISTIC, SEMI_IMPLICIT = 0.5, 1.0
-
-
 @njit_inline
-def advanced(s: float, v: float, acc: float, dt: float, weight: float) -> tuple[float, float]:
+def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
     """Position and speed after one step of constant acceleration; a vehicle never reverses.
 
-    s + v·dt + weight·acc·dt²: the weight 1/2 is the ballistic rule, 1 is SUMO's default, the
-    semi-implicit Euler rule s + v'·dt. A vehicle that would reverse stops where its speed reaches
-    zero.
-    Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10; SUMO's `step-method`.
+    A vehicle that would reverse stops where its speed reaches zero.
+    Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10.
     """
     v_new = v + acc * dt
     if v_new < 0.0:
         return s - v * v / (2.0 * acc), 0.0
-    return s + v * dt + weight * acc * dt * dt, v_new
+    return s + v * dt + 0.5 * acc * dt * dt, v_new
 
 
 @njit_inline
-def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
-    """`advanced` by the ballistic rule."""
-    return advanced(s, v, acc, dt, BALLISTIC)
+def semi_implicit(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
+    """Position and speed after one step of SUMO's default rule, s + v'·dt with the new speed v'.
+
+    A vehicle that would reverse stands. Source: SUMO's `step-method` (semi-implicit Euler).
+    """
+    v_new = max(v + acc * dt, 0.0)
+    return s + v_new * dt, v_new
 
 
 @njit

@@ -31,11 +31,12 @@ CROSS, JOIN, PART = int(Meeting.CROSS), int(Meeting.JOIN), int(Meeting.PART)
 
 
 @njit
-def accelerate_engines(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
+def accelerate_engines(
+    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine
+) -> bool:
     """Choose every vehicle's acceleration from the present state; whether two overlap."""
     overlap = False
-    ends, meetings, waits = road.ends, road.meetings, road.waits
-    engine = law.engine
+    ends = road.ends
     inside = np.empty(INSIDE, np.int64)
     count = gather(vehicles, lanes, ends, law, inside)
     for lane in range(len(lanes)):
@@ -65,7 +66,7 @@ def accelerate_engines(vehicles: Records, lanes: Records, road: Road, law: Law) 
                     if on_way:
                         break
                 if count and not (led and s < law.entry) and law.entry - s <= engine.radar:
-                    u = min(u, meet(vehicles, ends, meetings, waits, law, inside, count, i))
+                    u = min(u, meet(vehicles, ends, law, engine, inside, count, i))
                 j = lanes[int(ends[p, 2])]["tail"]
             else:
                 j = me["ahead"]
@@ -76,7 +77,7 @@ def accelerate_engines(vehicles: Records, lanes: Records, road: Road, law: Law) 
                 if s >= leave:
                     nearest = min(nearest, gap)
             overlap |= nearest <= 0.0
-            me["a"] = realise(v, me["a"], u, me["stopping"] != 0, law)
+            me["a"] = realise(v, me["a"], u, me["stopping"] != 0, law, engine)
             me["stopping"] = v0 == 0.0
     return overlap
 
@@ -104,9 +105,8 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, inside: In
 def meet(
     vehicles: Records,
     ends: Floats,
-    meetings: Floats,
-    waits: Floats,
     law: Law,
+    engine: Engine,
     inside: Ints,
     count: int,
     i: int,
@@ -116,6 +116,7 @@ def meet(
     Source: `MSLink::getLeaderInfo`, `MSVehicle::adaptToJunctionLeader`,
     `MSLane::getLeaderOnConsecutive`, `MSVehicle::isLeader`.
     """
+    meetings, waits = engine.meetings, engine.waits
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
     to_exit = ends[p, 0] - s
     approaching = s < law.entry
@@ -160,9 +161,9 @@ def meet(
         if approaching:
             if gap + other["v"] < shortest:
                 shortest = gap + other["v"]
-                u = follow(v, gap if gap >= 0.0 else law.entry - s, other["v"], law.engine)
+                u = follow(v, gap if gap >= 0.0 else law.entry - s, other["v"], engine)
         else:
-            u = min(u, follow(v, gap, other["v"], law.engine) if gap >= 0.0 else math.inf)
+            u = min(u, follow(v, gap, other["v"], engine) if gap >= 0.0 else math.inf)
     return u
 
 
@@ -186,11 +187,11 @@ def follow(v: float, gap: float, v_leader: float, engine: Engine) -> float:
 
 
 @njit_inline
-def realise(v: float, a: float, u: float, stopping: bool, law: Law) -> float:
+def realise(v: float, a: float, u: float, stopping: bool, law: Law, engine: Engine) -> float:
     """Acceleration of this step: the engine's answer to `u`, no further than standstill.
 
     A desired speed of 0 makes SUMO ask, from the next step on, for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
-    a = engine_lag(a, u, law.engine.lag, law.dt)
-    return max(min(a, law.engine.a_max), -law.b_max, -v / law.dt)
+    a = engine_lag(a, u, engine.lag, law.dt)
+    return max(min(a, engine.a_max), -law.b_max, -v / law.dt)

@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import (
-    advanced,
+    ballistic,
     gap_ratio,
     idm,
     iidm,
     insertion_speed,
+    semi_implicit,
     speed_towards,
 )
 from minisim.engine import accelerate_engines
 from minisim.jit import njit, njit_inline
-from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
+from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Engine, Floats, Law, Records, Road
 
 #: Reasons to return, as bits.
 MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
@@ -37,6 +38,7 @@ def advance(
     lanes: Records,
     road: Road,
     law: Law,
+    engine: Engine | None,
     trace: Records,
     traced: int,
     bodies: Floats,
@@ -57,7 +59,7 @@ def advance(
     """
     reasons = 0
     while tick < until and reasons == 0:
-        reasons = step(vehicles, lanes, road, law, bodies, tick)
+        reasons = step(vehicles, lanes, road, law, engine, bodies, tick)
         tick += 1
         if law.record_from <= tick < law.record_to:
             traced = record(vehicles, lanes, road, law, trace, traced, tick)
@@ -67,26 +69,36 @@ def advance(
 
 
 @njit
-def step(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats, tick: int) -> int:
+def step(
+    vehicles: Records,
+    lanes: Records,
+    road: Road,
+    law: Law,
+    engine: Engine | None,
+    bodies: Floats,
+    tick: int,
+) -> int:
     """One step, from `tick` to the next; the reasons to return."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, tick):
+    if insert(vehicles, lanes, road, law, engine, tick):
         reasons |= MARK
-    if law.powered:
-        overlap = accelerate_engines(vehicles, lanes, road, law)
-        hold_engines(vehicles, lanes, law)
-    else:
+    if engine is None:
         overlap = accelerate(vehicles, lanes, road, law)
+    else:
+        overlap = accelerate_engines(vehicles, lanes, road, law, engine)
+        hold_engines(vehicles, lanes, law)
     if overlap:
         reasons |= GAP
-    reasons |= move(vehicles, lanes, road, law, tick + 1)
+    reasons |= move(vehicles, lanes, road, law, engine, tick + 1)
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons
 
 
 @njit
-def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
+def insert(
+    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine | None, tick: int
+) -> bool:
     """Insert on each lane the next vehicle that is due, if the gap allows; FIFO, none dropped.
 
     No faster than the vehicle ahead allows, nor comfortable braking the lower limits ahead and,
@@ -113,12 +125,12 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
             rear = vehicles[j]["s"] - law.length
-            if law.powered:  # SUMO's rule for its CC model: any speed will do
-                safe = math.inf if rear - s >= law.min_gap else -1.0
-            else:
+            if engine is None:
                 safe = insertion_speed(
                     rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
                 )
+            else:  # SUMO's rule for its CC model: any speed will do
+                safe = math.inf if rear - s >= law.min_gap else -1.0
             if safe < 0.0:
                 continue
             v = min(v, safe)
@@ -264,7 +276,9 @@ def hold_engines(vehicles: Records, lanes: Records, law: Law) -> None:
 
 
 @njit
-def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
+def move(
+    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine | None, tick: int
+) -> int:
     """Move everybody by one step, book waiting and loss, and collect the reasons to return."""
     reasons = 0
     done = True
@@ -276,7 +290,10 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
                 continue
             p = vehicles[i]["path"]
             before, acc = vehicles[i]["s"], vehicles[i]["a"]
-            s, v = advanced(before, vehicles[i]["v"], acc, law.dt, law.weight)
+            if engine is None:
+                s, v = ballistic(before, vehicles[i]["v"], acc, law.dt)
+            else:
+                s, v = semi_implicit(before, vehicles[i]["v"], acc, law.dt)
             vehicles[i]["s"] = s
             vehicles[i]["v"] = v
             if v <= WAITING_SPEED:
@@ -299,7 +316,7 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
                 vehicles[i]["entered"] = tick
                 vehicles[i]["ahead"] = lanes[exit_arm]["last"]
                 lanes[exit_arm]["last"] = i
-            if law.powered and before < ends[p, 0] <= s:
+            if engine is not None and before < ends[p, 0] <= s:
                 exit_arm = int(ends[p, 2])
                 vehicles[i]["ahead"] = lanes[exit_arm]["tail"]
                 lanes[exit_arm]["tail"] = i

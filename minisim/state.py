@@ -14,13 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import Arrivals
-from minisim.carfollowing import BALLISTIC, SEMI_IMPLICIT
 from minisim.control import Plan, Site
 from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
-from minisim.geometry import Intersection, Path
+from minisim.geometry import Path
 from minisim.streams import stream
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import EngineVehicle
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -113,8 +112,6 @@ class Road(NamedTuple):
         section_speed: (p, k) limit from there on [m/s].
         branch: (p, p) [m], see `Intersection.branch`.
         marks: (j,) `s` of the wake-up marks, ascending, the last one infinite [m].
-        meetings: (p, p, 3), see `minisim.crossings.meetings` (engine only, else empty).
-        waits: (p, 2): waiting position past the entry and sagitta [m] (engine only, else empty).
     """
 
     ends: Floats
@@ -124,12 +121,15 @@ class Road(NamedTuple):
     section_speed: Floats
     branch: Floats
     marks: Floats
-    meetings: Floats
-    waits: Floats
 
 
 class Engine(NamedTuple):
-    """The scalars of `minisim.vehicle.EngineVehicle` (SI units)."""
+    """What a run of `minisim.vehicle.EngineVehicle` needs beside `Law` (SI units).
+
+    Attributes:
+        meetings: (p, p, 3), see `minisim.crossings.meetings`.
+        waits: (p, 2): waiting position past the junction entry, sagitta [m].
+    """
 
     cruise_speed: float
     cruise_gain: float
@@ -141,13 +141,14 @@ class Engine(NamedTuple):
     lag: float
     a_max: float
     radar: float
+    meetings: Floats
+    waits: Floats
 
 
 class Law(NamedTuple):
     """The scalars of a run: car following, lines and switches (SI units)."""
 
     dt: float
-    weight: float  # of acceleration in a step's distance, see `carfollowing.advanced`
     a: float
     b: float
     b_max: float
@@ -155,8 +156,6 @@ class Law(NamedTuple):
     min_gap: float
     delta: float
     improved: bool
-    powered: bool  # vehicles have an `engine`
-    engine: Engine
     length: float
     width: float
     entry: float  # s of the junction entry
@@ -183,7 +182,6 @@ def build_road(site: Site, plan: Plan) -> Road:
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
-    powered = isinstance(site.vehicle, EngineVehicle)
     marks = sorted(intersection.approach_length - distance for distance in plan.marks)
     return Road(
         ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
@@ -193,15 +191,7 @@ def build_road(site: Site, plan: Plan) -> Road:
         section_speed=speed,
         branch=np.array(intersection.branch(site.vehicle)),
         marks=np.array([*marks, np.inf]),
-        meetings=meetings(intersection) if powered else np.zeros((0, 0, 3)),
-        waits=_waits(intersection, site.vehicle) if powered else np.zeros((0, 2)),
     )
-
-
-def _waits(intersection: Intersection, vehicle: VehicleType) -> Floats:
-    ways = intersection.ways or ()
-    wait = [way.wait for way in ways] or [0.0] * len(intersection.paths)
-    return np.stack([np.array(wait), sagittas(intersection, vehicle.length)], axis=-1)
 
 
 def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
@@ -243,7 +233,6 @@ def build_law(
     near = record == "junction"
     return Law(
         dt=site.dt,
-        weight=SEMI_IMPLICIT if isinstance(vehicle, EngineVehicle) else BALLISTIC,
         a=vehicle.acceleration,
         b=vehicle.deceleration,
         b_max=vehicle.max_deceleration,
@@ -251,8 +240,6 @@ def build_law(
         min_gap=vehicle.min_gap,
         delta=vehicle.exponent,
         improved=vehicle.model == "iidm",
-        powered=isinstance(vehicle, EngineVehicle),
-        engine=_engine(vehicle),
         length=vehicle.length,
         width=vehicle.width,
         entry=entry,
@@ -269,9 +256,12 @@ def build_law(
     )
 
 
-def _engine(vehicle: VehicleType) -> Engine:
+def build_engine(site: Site) -> Engine | None:
+    """Collect what vehicles with an engine need; None where they have none."""
+    vehicle, intersection = site.vehicle, site.intersection
     if not isinstance(vehicle, EngineVehicle):
-        return Engine(*(0.0,) * len(Engine._fields))
+        return None
+    waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
     return Engine(
         cruise_speed=vehicle.cruise_speed,
         cruise_gain=vehicle.cruise_gain,
@@ -283,6 +273,8 @@ def _engine(vehicle: VehicleType) -> Engine:
         lag=vehicle.lag,
         a_max=vehicle.engine_acceleration,
         radar=vehicle.radar,
+        meetings=meetings(intersection),
+        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
     )
 
 
