@@ -246,7 +246,7 @@ class AsRunSession:
     def decide(self, view: View) -> Iterable[Command]:
         """One round of the rules; another one in the next step until nothing changes any more."""
         rules = self.rules
-        before = (rules.serving, list(rules.action), rules.chosen)
+        before = (list(rules.action), rules.chosen)
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
         gone = [v for v in self._desired if v not in cars]
         speeds = rules.step(cars)
@@ -262,7 +262,7 @@ class AsRunSession:
                 commands.append(Advise(vehicle, speed))
             if vehicle not in rules.chosen:
                 del self._desired[vehicle]
-        if before != (rules.serving, rules.action, rules.chosen):
+        if before != (rules.action, rules.chosen):
             commands.append(Wake(view.time + self._dt))
         return commands
 
