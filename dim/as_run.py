@@ -227,7 +227,7 @@ class AsRunSession:
         self.rules = AsRunRules(site.intersection.n, matrix, order)
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
         rules = self.rules
-        edges = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound, FREED)
+        edges = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound, FREED, CLEAR)
         if rules.red_start > self._origin:
             raise InputError(
                 f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "

@@ -39,89 +39,116 @@ def meetings(intersection: Intersection) -> Floats:
     `[p, q]` holds the kind (`Meeting`), the distance on way p from where it meets way q to the
     junction exit [m], and the width of the crossing on way p [m] (0 for `JOIN` and `PART`).
     """
-    ways = [_Curve.of(path, intersection) for path in intersection.paths]
-    table = np.zeros((len(ways), len(ways), 3))
-    for p, way in enumerate(ways):
-        for q, other in enumerate(ways):
-            if p != q:
-                table[p, q] = _meeting(way, other, intersection.lane_width)
+    curves = [_Curve.of(path, intersection) for path in intersection.paths]
+    table = np.zeros((len(curves), len(curves), 3))
+    for p, (path, curve) in enumerate(zip(intersection.paths, curves, strict=True)):
+        for q, (rival, other) in enumerate(zip(intersection.paths, curves, strict=True)):
+            if path.movement.origin == rival.movement.origin:
+                table[p, q] = (Meeting.NOWHERE, 0.0, 0.0) if p == q else _part(curve, other)
+            elif path.exit_arm == rival.exit_arm:
+                table[p, q] = _join(curve.behind_wait, other.behind_wait)
+            else:
+                width = intersection.lane_width
+                table[p, q] = _cross(curve.behind_wait, other.behind_wait, width)
     return table
 
 
 class _Curve(NamedTuple):
-    """One way: its polyline, length, waiting position, origin and exit arm."""
+    """A way or its second part: polyline, driven length and waiting position [m].
+
+    The polyline's own length may differ a little: SUMO rounds lengths, and scales positions.
+    """
 
     points: Floats
     length: float
-    wait: float
-    origin: int
-    exit_arm: int
+    wait: float = 0.0
 
     @classmethod
     def of(cls, path: Path, intersection: Intersection) -> _Curve:
         """The given curve where there is one, else the arc."""
-        points, wait = path.points, 0.0
-        if intersection.ways is not None:
-            way = intersection.ways[intersection.index(path.movement)]
-            points, wait = np.asarray(way.points, dtype=float), way.wait
         length = path.exit - path.entry
-        return cls(points, length, wait, path.movement.origin, path.exit_arm)
+        if intersection.ways is None:
+            return cls(path.points, length)
+        way = intersection.ways[intersection.index(path.movement)]
+        return cls(np.asarray(way.points, dtype=float), length, way.wait)
+
+    @property
+    def distances(self) -> Floats:
+        """Of the points along the polyline [m]."""
+        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def line(self) -> shapely.LineString:
+        """The polyline for shapely."""
+        return shapely.LineString(self.points)
+
+    @property
+    def scale(self) -> float:
+        """Driven length over the polyline's."""
+        return self.length / float(self.distances[-1])
+
+    @property
+    def backwards(self) -> _Curve:
+        """The same from its end."""
+        return self._replace(points=self.points[::-1])
+
+    @property
+    def behind_wait(self) -> _Curve:
+        """What lies behind the waiting position, a point of the polyline: what others can meet."""
+        if self.wait == 0.0:
+            return self
+        k = int(np.argmin(np.abs(self.distances - self.wait)))
+        return _Curve(self.points[k:], self.length - self.wait)
 
 
-def _meeting(way: _Curve, other: _Curve, lane_width: float) -> tuple[int, float, float]:
-    if way.origin == other.origin:
-        apart = _parted(way.points, other.points)
-        return Meeting.PART, max(way.length - apart, 0.0), 0.0
-    if way.exit_arm == other.exit_arm:
-        return Meeting.JOIN, _parted(way.points[::-1], other.points[::-1]), 0.0
-    place = _crossing(way, other)
-    if place is None:
-        return Meeting.NOWHERE, 0.0, 0.0
-    at, behind, angle = place
-    if at < way.wait or behind < other.wait:  # on a first part, which nobody meets
-        return Meeting.NOWHERE, 0.0, 0.0
-    width = lane_width * (2.0 / max(math.sin(angle), 0.2) - 1.0)
-    width = min(width, way.length - way.wait)
-    return Meeting.CROSS, way.length - max(at - width / 2.0, way.wait), width
+Place = tuple[int, float, float]
 
 
-def _crossing(way: _Curve, other: _Curve) -> tuple[float, float, float] | None:
-    """Distance from both entries to the last crossing [m], and its angle [rad]."""
-    line, across = shapely.LineString(way.points), shapely.LineString(other.points)
-    points = shapely.get_coordinates(shapely.intersection(line, across))
+def _part(way: _Curve, other: _Curve) -> Place:
+    apart = _parted(way, other) * way.scale
+    return Meeting.PART, max(way.length - apart, 0.0), 0.0
+
+
+def _join(way: _Curve, other: _Curve) -> Place:
+    return Meeting.JOIN, _parted(way.backwards, other.backwards) * way.scale, 0.0
+
+
+def _cross(way: _Curve, other: _Curve, lane_width: float) -> Place:
+    points = shapely.get_coordinates(shapely.intersection(way.line, other.line))
     if not len(points):
-        return None
-    at = max(float(line.project(shapely.Point(point))) for point in points)
-    behind = max(float(across.project(shapely.Point(point))) for point in points)
-    angle = abs(_bearing(way.points, at) - _bearing(other.points, behind)) % (2.0 * math.pi)
-    return at, behind, min(angle, 2.0 * math.pi - angle)
+        return Meeting.NOWHERE, 0.0, 0.0
+    at = max(float(way.line.project(shapely.Point(point))) for point in points)
+    behind = max(float(other.line.project(shapely.Point(point))) for point in points)
+    angle = abs(_bearing(way, at) - _bearing(other, behind)) % (2.0 * math.pi)
+    sine = math.sin(min(angle, 2.0 * math.pi - angle))
+    width = min(lane_width * (2.0 / max(sine, 0.2) - 1.0), way.length)
+    return Meeting.CROSS, way.length - max(at - width / 2.0, 0.0) * way.scale, width
 
 
-def _bearing(points: Floats, at: float) -> float:
+def _bearing(curve: _Curve, at: float) -> float:
     """Direction of the polyline's segment at a distance along it [rad]."""
-    steps = np.diff(points, axis=0)
-    ends = np.cumsum(np.linalg.norm(steps, axis=1))
-    k = min(int(np.searchsorted(ends, at)), len(steps) - 1)
+    steps = np.diff(curve.points, axis=0)
+    k = min(int(np.searchsorted(curve.distances[1:], at)), len(steps) - 1)
     return math.atan2(steps[k, 1], steps[k, 0])
 
 
-def _parted(points: Floats, others: Floats) -> float:
-    """Distance along two polylines with one beginning to where both are `DIVERGED` [m]."""
-    one, two = shapely.LineString(points), shapely.LineString(others)
-    first, second = _until_apart(points, two), _until_apart(others, one)
-    return min(max(first, second), one.length, two.length)
+def _parted(one: _Curve, two: _Curve) -> float:
+    """Distance along two curves with one beginning to where both are `DIVERGED` [m]."""
+    near = max(_until_apart(one, two), _until_apart(two, one))
+    return min(near, float(one.distances[-1]), float(two.distances[-1]))
 
 
-def _until_apart(points: Floats, other: shapely.LineString) -> float:
-    """Distance along the points to where they stay `DIVERGED` from the other line [m]."""
-    gaps = np.asarray(shapely.distance(shapely.points(points), other))
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    near = np.flatnonzero(gaps <= DIVERGED)
-    k = int(near[-1])
-    if k == len(points) - 1:
-        return float(at[-1])
+def _until_apart(curve: _Curve, other: _Curve) -> float:
+    """Distance along the curve to where it stays `DIVERGED` from the other [m]."""
+    gaps = np.asarray(shapely.distance(shapely.points(curve.points), other.line))
+    at = curve.distances
+    rounding = curve.length - float(at[-1])
+    k = int(np.flatnonzero(gaps <= DIVERGED)[-1])
+    if k == len(at) - 1:
+        return curve.length
     share = (DIVERGED - gaps[k]) / (gaps[k + 1] - gaps[k])
-    return float(at[k] + share * (at[k + 1] - at[k]))
+    return float(at[k] + share * (at[k + 1] - at[k])) + rounding
 
 
 def sagittas(intersection: Intersection, length: float) -> Floats:

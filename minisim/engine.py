@@ -24,8 +24,8 @@ from minisim.state import DRIVING, POSITION_EPS, Engine, Floats, Ints, Law, Reco
 #: Vehicles inside the junction at once, at most.
 INSIDE = 64
 
-#: SUMO's limit below which a vehicle counts as halting [m/s].
-HALTING = 0.1
+#: What a step must exceed to be none of standing, times dt [m/s²]: SUMO's `NUMERICAL_EPS_SPEED`.
+STANDSTILL = 1e-4
 
 CROSS, JOIN, PART = int(Meeting.CROSS), int(Meeting.JOIN), int(Meeting.PART)
 
@@ -161,7 +161,8 @@ def meet(
         if approaching:
             if gap + other["v"] < shortest:
                 shortest = gap + other["v"]
-                u = follow(v, gap if gap >= 0.0 else law.entry - s, other["v"], engine)
+                to_part = law.entry + waits[p, 0] - s  # of its way that the other can meet
+                u = follow(v, gap if gap >= 0.0 else to_part, other["v"], engine)
         else:
             u = min(u, follow(v, gap, other["v"], engine) if gap >= 0.0 else math.inf)
     return u
@@ -193,5 +194,5 @@ def realise(v: float, a: float, u: float, stopping: bool, law: Law, engine: Engi
     A desired speed of 0 makes SUMO ask, from the next step on, for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
-    a = engine_lag(a, u, engine.lag, law.dt)
-    return max(min(a, engine.a_max), -law.b_max, -v / law.dt)
+    a = max(min(engine_lag(a, u, engine.lag, law.dt), engine.a_max), -law.b_max)
+    return -v / law.dt if v + a * law.dt < STANDSTILL * law.dt else a

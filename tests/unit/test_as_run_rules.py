@@ -248,7 +248,7 @@ def test_the_session_reads_views_and_tells_changes_once() -> None:
 def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     plan = AsRunDim().start(four_way(profile="as_run").site()).plan
     assert isinstance(plan, Plan)
-    assert plan.marks == pytest.approx((23.7, 3.7, 0.7, -1.3, -17.3))
+    assert plan.marks == pytest.approx((23.7, 3.7, 0.7, -1.3, -17.3, -19.3))
     assert plan.reach == pytest.approx(19.3)
     assert plan.lanes_open
     assert plan.wake_on_clear
