@@ -18,7 +18,9 @@ outside; here each is a named quirk:
 6. *busy junction*: nothing is decided while anyone is between `bound` and 508 m;
 7. *green zone goes*: whoever is in the action list and within 2 m of `bound` drives on without
    any right of way, at a desired speed of 50 m/s, and keeps the junction busy;
-8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then;
+8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then; who
+   loses it in the yellow zone is told 20 m/s for one step before it is held (the authors set 20
+   first and 10 at the end of their loop, to those who still have it);
 9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
    alphabet wins, whatever its size (`order="size"` is the rule that the paper describes).
 
@@ -174,6 +176,8 @@ class AsRunRules:
                     speeds[car.id] = HELD_SPEED
                 if car.id not in self.action and len(self.action) < self.arms:
                     self.action.append(car.id)
+                if car.id in self.chosen and car.id in self.action:
+                    speeds[car.id] = EXIT_SPEED
             if car.driven > FREED and car.id in self.action:
                 self.action.remove(car.id)
             if car.driven > self.bound and car.id not in self.action:

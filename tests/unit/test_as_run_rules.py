@@ -194,6 +194,16 @@ def test_the_right_of_way_lasts_until_the_next_decision() -> None:
     assert speeds == {1: EXIT_SPEED, 2: EXIT_SPEED}
 
 
+def test_who_loses_the_right_of_way_is_told_20_for_one_step() -> None:
+    rule = rules()
+    step(rule, car("v2.c_2", 485.5))
+    assert rule.chosen == (2,)
+    speeds = step(rule, car("v2.c_2", 485.6), car("v3.b_2", 485.0))
+    assert rule.chosen == (3,)
+    assert speeds == {2: EXIT_SPEED, 3: GO_SPEED}
+    assert step(rule, car("v2.c_2", 485.7), car("v3.b_2", 485.1))[2] == HELD_SPEED
+
+
 # --- 9: lanes first ------------------------------------------------------------------------------
 
 
