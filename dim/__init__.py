@@ -1,5 +1,6 @@
 """Decentralised intersection management: vehicles that decide alone, with the same answer."""
 
+from dim.as_run import AsRunDim
 from dim.controller import Dim
 from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
@@ -7,6 +8,7 @@ from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
 
 __all__ = [
+    "AsRunDim",
     "DecisionTable",
     "Dim",
     "ExactPerception",

@@ -99,6 +99,16 @@ def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
     return s + v * dt + 0.5 * acc * dt * dt, v_new
 
 
+@njit_inline
+def semi_implicit(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
+    """Position and speed after one step of SUMO's default rule, s + v'·dt with the new speed v'.
+
+    A vehicle that would reverse stands. Source: SUMO's `step-method` (semi-implicit Euler).
+    """
+    v_new = max(v + acc * dt, 0.0)
+    return s + v_new * dt, v_new
+
+
 @njit
 def insertion_speed(
     gap: float, v_leader: float, a: float, b: float, headway: float, min_gap: float
@@ -115,3 +125,38 @@ def insertion_speed(
     root = math.sqrt(a * b)
     half = 0.5 * v_leader - root * headway
     return half + math.sqrt(half * half + 2.0 * root * room)
+
+
+@njit_inline
+def cruise_control(v: float, v0: float, gain: float, a: float, b: float) -> float:
+    """Acceleration that a cruise control asks of the engine, gain·(v0 − v) within [−b, a] [m/s²].
+
+    Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without integral term; SUMO's
+    `MSCFModel_CC::_cc`.
+    """
+    u = gain * (v0 - v)
+    return min(max(u, -b), a)
+
+
+@njit_inline
+def distance_control(
+    v: float, gap: float, v_leader: float, headway: float, gain: float, spacing: float
+) -> float:
+    """Acceleration that an ACC asks of the engine behind a leader [m/s²].
+
+    −((v − v_leader) + gain·(headway·v + spacing − gap)) / headway: in equilibrium the gap is
+    headway·v + spacing. Like SUMO, callers measure `gap` beyond the vehicle's `min_gap`.
+    Source: Rajamani 2006, eq. 6.18; SUMO's `MSCFModel_CC::_acc`.
+    """
+    return -((v - v_leader) + gain * (headway * v + spacing - gap)) / headway
+
+
+@njit_inline
+def engine_lag(a: float, u: float, lag: float, dt: float) -> float:
+    """Acceleration of the next step when the engine, now at `a`, is asked for `u` [m/s²].
+
+    First-order lag by the implicit Euler rule: α·u + (1 − α)·a with α = dt/(lag + dt).
+    Source: SUMO's `FirstOrderLagModel` (Plexe; Segata et al., VNC 2014).
+    """
+    alpha = dt / (lag + dt)
+    return alpha * u + (1.0 - alpha) * a

@@ -90,6 +90,7 @@ class Observed(NamedTuple):
         distance: from its front bumper to the junction entry [m]; negative inside.
         speed: [m/s].
         length: [m].
+        demand_time: when it wanted to enter the road [s].
     """
 
     id: int
@@ -98,6 +99,7 @@ class Observed(NamedTuple):
     distance: float
     speed: float
     length: float
+    demand_time: float = 0.0
 
     @property
     def movement(self) -> Movement:
@@ -127,7 +129,8 @@ class View(NamedTuple):
     Attributes:
         time: [s].
         vehicles: every vehicle from `Plan.sight` before the junction until its rear bumper has
-            left it; ordered by lane, then front to back (vehicles inside the junction first).
+            left it (and it is `Plan.reach` past the entry); ordered by lane, then front to back
+            (vehicles inside the junction first).
     """
 
     time: float
@@ -215,10 +218,12 @@ class Plan:
         hold_distance: the hold line's distance before the junction entry [m].
         markings: road markings of every approach lane.
         marks: wake when a front bumper passes one of these distances [m] before the junction
-            entry; 0 is the entry itself.
+            entry; 0 is the entry itself, negative is past it.
         wake_on_clear: wake when a rear bumper leaves the junction.
         period: wake every so many seconds, or None.
         sight: how far before the junction entry a view reaches [m].
+        reach: a view holds a vehicle until its front is at least this far past the junction
+            entry, even when its rear has left the junction before that [m].
         lanes_open: whether lanes start open; otherwise everyone is held until told to go.
     """
 
@@ -228,18 +233,20 @@ class Plan:
     wake_on_clear: bool = False
     period: float | None = None
     sight: float = 50.0
+    reach: float = 0.0
     lanes_open: bool = False
 
     def __post_init__(self) -> None:
         number("hold_distance [m]", self.hold_distance, low=0, high=1000)
         number("sight [m]", self.sight, low=0)
+        number("reach [m]", self.reach, low=0, high=1000)
         instance("markings", self.markings, tuple)
         for marking in self.markings:
             instance("marking", marking, Marking)
         instance("wake_on_clear", self.wake_on_clear, bool)
         instance("lanes_open", self.lanes_open, bool)
         for mark in numbers("marks [m]", self.marks):
-            number("mark [m]", mark, low=0)
+            number("mark [m]", mark, low=-1000)
         if self.period is not None:
             number("period [s]", self.period, above=0)
 

@@ -50,6 +50,32 @@ class Movement(NamedTuple):
         return f"{ARM_NAMES[self.origin]}{self.manoeuvre}"
 
 
+class Way(NamedTuple):
+    """A given curve through the junction.
+
+    Attributes:
+        points: x, y of its polyline from entry to exit [m].
+        length: what a vehicle drives on it [m]; simulators round.
+        wait: from the entry to the waiting position inside the junction that SUMO gives to some
+            far turns [m]; 0 where there is none.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    length: float
+    wait: float = 0.0
+
+    def resampled(self, count: int) -> Floats:
+        """`count` points at equal distances along it, shape (count, 2)."""
+        at = self._distances()
+        points = np.asarray(self.points, dtype=float)
+        wanted = np.linspace(0.0, at[-1], count)
+        return np.stack([np.interp(wanted, at, points[:, k]) for k in (0, 1)], axis=-1)
+
+    def _distances(self) -> Floats:
+        steps = np.linalg.norm(np.diff(np.asarray(self.points, dtype=float), axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+
 @dataclass(frozen=True)
 class Arm:
     """A road that meets the junction: its name and bearing [degrees clockwise from north]."""
@@ -149,6 +175,8 @@ class Intersection:
             smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms:
             (lane_width + KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°.
         arm_length: from the centre to the far end of each road [m].
+        ways: how each movement crosses the junction, in the order of `movements`, where that is
+            given and not an arc (another simulator's curves); None is the arcs.
     """
 
     bearings: tuple[float, ...]
@@ -156,6 +184,7 @@ class Intersection:
     lane_width: float = 3.2
     junction_radius: float = field(default=math.nan)
     arm_length: float = 500.0
+    ways: tuple[Way, ...] | None = None
 
     def __post_init__(self) -> None:
         bearings = numbers("bearings", self.bearings)
@@ -189,6 +218,7 @@ class Intersection:
                 f"{max(tightest, 0):.2g} m; a car needs {MIN_PATH_RADIUS:g} m "
                 f"(the default here is {self._default_radius:.3g} m)"
             )
+        self._check_ways()
 
     @property
     def arms(self) -> tuple[Arm, ...]:
@@ -329,6 +359,9 @@ class Intersection:
             points = start + radius * (forward * heading_in - sign * inward * left_in)
             points[-1] = end
         entry = self.approach_length
+        if self.ways is not None:
+            way = self.ways[self.index(movement)]
+            length, points = way.length, way.resampled(ARC_SEGMENTS + 1)
         return Path(
             movement=movement,
             exit_arm=self.exit_arm(movement),
@@ -340,6 +373,19 @@ class Intersection:
             heading_in=heading_in,
             heading_out=heading_out,
         )
+
+    def _check_ways(self) -> None:
+        if self.ways is None:
+            return
+        if len(self.ways) != len(self.movements):
+            raise InputError(
+                f"ways must hold {len(self.movements)} curves, one a movement, got {len(self.ways)}"
+            )
+        for movement, way in zip(self.movements, self.ways, strict=True):
+            if not isinstance(way, Way) or len(way.points) < 2:
+                raise InputError(f"ways, {movement}: a Way of two or more points is needed")
+            number(f"length of the way of {movement} [m]", way.length, low=1, high=200)
+            number(f"waiting position of {movement} [m]", way.wait, low=0, below=way.length)
 
     def _no_such(self, what: str) -> str:
         lanes = f"a … {ARM_NAMES[self.n - 1]}"

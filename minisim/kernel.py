@@ -15,10 +15,12 @@ from minisim.carfollowing import (
     idm,
     iidm,
     insertion_speed,
+    semi_implicit,
     speed_towards,
 )
+from minisim.engine import accelerate_engines
 from minisim.jit import njit, njit_inline
-from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
+from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Engine, Floats, Law, Records, Road
 
 #: Reasons to return, as bits.
 MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
@@ -36,6 +38,7 @@ def advance(
     lanes: Records,
     road: Road,
     law: Law,
+    engine: Engine | None,
     trace: Records,
     traced: int,
     bodies: Floats,
@@ -56,7 +59,7 @@ def advance(
     """
     reasons = 0
     while tick < until and reasons == 0:
-        reasons = step(vehicles, lanes, road, law, bodies, tick)
+        reasons = step(vehicles, lanes, road, law, engine, bodies, tick)
         tick += 1
         if law.record_from <= tick < law.record_to:
             traced = record(vehicles, lanes, road, law, trace, traced, tick)
@@ -66,21 +69,36 @@ def advance(
 
 
 @njit
-def step(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats, tick: int) -> int:
+def step(
+    vehicles: Records,
+    lanes: Records,
+    road: Road,
+    law: Law,
+    engine: Engine | None,
+    bodies: Floats,
+    tick: int,
+) -> int:
     """One step, from `tick` to the next; the reasons to return."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, tick):
+    if insert(vehicles, lanes, road, law, engine, tick):
         reasons |= MARK
-    if accelerate(vehicles, lanes, road, law):
+    if engine is None:
+        overlap = accelerate(vehicles, lanes, road, law)
+    else:
+        overlap = accelerate_engines(vehicles, lanes, road, law, engine)
+        hold_engines(vehicles, lanes, law)
+    if overlap:
         reasons |= GAP
-    reasons |= move(vehicles, lanes, road, law, tick + 1)
+    reasons |= move(vehicles, lanes, road, law, engine, tick + 1)
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons
 
 
 @njit
-def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
+def insert(
+    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine | None, tick: int
+) -> bool:
     """Insert on each lane the next vehicle that is due, if the gap allows; FIFO, none dropped.
 
     No faster than the vehicle ahead allows, nor comfortable braking the lower limits ahead and,
@@ -93,7 +111,7 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         i = lanes[lane]["next"]
         if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
             continue
-        s, p = law.length, vehicles[i]["path"]
+        s, p = law.length + law.slack, vehicles[i]["path"]
         section = 0
         while s >= road.section_start[p, section + 1]:
             section += 1
@@ -107,9 +125,12 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
             rear = vehicles[j]["s"] - law.length
-            safe = insertion_speed(
-                rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
-            )
+            if engine is None:
+                safe = insertion_speed(
+                    rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
+                )
+            else:  # SUMO's rule for its CC model: any speed will do
+                safe = math.inf if rear - s >= law.min_gap else -1.0
             if safe < 0.0:
                 continue
             v = min(v, safe)
@@ -243,7 +264,21 @@ def hold(v: float, s: float, law: Law) -> float:
 
 
 @njit
-def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
+def hold_engines(vehicles: Records, lanes: Records, law: Law) -> None:
+    """Stop vehicles with an engine at their hold line where they have no right of way."""
+    for lane in range(len(lanes)):
+        if lanes[lane]["open"] != 0:
+            continue
+        for i in range(lanes[lane]["front"], lanes[lane]["next"]):
+            me = vehicles[i]
+            if me["status"] == DRIVING and me["go"] == 0 and me["s"] < law.entry:
+                me["a"] = max(min(me["a"], hold(me["v"], me["s"], law)), -law.b_max)
+
+
+@njit
+def move(
+    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine | None, tick: int
+) -> int:
     """Move everybody by one step, book waiting and loss, and collect the reasons to return."""
     reasons = 0
     done = True
@@ -254,7 +289,11 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
             if vehicles[i]["status"] != DRIVING:
                 continue
             p = vehicles[i]["path"]
-            s, v = ballistic(vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["a"], law.dt)
+            before, acc = vehicles[i]["s"], vehicles[i]["a"]
+            if engine is None:
+                s, v = ballistic(before, vehicles[i]["v"], acc, law.dt)
+            else:
+                s, v = semi_implicit(before, vehicles[i]["v"], acc, law.dt)
             vehicles[i]["s"] = s
             vehicles[i]["v"] = v
             if v <= WAITING_SPEED:
@@ -274,13 +313,18 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
             if i == lanes[lane]["front"]:
                 exit_arm = int(ends[p, 2])
                 lanes[lane]["front"] = i + 1
+                vehicles[i]["entered"] = tick
                 vehicles[i]["ahead"] = lanes[exit_arm]["last"]
                 lanes[exit_arm]["last"] = i
-            if vehicles[i]["cleared"] == 0 and s - law.length >= ends[p, 0]:
+            if engine is not None and before < ends[p, 0] <= s:
+                exit_arm = int(ends[p, 2])
+                vehicles[i]["ahead"] = lanes[exit_arm]["tail"]
+                lanes[exit_arm]["tail"] = i
+            if vehicles[i]["cleared"] == 0 and s >= max(ends[p, 0] + law.length, law.leave):
                 vehicles[i]["cleared"] = 1
                 if law.wake_on_clear:
                     reasons |= CLEAR
-            if s >= ends[p, 1]:
+            if s >= ends[p, 1] - law.slack:
                 vehicles[i]["status"] = ARRIVED
                 vehicles[i]["arrival_tick"] = tick
         while (
@@ -435,5 +479,6 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen["distance"] = distance
             seen["speed"] = me["v"]
             seen["length"] = law.length
+            seen["demand_time"] = me["demand_tick"] * law.dt
             count += 1
     return count

@@ -47,6 +47,7 @@ from minisim.state import (
     OBSERVED,
     TRACE,
     Records,
+    build_engine,
     build_lanes,
     build_law,
     build_road,
@@ -202,6 +203,7 @@ class Simulation:
             record=record,
             record_window=checked_window(record_window),
         )
+        self._engine = build_engine(self.site)
         self._vehicles = build_vehicles(self.site, arrivals)
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
@@ -253,6 +255,7 @@ class Simulation:
                 self._lanes,
                 self._road,
                 self._law,
+                self._engine,
                 self._trace,
                 self._traced,
                 self._bodies,

@@ -15,11 +15,14 @@ import numpy.typing as npt
 
 from minisim.arrivals import Arrivals
 from minisim.control import Plan, Site
+from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
 from minisim.geometry import Path
 from minisim.streams import stream
+from minisim.vehicle import EngineVehicle
 
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
 #: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
@@ -50,6 +53,8 @@ VEHICLE = np.dtype(
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
+        ("entered", np.int64),  # tick of entering the junction (engine only)
+        ("stopping", np.int64),  # advised to stand in the step before (engine only)
         ("depart_tick", np.int64),
         ("arrival_tick", np.int64),
         ("waiting_ticks", np.int64),
@@ -66,6 +71,7 @@ LANE = np.dtype(
         ("uncleared", np.int64),  # first row not yet clear of the junction
         ("open", np.int64),
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
+        ("tail", np.int64),  # last row that entered the exit lane of this arm (engine only)
     ]
 )
 
@@ -90,6 +96,7 @@ OBSERVED = np.dtype(
         ("distance", np.float64),
         ("speed", np.float64),
         ("length", np.float64),
+        ("demand_time", np.float64),
     ]
 )
 
@@ -116,6 +123,28 @@ class Road(NamedTuple):
     marks: Floats
 
 
+class Engine(NamedTuple):
+    """What a run of `minisim.vehicle.EngineVehicle` needs beside `Law` (SI units).
+
+    Attributes:
+        meetings: (p, p, 3), see `minisim.crossings.meetings`.
+        waits: (p, 2): waiting position past the junction entry, sagitta [m].
+    """
+
+    cruise_speed: float
+    cruise_gain: float
+    a: float
+    b: float
+    headway: float
+    spacing_gain: float
+    spacing: float
+    lag: float
+    a_max: float
+    radar: float
+    meetings: Floats
+    waits: Floats
+
+
 class Law(NamedTuple):
     """The scalars of a run: car following, lines and switches (SI units)."""
 
@@ -131,6 +160,8 @@ class Law(NamedTuple):
     width: float
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
+    leave: float  # s until which a vehicle stays in view at least
+    slack: float  # inserted so far past its length, arrived so far before the end of the road
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # negative: the highest safe one
     wake_on_clear: bool
@@ -213,6 +244,8 @@ def build_law(
         width=vehicle.width,
         entry=entry,
         hold=entry - plan.hold_distance,
+        leave=entry + plan.reach,
+        slack=POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0,
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -222,6 +255,32 @@ def build_law(
         record_past=RECORD_PAST if near else math.inf,
     )
 
+
+def build_engine(site: Site) -> Engine | None:
+    """Collect what vehicles with an engine need; None where they have none."""
+    vehicle, intersection = site.vehicle, site.intersection
+    if not isinstance(vehicle, EngineVehicle):
+        return None
+    waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
+    return Engine(
+        cruise_speed=vehicle.cruise_speed,
+        cruise_gain=vehicle.cruise_gain,
+        a=vehicle.cruise_acceleration,
+        b=vehicle.cruise_deceleration,
+        headway=vehicle.headway,
+        spacing_gain=vehicle.spacing_gain,
+        spacing=vehicle.spacing,
+        lag=vehicle.lag,
+        a_max=vehicle.engine_acceleration,
+        radar=vehicle.radar,
+        meetings=meetings(intersection),
+        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
+    )
+
+
+#: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
+#: and counts it as arrived this far before the end of the road.
+POSITION_EPS = 0.1
 
 #: Reach of a recording of the junction alone, before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
@@ -269,4 +328,5 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
     lanes["last"] = -1
+    lanes["tail"] = -1
     return lanes

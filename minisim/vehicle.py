@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from minisim.errors import InputError, choice, number
 
-MODELS = ("idm", "iidm")
+MODELS = ("idm", "iidm", "cc")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,8 @@ class VehicleType:
             collides, and the run reports it.
         speed_deviation: standard deviation of each driver's factor on the speed limit (mean 1,
             cut to 0.2 … 2 as SUMO's speedFactor); 0 makes all drivers alike.
-        model: "idm", or "iidm" (improved IDM: keeps the gap s0 + vT up to the desired speed).
+        model: "idm", or "iidm" (improved IDM: keeps the gap s0 + vT up to the desired speed);
+            "cc" is an `EngineVehicle`.
     """
 
     length: float = 5.0
@@ -55,7 +56,7 @@ class VehicleType:
         number("min_gap [m]", self.min_gap, low=0.5, high=20)
         number("exponent", self.exponent, low=1, high=50)
         number("max_deceleration [m/s²]", self.max_deceleration, low=0, high=1000)
-        if self.max_deceleration < self.needed_braking:
+        if self.model != "cc" and self.max_deceleration < self.needed_braking:
             raise InputError(
                 f"max_deceleration must be at least {self.needed_braking:.2f} m/s², got "
                 f"{self.max_deceleration!r}: with acceleration {self.acceleration:g} and "
@@ -63,6 +64,8 @@ class VehicleType:
             )
         number("speed_deviation", self.speed_deviation, low=0, high=0.5)
         choice("car-following model", self.model, MODELS)
+        if self.model == "cc" and not isinstance(self, EngineVehicle):
+            raise InputError("the car-following model 'cc' goes with an EngineVehicle")
 
     @property
     def needed_braking(self) -> float:
@@ -73,3 +76,51 @@ class VehicleType:
         """
         a, b = self.acceleration, self.deceleration
         return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineVehicle(VehicleType):
+    """A vehicle under cruise control with an engine that lags: SUMO's car-following model `CC`.
+
+    It ignores speed limits: it drives at `cruise_speed` until a controller advises another
+    speed. Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`.
+    The defaults are those of SUMO's model (`MSCFModel_CC`, from Plexe) where the authors' vehicle
+    type does not override them; headway and spacing of the base class are the ACC's.
+
+    Attributes:
+        cruise_speed: desired speed until advised otherwise (SUMO's `ccDesiredSpeed`) [m/s].
+        cruise_gain: the cruise control's gain (`ccKp`) [1/s].
+        cruise_acceleration: its largest acceleration (`ccAccel`) [m/s²].
+        cruise_deceleration: its strongest braking (`ccDecel`) [m/s²].
+        spacing_gain: the ACC's gain on the spacing error (`lambda`) [1/s].
+        spacing: what the ACC keeps beyond headway and `min_gap`, fixed in SUMO's code [m].
+        lag: time constant of the engine (`tauEngine`) [s].
+        engine_acceleration: the most it can do (`accel`) [m/s²].
+        radar: how far it sees the vehicle ahead, fixed in SUMO's code [m].
+    """
+
+    cruise_speed: float = 14.0
+    cruise_gain: float = 1.0
+    cruise_acceleration: float = 1.5
+    cruise_deceleration: float = 1.5
+    spacing_gain: float = 0.1
+    spacing: float = 2.0
+    lag: float = 0.5
+    engine_acceleration: float = 50.0
+    radar: float = 250.0
+    headway: float = 1.5
+    model: str = "cc"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        choice("car-following model of an EngineVehicle", self.model, ("cc",))
+        number("cruise_speed [m/s]", self.cruise_speed, low=0, high=100)
+        number("cruise_gain [1/s]", self.cruise_gain, above=0, high=100)
+        number("cruise_acceleration [m/s²]", self.cruise_acceleration, above=0, high=100)
+        number("cruise_deceleration [m/s²]", self.cruise_deceleration, above=0, high=100)
+        number("spacing_gain [1/s]", self.spacing_gain, above=0, high=100)
+        number("spacing [m]", self.spacing, low=0, high=100)
+        number("lag [s]", self.lag, low=0, high=10)
+        number("engine_acceleration [m/s²]", self.engine_acceleration, above=0, high=1000)
+        number("radar [m]", self.radar, above=0, high=10_000)
+        number("headway [s]", self.headway, above=0, high=10)

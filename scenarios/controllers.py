@@ -5,18 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from baselines import FixedTime
-from dim import Dim
+from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
-from scenarios.scenario import Profile, profile_named
+from scenarios.scenario import AS_RUN, Profile, profile_named
+
+
+def _dim(profile: Profile) -> Controller:
+    """DIM as the profile has it: the authors' own rules go with the vehicle of their runs."""
+    return AsRunDim() if profile.name == AS_RUN.name else Dim()
+
 
 #: Name -> what makes the controller for a profile. A new controller needs one line here.
 CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
-    "dim": lambda _: Dim(),
+    "dim": _dim,
     "dim-harmonious": lambda _: Dim(gate="harmonious"),
     "dim-lanes": lambda _: Dim(order="lanes"),
     "dim-inflow": lambda _: Dim(priorities="inflow"),
     "dim-paper-commit": lambda _: Dim(commit="paper"),
+    "dim-as-run": lambda _: AsRunDim(),
+    "dim-as-run-size": lambda _: AsRunDim(order="size"),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
     "unregulated": lambda _: Unregulated(),

@@ -14,8 +14,9 @@ from typing import Any, Literal
 
 from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, instance, integer, numbers, show
-from minisim.geometry import Intersection
-from scenarios.scenario import Profile, Scenario, profile_named
+from minisim.geometry import Intersection, Way
+from scenarios.published import PUBLISHED_ARMS, published_ways
+from scenarios.scenario import AS_RUN, Profile, Scenario, profile_named
 
 Side = Literal["left", "right"]
 
@@ -54,6 +55,7 @@ def from_bearings(
     lane_width: float = 3.2,
     junction_radius: float = math.nan,
     arm_length: float = 500.0,
+    ways: tuple[Way, ...] | None = None,
     split: Sequence[float] | None = None,
     turns: Sequence[float] | None = None,
     model: str = "poisson",
@@ -78,6 +80,7 @@ def from_bearings(
             lane_width=lane_width,
             junction_radius=junction_radius,
             arm_length=arm_length,
+            ways=ways,
         ),
         demand=Demand(
             density=density,
@@ -124,4 +127,17 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
 
 def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scenario:
     bearings = [360.0 * i / n for i in range(n)]
+    if profile_named(options.get("profile", "paper")) == AS_RUN and _is_published(n, options):
+        options = {"ways": published_ways(n), **options}
     return from_bearings(bearings, density, **{"name": name, **options})
+
+
+def _is_published(n: int, options: dict[str, Any]) -> bool:
+    """Whether this is a junction of the paper: its arms, side and measures."""
+    radius = options.get("junction_radius")
+    return (
+        n in PUBLISHED_ARMS
+        and options.get("side", "left") == "left"
+        and not {"lane_width", "arm_length"} & set(options)
+        and radius == (FIVE_WAY_RADIUS if n == 5 else None)
+    )

@@ -27,9 +27,10 @@ ControllerName = Annotated[
     str,
     typer.Option(
         "--controller", "-c", metavar="NAME",
-        help="Who decides: dim (the paper's rules), dim-harmonious (enter beside crossing "
-        "vehicles in harmony), dim-lanes, dim-inflow, dim-paper-commit, fixed-time, "
-        "fixed-time-equal, unregulated.",
+        help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
+        "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
+        "dim-paper-commit, dim-as-run, dim-as-run-size, fixed-time, fixed-time-equal, "
+        "unregulated.",
     ),
 ]  # fmt: skip
 Density = Annotated[
@@ -54,8 +55,8 @@ ProfileName = Annotated[
     str,
     typer.Option(
         "--profile", "-p", metavar="NAME",
-        help="Vehicle and speeds: paper (what its text prescribes) or fair (one vehicle and "
-        "speed limit for every controller).",
+        help="Vehicle and speeds: paper (what its text prescribes), fair (one vehicle and "
+        "speed limit for every controller) or as_run (what produced the published numbers).",
     ),
 ]  # fmt: skip
 Side = Annotated[

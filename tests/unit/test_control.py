@@ -88,7 +88,8 @@ def test_sites_are_checked(change: dict[str, object], message: str) -> None:
     [
         ({"hold_distance": -1}, "hold_distance"),
         ({"sight": -1}, "sight"),
-        ({"marks": (1.0, -1.0)}, "mark"),
+        ({"marks": (1.0, -1001.0)}, "mark"),
+        ({"reach": -1}, "reach"),
         ({"marks": 3.0}, "marks .* must be a sequence"),
         ({"period": 0}, "period"),
         ({"markings": ("red",)}, "marking must be a Marking"),

@@ -1,0 +1,281 @@
+"""DIM as it was run for the published numbers: the authors' rules, quirks and all.
+
+The paper describes one algorithm; the runs behind its figures followed another. This module holds
+what they did, so that those runs can be replayed vehicle by vehicle, and it holds all of it: no
+other module knows of these rules. What is meant and what is a slip cannot be told apart from
+outside; here each is a named quirk:
+
+1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
+   road, and `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
+2. *speeds by decree*: nobody slows down for a zone; on entering it the desired speed is replaced
+   (14 m/s on the road, 10 in the red zone, 0 without and 10 with the right of way, 20 behind);
+3. *names decide*: vehicles are visited in the alphabetical order of their names, `v<second of
+   demand>.<lane>_<manoeuvre>`, so that v100 comes before v99;
+4. *short action list*: only as many vehicles as there are arms take part, whoever is visited
+   first; places are given back 506 m after insertion;
+5. *several of a lane*: the action list may hold two vehicles of one lane; of two with the same
+   movement only the later entry can be chosen;
+6. *busy junction*: nothing is decided while anyone is between `bound` and 508 m;
+7. *green zone goes*: whoever is in the action list and within 2 m of `bound` drives on without
+   any right of way, at a desired speed of 50 m/s, and keeps the junction busy;
+8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then; who
+   loses it in the yellow zone is told 20 m/s for one step before it is held (the authors set 20
+   first and 10 at the end of their loop, to those who still have it);
+9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
+   alphabet wins, whatever its size (`order="size"` is the rule that the paper describes).
+
+Times, lengths and speeds are those of the authors' driver (see `BOUND`, `RED` and the constants);
+whatever happens, happens at the end of a step and takes effect in the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import networkx as nx
+
+from dim.decision import ORDERS
+from dim.harmony import HarmonyMatrix
+from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
+from minisim.errors import InputError, choice, instance
+from minisim.geometry import Movement
+
+#: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
+#: numbers are the authors' (`JUNC_BOUND` of their three drivers).
+BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
+
+#: Length of the red zone before the yellow one, by number of arms [m].
+RED = {3: 20.0, 4: 20.0, 5: 25.0}
+
+YELLOW = 5.0  #: length of the yellow zone, up to the bound [m]
+GREEN = 2.0  #: of the stretch before the bound from which a vehicle goes regardless [m]
+FREED = 506.0  #: distance driven at which a place in the action list is given back [m]
+CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
+
+RED_SPEED = 10.0  #: desired in the red zone [m/s]
+HELD_SPEED = 0.0  #: desired in the yellow zone without right of way [m/s]
+GO_SPEED = 10.0  #: desired with right of way [m/s]
+GREEN_SPEED = 50.0  #: desired in the green zone [m/s]
+EXIT_SPEED = 20.0  #: desired beyond [m/s]
+
+#: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
+INSERTION = 0.1
+
+#: Room for rounding where a mark and a distance are compared [m].
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class AsRunDim:
+    """DIM as the authors ran it, for 3, 4 and 5 arms.
+
+    Attributes:
+        order: "lanes" as in every published run, or "size" as the paper describes.
+        matrix: harmony of the movements; None is the paper's table.
+
+    Raises:
+        InputError: an unknown order.
+    """
+
+    order: str = "lanes"
+    matrix: HarmonyMatrix | None = None
+
+    def __post_init__(self) -> None:
+        choice("order", self.order, ORDERS)
+        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
+
+    @property
+    def name(self) -> str:
+        """`dim-as-run`, or `dim-as-run-size`."""
+        return "dim-as-run" if self.order == "lanes" else "dim-as-run-size"
+
+    def start(self, site: Site) -> AsRunSession:
+        """Begin a run; raises `InputError` where the rules do not fit the site."""
+        n = site.intersection.n
+        if n not in BOUND:
+            raise InputError(f"the as-run rules are for 3, 4 or 5 arms, the intersection has {n}")
+        matrix = HarmonyMatrix.paper(n) if self.matrix is None else self.matrix
+        if matrix.n != n:
+            raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
+        return AsRunSession(site, matrix, self.order)
+
+
+@dataclass(frozen=True)
+class Car:
+    """What the rules know of one vehicle at one moment.
+
+    Attributes:
+        id: of the vehicle.
+        name: as in the authors' driver.
+        movement: its movement.
+        driven: distance since insertion [m].
+    """
+
+    id: int
+    name: str
+    movement: Movement
+    driven: float
+
+
+class AsRunRules:
+    """The authors' loop body: lists of vehicles and the desired speeds that follow from them.
+
+    Attributes:
+        serving: ids of those from the red zone on until they are clear.
+        action: ids of those that take part, in order of entry.
+        chosen: ids of those with the right of way.
+    """
+
+    def __init__(self, arms: int, matrix: HarmonyMatrix, order: str) -> None:
+        self.arms = arms
+        self.bound = BOUND[arms]
+        self.red_start = self.bound - YELLOW - RED[arms]
+        self.yellow_start = self.bound - YELLOW
+        self.green_start = self.bound - GREEN
+        self.matrix = matrix
+        self.order = order
+        self.serving: list[int] = []
+        self.action: list[int] = []
+        self.chosen: tuple[int, ...] = ()
+
+    def step(self, cars: Mapping[int, Car]) -> dict[int, float]:
+        """Update the lists from what is on the road; the desired speeds that are set now [m/s].
+
+        Args:
+            cars: by id, those from the start of the red zone on until they are clear.
+        """
+        speeds: dict[int, float] = {}
+        visited = sorted(cars.values(), key=lambda car: (car.name, car.id))
+        self._serve(visited, cars, speeds)
+        busy = self._visit(visited, speeds)
+        busy |= self._green(cars, speeds)
+        if not busy:
+            self.chosen = self._decide(cars)
+        for vehicle in self.chosen:
+            speeds[vehicle] = GO_SPEED
+        return speeds
+
+    def _serve(self, visited: list[Car], cars: Mapping[int, Car], speeds: dict[int, float]) -> None:
+        """Red zone: slow down, once."""
+        for car in visited:
+            if car.id not in self.serving and self.red_start <= car.driven < self.yellow_start:
+                self.serving.append(car.id)
+                speeds[car.id] = RED_SPEED
+        self.serving = [v for v in self.serving if v in cars and cars[v].driven <= CLEAR]
+
+    def _visit(self, visited: list[Car], speeds: dict[int, float]) -> bool:
+        """Yellow zone and beyond, one vehicle after the other; whether the junction is busy."""
+        busy = False
+        present = {car.id for car in visited}
+        self.action = [v for v in self.action if v in present]
+        for car in visited:
+            if self.yellow_start <= car.driven <= self.bound:
+                if car.id not in self.chosen:
+                    speeds[car.id] = HELD_SPEED
+                if car.id not in self.action and len(self.action) < self.arms:
+                    self.action.append(car.id)
+                if car.id in self.chosen and car.id in self.action:
+                    speeds[car.id] = EXIT_SPEED
+            if car.driven > FREED and car.id in self.action:
+                self.action.remove(car.id)
+            if car.driven > self.bound and car.id not in self.action:
+                speeds[car.id] = EXIT_SPEED
+            busy |= self.bound < car.driven <= CLEAR
+        return busy
+
+    def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
+        """Green zone: who takes part goes regardless; whether anyone does."""
+        going = [
+            vehicle
+            for vehicle in self.serving
+            if vehicle in self.action and cars[vehicle].driven >= self.green_start
+        ]
+        speeds.update(dict.fromkeys(going, GREEN_SPEED))
+        return bool(going)
+
+    def _decide(self, cars: Mapping[int, Car]) -> tuple[int, ...]:
+        """The ids of the winning clique; of one movement only the last entry counts."""
+        holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
+        clique = winner(self.matrix, frozenset(holder), self.order)
+        return tuple(holder[movement] for movement in clique)
+
+
+@lru_cache(maxsize=100_000)
+def winner(
+    matrix: HarmonyMatrix, movements: frozenset[Movement], order: str
+) -> tuple[Movement, ...]:
+    """The maximal clique that wins, sorted; two movements of one lane are never in harmony."""
+    graph: nx.Graph[Movement] = nx.Graph()
+    graph.add_nodes_from(movements)
+    graph.add_edges_from(
+        (a, b) for a in movements for b in movements if a < b and matrix.harmony(a, b)
+    )
+    cliques = [tuple(sorted(clique)) for clique in nx.find_cliques(graph)]
+    if order == "size":
+        return min(cliques, key=lambda clique: (-len(clique), clique), default=())
+    return min(cliques, default=())
+
+
+class AsRunSession:
+    """One run: reads the host's views, tells what changes.
+
+    Attributes:
+        rules: the authors' loop body.
+        plan: what the host has to provide: a wake-up wherever a zone begins or ends.
+    """
+
+    def __init__(self, site: Site, matrix: HarmonyMatrix, order: str) -> None:
+        instance("site", site, Site)
+        self.rules = AsRunRules(site.intersection.n, matrix, order)
+        self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
+        rules = self.rules
+        edges = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound, FREED, CLEAR)
+        if rules.red_start > self._origin:
+            raise InputError(
+                f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "
+                f"leave {self._origin:.4g} m"
+            )
+        self.plan = Plan(
+            marks=tuple(self._origin - edge for edge in edges),
+            wake_on_clear=True,
+            sight=self._origin - rules.red_start,
+            reach=max(CLEAR - self._origin, 0.0),
+            lanes_open=True,
+        )
+        self._dt = site.dt
+        self._desired: dict[int, float] = {}
+
+    def decide(self, view: View) -> Iterable[Command]:
+        """One round of the rules; another one in the next step until nothing changes any more."""
+        rules = self.rules
+        before = (list(rules.action), rules.chosen)
+        cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
+        gone = [v for v in self._desired if v not in cars]
+        speeds = rules.step(cars)
+        commands: list[Command] = []
+        for vehicle, speed in speeds.items():
+            if vehicle in cars and self._desired.get(vehicle) != speed:
+                self._desired[vehicle] = speed
+                commands.append(Advise(vehicle, speed))
+        for vehicle in gone:
+            speed = GO_SPEED if vehicle in rules.chosen else EXIT_SPEED
+            if self._desired[vehicle] != speed:
+                self._desired[vehicle] = speed
+                commands.append(Advise(vehicle, speed))
+            if vehicle not in rules.chosen:
+                del self._desired[vehicle]
+        if before != (rules.action, rules.chosen):
+            commands.append(Wake(view.time + self._dt))
+        return commands
+
+    def _car(self, vehicle: Observed) -> Car:
+        second = int(vehicle.demand_time + ROUNDING)
+        lane = "abcde"[vehicle.lane]
+        return Car(
+            id=vehicle.id,
+            name=f"v{second}.{lane}_{vehicle.manoeuvre}",
+            movement=vehicle.movement,
+            driven=self._origin - vehicle.distance + ROUNDING,
+        )
