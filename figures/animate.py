@@ -25,7 +25,7 @@ from figures.film import Film
 from minisim.errors import number
 from minisim.geometry import Floats, Intersection
 from minisim.recording import replacing
-from minisim.simulation import Run
+from minisim.run import Run
 
 #: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.
 WIDTH, HEIGHT, DPI = 7.2, 8.8, 100

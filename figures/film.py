@@ -12,7 +12,7 @@ from minisim.errors import InputError
 from minisim.geometry import Floats, Intersection, Movement
 from minisim.kernel import WAITING_SPEED
 from minisim.recording import movement_index
-from minisim.simulation import Run
+from minisim.run import Run
 
 Rows = npt.NDArray[np.int64]
 

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
     from minisim.errors import MinisimError
     from minisim.geometry import Intersection, Movement
-    from minisim.simulation import Run, Simulation, simulate
+    from minisim.run import Run
+    from minisim.simulation import Simulation, simulate
     from minisim.vehicle import VehicleType
 
 _HOME = {
@@ -30,7 +31,7 @@ _HOME = {
     "Intersection": "minisim.geometry",
     "MinisimError": "minisim.errors",
     "Movement": "minisim.geometry",
-    "Run": "minisim.simulation",
+    "Run": "minisim.run",
     "Simulation": "minisim.simulation",
     "VehicleType": "minisim.vehicle",
     "read_arrivals": "minisim.arrivals",

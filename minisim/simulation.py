@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from functools import partial
 
 import numpy as np
 
 from minisim import kernel
-from minisim.arrivals import Arrivals
 from minisim.collision import Body, Collision, touching
 from minisim.control import (
     Advise,
@@ -23,24 +18,23 @@ from minisim.control import (
     Hold,
     Observed,
     Open,
-    Plan,
-    Session,
-    Site,
     View,
     Wake,
 )
 from minisim.errors import (
-    CollisionError,
-    ControllerError,
-    InputError,
     choice,
-    instance,
-    integer,
     number,
-    numbers,
-    show,
 )
-from minisim.recording import TRAJECTORY_COLUMNS
+from minisim.hosting import (
+    AFTERMATH,
+    ON_COLLISION,
+    RECORDS,
+    ask,
+    begin,
+    checked_window,
+    collision_error,
+)
+from minisim.run import Run, ScenarioLike
 from minisim.state import (
     DRIVING,
     NEVER,
@@ -54,110 +48,7 @@ from minisim.state import (
     build_vehicles,
     first_tick,
 )
-from minisim.trips import Trips, collect_trips, summarise, trip_table
-from minisim.version import __version__
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-RECORDS = ("junction", "all")
-ON_COLLISION = ("stop", "record")
-
-#: How long a replay goes on after the collision [s].
-AFTERMATH = 2.0
-
-
-class ScenarioLike(Protocol):
-    """What a run needs of a scenario (`scenarios.Scenario` is one)."""
-
-    @property
-    def name(self) -> str:
-        """Such as "four-way"."""
-
-    @property
-    def profile_name(self) -> str:
-        """Such as "paper"."""
-
-    @property
-    def density(self) -> float:
-        """Mean inflow a lane [veh/h]."""
-
-    @property
-    def horizon(self) -> float:
-        """Simulated time [s]."""
-
-    @property
-    def depart_speed(self) -> float | None:
-        """At insertion [m/s]; None is the highest safe one."""
-
-    def site(self, seed: int) -> Site:
-        """What the controller may know."""
-
-    def arrivals(self, seed: int) -> Arrivals:
-        """The arrival table."""
-
-
-class Beginning(NamedTuple):
-    """A run that is about to begin, whoever hosts it: checked, and the session started."""
-
-    site: Site
-    arrivals: Arrivals
-    session: Session
-    plan: Plan
-
-
-def begin(scenario: ScenarioLike, controller: Controller, seed: int) -> Beginning:
-    """Check what is to be run, draw the arrivals and start the controller's session.
-
-    Raises:
-        InputError: no scenario, controller or seed, or a scenario that the controller cannot
-            serve.
-        ControllerError: the controller gave no session.
-    """
-    _check_scenario(scenario)
-    if not isinstance(controller, Controller) or isinstance(controller, type):
-        given = show(controller)
-        raise InputError(f"controller must be a Controller such as Dim(), got {given}")
-    site = scenario.site(integer("seed", seed, low=0))
-    arrivals = scenario.arrivals(seed)
-    arrivals.check(site.intersection.n)
-    session = controller.start(site)
-    return Beginning(site, arrivals, session, _plan_of(session, controller))
-
-
-def ask(
-    session: Session, view: View, tick: int, *, controller: Controller, site: Site, vehicles: int
-) -> list[Command]:
-    """Show a session its view at `tick` of a run of so many vehicles; returns its commands.
-
-    Raises:
-        ControllerError: it answered with something that cannot be carried out.
-    """
-    commands = list(session.decide(view))
-    try:
-        for command in commands:
-            _check_command(command, tick, site, vehicles)
-    except InputError as error:
-        raise ControllerError(
-            f"controller {controller.name!r} at {view.time:.1f} s: {error}"
-        ) from error
-    return commands
-
-
-def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
-    if isinstance(command, Go | Hold | Advise):
-        integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
-        if isinstance(command, Advise) and command.speed != math.inf:
-            number("advised speed [m/s]", command.speed, low=0)
-    elif isinstance(command, Open | Close):
-        integer("lane", command.lane, low=0, high=site.intersection.n - 1)
-    elif isinstance(command, Wake):
-        if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
-            raise InputError(
-                f"wake-up time {command.time:g} s is not after {round(tick * site.dt, 6):g} s"
-            )
-    else:
-        raise InputError(f"{show(command)} is not a command")
+from minisim.trips import collect_trips
 
 
 class Simulation:
@@ -409,117 +300,6 @@ def _replay(stopped: Simulation, seconds: float = 10.0) -> Run:
     return again.result()
 
 
-def collision_error(
-    collisions: Sequence[Collision],
-    scenario: ScenarioLike,
-    controller: Controller,
-    seed: int,
-    replay: Callable[..., Run],
-) -> CollisionError:
-    """What stopped a run, with a `replay` that records what led to it."""
-    what = "; ".join(str(collision) for collision in collisions)
-    where = f"scenario {scenario.name}, controller {controller.name}"
-    return CollisionError(f"{what} ({where}, seed {seed})", tuple(collisions), replay)
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """The result of a run.
-
-    Attributes:
-        scenario, controller, seed: what was run.
-        site, plan: what the controller knew and asked for.
-        collisions: each pair of vehicles once.
-        columns: the trips as arrays.
-        record: what was recorded of the trajectories.
-        trace, rows: the recording, and each row's vehicle id and path.
-        host: what moved the vehicles, for the provenance: `host` and what else to name.
-    """
-
-    scenario: ScenarioLike
-    controller: Controller
-    seed: int
-    site: Site
-    plan: Plan
-    collisions: tuple[Collision, ...]
-    columns: Trips
-    record: str | None
-    trace: Records
-    rows: Records
-    host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
-
-    @cached_property
-    def trips(self) -> pd.DataFrame:
-        """One row a trip in demand order, columns `minisim.trips.TRIP_COLUMNS`."""
-        return trip_table(self.columns)
-
-    def summary(self) -> dict[str, Any]:
-        """What was run and its means; see `minisim.trips.summarise`."""
-        return {
-            "controller": self.controller.name,
-            "scenario": self.scenario.name,
-            "profile": self.scenario.profile_name,
-            "density": self.scenario.density,
-            "seed": self.seed,
-            "horizon_s": self.scenario.horizon,
-            "host": self.host["host"],
-            **summarise(self.columns, self.site.intersection.n),
-            "collisions": len(self.collisions),
-        }
-
-    @property
-    def provenance(self) -> dict[str, str]:
-        """Version, environment and parameters: all that is needed to run it again."""
-        return {
-            "minisim": __version__,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "scenario": repr(self.scenario),
-            "controller": repr(self.controller),
-            "seed": str(self.seed),
-            **self.host,
-        }
-
-    @cached_property
-    def trajectories(self) -> pd.DataFrame:
-        """One row a vehicle and step, columns `minisim.recording.TRAJECTORY_COLUMNS`.
-
-        Raises:
-            InputError: nothing was recorded.
-        """
-        import pandas as pd
-
-        if self.record is None:
-            raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        vehicle = self.rows["id"][self.trace["row"]]
-        order = np.lexsort((vehicle, self.trace["tick"]))
-        trace, vehicle = self.trace[order], vehicle[order]
-        paths, arms = self.site.intersection.paths, self.site.intersection.arms
-        path_of = self.rows["path"][trace["row"]]
-        front = np.zeros((len(trace), 2))
-        heading = np.zeros((len(trace), 2))
-        for p in np.unique(path_of).tolist():
-            chosen = np.flatnonzero(path_of == p)
-            s = trace["s"][chosen]
-            front[chosen] = paths[p].position(s)
-            heading[chosen] = paths[p].pose(s, self.site.vehicle.length)[1]
-        manoeuvres = self.site.intersection.n - 1
-        columns = (
-            np.round(trace["tick"] * self.site.dt, 6),
-            vehicle,
-            pd.Categorical.from_codes(path_of // manoeuvres, pd.Index([arm.name for arm in arms])),
-            path_of % manoeuvres + 1,
-            trace["s"],
-            front[:, 0],
-            front[:, 1],
-            np.degrees(np.arctan2(heading[:, 0], heading[:, 1])) % 360.0,
-            trace["v"],
-            trace["a"],
-            trace["released"] != 0,
-        )
-        return pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
-
-
 def simulate(
     scenario: ScenarioLike,
     controller: Controller,
@@ -547,32 +327,3 @@ def simulate(
         record_window=record_window,
         on_collision=on_collision,
     ).run()
-
-
-def _check_scenario(scenario: object) -> None:
-    needed = ("name", "profile_name", "density", "horizon", "depart_speed", "site", "arrivals")
-    if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
-        raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-
-
-def _plan_of(session: object, controller: Controller) -> Plan:
-    plan = getattr(session, "plan", None)
-    if not isinstance(plan, Plan) or not isinstance(session, Session):
-        raise ControllerError(
-            f"controller {controller.name!r}: start() must return a Session with a Plan, "
-            f"got {show(session)}"
-        )
-    return plan
-
-
-def checked_window(window: Iterable[float]) -> tuple[float, float]:
-    """Return a `record_window`, or raise `InputError`."""
-    instance("record_window", window, tuple)
-    if not isinstance(window, tuple) or len(window) != 2:
-        raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
-    start, end = window
-    end = end if end == math.inf else number("end of record_window [s]", end)
-    start = number("start of record_window [s]", start, low=0)
-    if end < start:
-        raise InputError(f"record_window must not end before it starts, got {show(window)}")
-    return numbers("record_window", (start,))[0], end

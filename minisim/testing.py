@@ -40,7 +40,8 @@ from minisim.errors import (
     numbers,
 )
 from minisim.geometry import ARM_NAMES, Intersection
-from minisim.simulation import Run, simulate
+from minisim.run import Run
+from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
 
 #: Time to serve one vehicle that a controller may take after the demand has ended [s], and time

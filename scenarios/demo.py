@@ -22,7 +22,7 @@ from scenarios.sweep import Experiment, sweep, workers
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.simulation import Run
+    from minisim.run import Run
 
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {

@@ -11,7 +11,7 @@ import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import Command, Plan, Session, Site, View
-from minisim.simulation import Run
+from minisim.run import Run
 from scenarios import Scenario
 
 

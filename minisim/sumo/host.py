@@ -26,18 +26,17 @@ from minisim.errors import (
     choice,
     instance,
 )
-from minisim.simulation import (
+from minisim.hosting import (
     AFTERMATH,
     ON_COLLISION,
     RECORDS,
     Beginning,
-    Run,
-    ScenarioLike,
     ask,
     begin,
     checked_window,
     collision_error,
 )
+from minisim.run import Run, ScenarioLike
 from minisim.state import build_law, build_road, build_vehicles, first_tick
 from minisim.sumo.files import (
     CONFIGURATION,

@@ -13,7 +13,8 @@ from baselines import FixedTime
 from dim import Dim
 from minisim.collision import touching
 from minisim.control import Controller, Plan, Unregulated
-from minisim.simulation import Run, Simulation
+from minisim.run import Run
+from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
 from tests.runs import Fixed, digest, drained, replayed
 from tests.strategies import scenarios, vehicles

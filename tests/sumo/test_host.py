@@ -44,7 +44,7 @@ from minisim.errors import (
     SumoError,
 )
 from minisim.geometry import Intersection
-from minisim.simulation import Run
+from minisim.run import Run
 from minisim.sumo import host, network, simulate
 from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType

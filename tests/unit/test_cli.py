@@ -22,10 +22,10 @@ from minisim.errors import InputError
 from minisim.trips import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
+from scenarios.cli.report import harmony_table
+from scenarios.cli.terminal import show
 from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.demo import Tour
-from scenarios.report import harmony_table
-from scenarios.terminal import show
 
 ROOT = Path(__file__).parents[2]
 SHORT = ("--horizon", "240", "--density", "300")
@@ -416,7 +416,7 @@ def test_ctrl_c_is_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.M
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scenarios.cli.build_scenario", interrupted)
+    monkeypatch.setattr("scenarios.cli.run.build_scenario", interrupted)
     assert main(["run", "four-way"]) == 130
     assert capsys.readouterr().err == "minisim: interrupted\n"
 

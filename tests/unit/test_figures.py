@@ -27,7 +27,7 @@ from figures.film import RELEASED, Film
 from minisim.control import Plan, Unregulated
 from minisim.errors import FileError, InputError
 from minisim.geometry import Intersection
-from minisim.simulation import Run
+from minisim.run import Run
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 

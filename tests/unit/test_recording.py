@@ -26,7 +26,7 @@ from minisim.recording import (
     write_trajectories,
     write_trips,
 )
-from minisim.simulation import Run
+from minisim.run import Run
 from minisim.testing import small_scenario
 from minisim.trips import TRIP_COLUMNS
 

@@ -1,0 +1,149 @@
+"""What every host of a controller does alike: begin a run, ask the session, report a collision."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from minisim.arrivals import Arrivals
+from minisim.collision import Collision
+from minisim.control import (
+    Advise,
+    Close,
+    Command,
+    Controller,
+    Go,
+    Hold,
+    Open,
+    Plan,
+    Session,
+    Site,
+    View,
+    Wake,
+)
+from minisim.errors import (
+    CollisionError,
+    ControllerError,
+    InputError,
+    instance,
+    integer,
+    number,
+    numbers,
+    show,
+)
+from minisim.run import Run, ScenarioLike
+from minisim.state import (
+    first_tick,
+)
+
+RECORDS = ("junction", "all")
+ON_COLLISION = ("stop", "record")
+
+#: How long a replay goes on after the collision [s].
+AFTERMATH = 2.0
+
+
+class Beginning(NamedTuple):
+    """A run that is about to begin, whoever hosts it: checked, and the session started."""
+
+    site: Site
+    arrivals: Arrivals
+    session: Session
+    plan: Plan
+
+
+def begin(scenario: ScenarioLike, controller: Controller, seed: int) -> Beginning:
+    """Check what is to be run, draw the arrivals and start the controller's session.
+
+    Raises:
+        InputError: no scenario, controller or seed, or a scenario that the controller cannot
+            serve.
+        ControllerError: the controller gave no session.
+    """
+    _check_scenario(scenario)
+    if not isinstance(controller, Controller) or isinstance(controller, type):
+        given = show(controller)
+        raise InputError(f"controller must be a Controller such as Dim(), got {given}")
+    site = scenario.site(integer("seed", seed, low=0))
+    arrivals = scenario.arrivals(seed)
+    arrivals.check(site.intersection.n)
+    session = controller.start(site)
+    return Beginning(site, arrivals, session, _plan_of(session, controller))
+
+
+def ask(
+    session: Session, view: View, tick: int, *, controller: Controller, site: Site, vehicles: int
+) -> list[Command]:
+    """Show a session its view at `tick` of a run of so many vehicles; returns its commands.
+
+    Raises:
+        ControllerError: it answered with something that cannot be carried out.
+    """
+    commands = list(session.decide(view))
+    try:
+        for command in commands:
+            _check_command(command, tick, site, vehicles)
+    except InputError as error:
+        raise ControllerError(
+            f"controller {controller.name!r} at {view.time:.1f} s: {error}"
+        ) from error
+    return commands
+
+
+def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
+    if isinstance(command, Go | Hold | Advise):
+        integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
+        if isinstance(command, Advise) and command.speed != math.inf:
+            number("advised speed [m/s]", command.speed, low=0)
+    elif isinstance(command, Open | Close):
+        integer("lane", command.lane, low=0, high=site.intersection.n - 1)
+    elif isinstance(command, Wake):
+        if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
+            raise InputError(
+                f"wake-up time {command.time:g} s is not after {round(tick * site.dt, 6):g} s"
+            )
+    else:
+        raise InputError(f"{show(command)} is not a command")
+
+
+def collision_error(
+    collisions: Sequence[Collision],
+    scenario: ScenarioLike,
+    controller: Controller,
+    seed: int,
+    replay: Callable[..., Run],
+) -> CollisionError:
+    """What stopped a run, with a `replay` that records what led to it."""
+    what = "; ".join(str(collision) for collision in collisions)
+    where = f"scenario {scenario.name}, controller {controller.name}"
+    return CollisionError(f"{what} ({where}, seed {seed})", tuple(collisions), replay)
+
+
+def _check_scenario(scenario: object) -> None:
+    needed = ("name", "profile_name", "density", "horizon", "depart_speed", "site", "arrivals")
+    if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
+        raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
+
+
+def _plan_of(session: object, controller: Controller) -> Plan:
+    plan = getattr(session, "plan", None)
+    if not isinstance(plan, Plan) or not isinstance(session, Session):
+        raise ControllerError(
+            f"controller {controller.name!r}: start() must return a Session with a Plan, "
+            f"got {show(session)}"
+        )
+    return plan
+
+
+def checked_window(window: Iterable[float]) -> tuple[float, float]:
+    """Return a `record_window`, or raise `InputError`."""
+    instance("record_window", window, tuple)
+    if not isinstance(window, tuple) or len(window) != 2:
+        raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
+    start, end = window
+    end = end if end == math.inf else number("end of record_window [s]", end)
+    start = number("start of record_window [s]", start, low=0)
+    if end < start:
+        raise InputError(f"record_window must not end before it starts, got {show(window)}")
+    return numbers("record_window", (start,))[0], end

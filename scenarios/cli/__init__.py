@@ -1,0 +1,69 @@
+"""The `minisim` command: the composition root, which may import everything, and does so late.
+
+Every command imports what it needs when it runs, so that `minisim --help` is quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from minisim.errors import CollisionError, MinisimError
+from scenarios.cli.app import app
+from scenarios.cli.terminal import drop_output, prepare_streams
+
+__all__ = ["COMMANDS", "app", "main"]
+
+#: In the order of the help; the module of that name beside this one adds the command to the app.
+COMMANDS = ("demo", "run", "harmony", "decide", "animate")
+
+for _command in COMMANDS:
+    importlib.import_module(f"scenarios.cli.{_command}")
+
+#: What typer raises for a wrong command line: the parent of its public `BadParameter`.
+_USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code.
+
+    Bad input is one line on stderr and 2, a collision that stops a run or a stdout that cannot be
+    written is 1, Ctrl-C is 130. Nothing on purpose is a traceback.
+    """
+    prepare_streams()
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
+        sys.stdout.flush()
+    except CollisionError as error:
+        return _fail(str(error), 1)
+    except MinisimError as error:
+        return _fail(str(error))
+    except _USAGE_ERROR as error:
+        message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
+        help_of = [name for name in given[:1] if name in COMMANDS]
+        see = shlex.join(["minisim", *help_of, "--help"])
+        return _fail(f"{message} (typed: {shlex.join(given)}; see {see})")
+    except (KeyboardInterrupt, typer.Abort):
+        code = 130
+    except BrokenPipeError:
+        # The reader of our output has gone (as `head` does): no more to say, and no complaint.
+        drop_output()
+        return 1
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        drop_output()
+        return _fail(f"cannot write to stdout: {error.strerror or error}", 1)
+    if code == 130:
+        typer.echo("minisim: interrupted", err=True)
+    return code if isinstance(code, int) else 0
+
+
+def _fail(message: str, code: int = 2) -> int:
+    typer.echo(f"minisim: {' '.join(message.split())}", err=True)
+    return code

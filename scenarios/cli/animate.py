@@ -1,0 +1,79 @@
+"""`minisim animate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from minisim.errors import number
+from scenarios.cli.app import app
+from scenarios.cli.options import (
+    Arrivals,
+    Bearings,
+    ControllerName,
+    Density,
+    ProfileName,
+    ScenarioName,
+    Seed,
+    Side,
+    Split,
+    Turns,
+    build_scenario,
+)
+from scenarios.cli.simulate import simulate
+from scenarios.cli.terminal import bar
+
+
+@app.command(
+    epilog="[bold]Examples[/bold]\n\n"
+    "minisim animate four-way -c dim -d 350 -o dim.gif\n\n"
+    "minisim animate five-way -c fixed-time -d 300 --start 600 --seconds 120 -o signal.html"
+)
+def animate(
+    scenario: ScenarioName,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="FILE", show_default=False,
+            help="What to write: .gif, .mp4 (needs ffmpeg) or .html (a page with a player).",
+        ),
+    ],
+    controller: ControllerName = "dim",
+    start: Annotated[float, typer.Option(metavar="S", help="Simulated time to begin at.")] = 300.0,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
+    fps: Annotated[float, typer.Option(help="Frames a second; at most one a step.")] = 10.0,
+    density: Density = None,
+    split: Split = None,
+    turns: Turns = None,
+    profile: ProfileName = "paper",
+    side: Side = "left",
+    bearings: Bearings = None,
+    seed: Seed = 0,
+    arrivals: Arrivals = None,
+) -> None:  # fmt: skip
+    """Write an animation: who waits, who has the right of way, who crosses."""
+    from figures.animate import frame_times, write_animation
+    from figures.encode import animation_format
+    from scenarios.cli.files import check_apart, check_file
+    from scenarios.controllers import controller_named
+    from scenarios.scenario import profile_named
+
+    check_apart({"--arrivals": arrivals, "--out": out})
+    animation_format(out)
+    check_file(out)
+    number("--start [s]", start, low=0, high=9e6)
+    number("--seconds", seconds, above=0, high=3600)
+    frame_times(start, seconds, fps, profile_named(profile).dt)
+    what = build_scenario(
+        scenario, bearings, arrivals, density, split, turns,
+        profile=profile, side=side, horizon=start + seconds,
+    )  # fmt: skip
+    result = simulate(
+        what, controller_named(controller, profile), seed,
+        record="all", record_window=(start, start + seconds), on_collision="record",
+    )  # fmt: skip
+    with bar("drawing") as progress:
+        write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=progress)
+    typer.echo(f"wrote {out}")

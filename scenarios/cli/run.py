@@ -1,0 +1,166 @@
+"""`minisim run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from minisim.errors import InputError, choice
+from scenarios.cli.app import app
+from scenarios.cli.options import (
+    Arrivals,
+    AsJson,
+    Bearings,
+    ControllerName,
+    Density,
+    Gui,
+    Host,
+    KeepFiles,
+    ProfileName,
+    ScenarioName,
+    Seed,
+    Side,
+    Split,
+    SumoModel,
+    Turns,
+    build_scenario,
+)
+from scenarios.cli.simulate import simulate, simulate_in_sumo
+from scenarios.cli.terminal import bar, show, show_json
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from minisim.run import Run
+
+HOSTS = ("minisim", "sumo")
+
+
+@app.command(
+    epilog="Times are means over the trips that ended before the horizon, as SUMO and the paper "
+    "count them; the last row also counts what the others have waited so far.\n\n"
+    "[bold]Examples[/bold]\n\n"
+    "minisim run four-way --controller dim --density 300\n\n"
+    "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
+    "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
+    "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
+    "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
+    "[bold]Exit codes[/bold]\n\n"
+    "0 done; 1 a collision stopped the run, or stdout cannot be written; 2 bad input."
+)
+def run(
+    scenario: ScenarioName,
+    controller: ControllerName = "dim",
+    density: Density = None,
+    split: Split = None,
+    turns: Turns = None,
+    profile: ProfileName = "paper",
+    side: Side = "left",
+    bearings: Bearings = None,
+    seed: Seed = 0,
+    horizon: Annotated[float, typer.Option(metavar="S", help="Simulated time.")] = 3600.0,
+    arrivals: Arrivals = None,
+    trips: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write one row a trip (.csv or .parquet)."),
+    ] = None,
+    fcd: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write trajectories as SUMO floating-car data (XML)."),
+    ] = None,
+    trajectories: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write trajectories as a table (.csv or .parquet)."),
+    ] = None,
+    on_collision: Annotated[
+        str,
+        typer.Option(
+            metavar="stop|record", help="Stop with a report, or note the collision and go on."
+        ),
+    ] = "stop",
+    safety: Annotated[
+        bool,
+        typer.Option(
+            "--safety/--no-safety",
+            help="Measure TTC and PET, which keeps all trajectories near the junction in memory "
+            "(some 36 MB per 1000 s).",
+        ),
+    ] = True,
+    host: Host = "minisim",
+    sumo_model: SumoModel = None,
+    gui: Gui = False,
+    keep_files: KeepFiles = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
+    from minisim.recording import write_fcd, write_trajectories, write_trips
+    from minisim.safety import safety_summary
+    from scenarios.cli.files import check_apart, check_fcd, check_table
+    from scenarios.controllers import controller_named
+
+    check_apart({
+        "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
+    })  # fmt: skip
+    for table in (trips, trajectories):
+        if table is not None:
+            check_table(table)
+    if fcd is not None:
+        check_fcd(fcd)
+    what = build_scenario(
+        scenario, bearings, arrivals, density, split, turns,
+        profile=profile, side=side, horizon=horizon,
+    )  # fmt: skip
+    who = controller_named(controller, profile)
+    everything = fcd is not None or trajectories is not None
+    options = {
+        "record": "all" if everything else "junction" if safety else None,
+        "on_collision": on_collision,
+    }
+    sumo = {"model": sumo_model, "gui": gui or None, "keep_files": keep_files}
+    asked = {name: value for name, value in sumo.items() if value is not None}
+    if choice("host", host, HOSTS) == "sumo":
+        result = simulate_in_sumo(what, who, seed, **options, **asked)
+    elif asked:
+        raise InputError("--sumo-model, --gui and --keep-files need --host sumo")
+    else:
+        result = simulate(what, who, seed, **options)
+    summary = result.summary()
+    with bar("measuring"):
+        summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
+        if trips is not None:
+            write_trips(result.trips, trips)
+        if trajectories is not None:
+            write_trajectories(result.trajectories, trajectories)
+        if fcd is not None:
+            write_fcd(result.trajectories, fcd, result.site)
+    if as_json:
+        show_json(summary)
+        return
+    from scenarios.cli.report import run_table, run_title, safety_line
+
+    show(run_title(summary), run_table(summary), safety_line(summary))
+    for collision in result.collisions[:10]:
+        typer.echo(f"  {collision}")
+    for path in (trips, trajectories, fcd):
+        if path is not None:
+            typer.echo(f"  wrote {path}")
+
+
+def _near_junction(run: Run) -> pd.DataFrame:
+    """The trajectories as far as `record="junction"` keeps them.
+
+    A recording of everything then gives the same safety numbers.
+    """
+    from minisim.recording import S, movement_index
+    from minisim.state import RECORD_BEFORE, RECORD_PAST
+
+    frame, paths = run.trajectories, run.site.intersection.paths
+    if run.record == "junction":
+        return frame
+    last = np.array([path.exit + RECORD_PAST for path in paths])
+    s = frame[S].to_numpy()
+    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, run.site)])
+    return frame[near]
