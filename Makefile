@@ -31,6 +31,7 @@ lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts
 
 bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 	$(BIN)/python tests/bench/bench.py
+	$(BIN)/python tests/bench/workers.py
 
 figures: $(VENV)/.installed  ## junction and harmony graph of a decision, as in the paper
 	mkdir -p out

@@ -97,6 +97,8 @@ def _recipe(name: str, cell: Cell, profile: Profile) -> str:
         return "dim-inflow"
     if name == "fixed-time" and profile.name != FAIR.name:
         return "fixed-time-equal"
+    if name == "v2ic" and profile.name == AS_RUN.name:
+        return "v2ic-as-run-14"  # 14 m/s where the balanced runs approached at 16.6
     return name
 
 

@@ -161,3 +161,22 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_sweep_killed_twenty_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     killed_and_restarted(tmp_path, kills=20, jobs=2, seeds=60, horizon=600)
+
+
+def test_two_sweeps_may_share_a_store(tmp_path: Path) -> None:
+    file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
+    file.write_text(SWEEP.format(seeds=3, horizon=60))
+    command = [
+        sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
+        "sweep", str(file), "--out", str(path), "--jobs", "1",
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    both = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    said = [process.communicate(timeout=120)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert all(f"24 runs in {path}" in text for text in said)
+    with Store(path, create=False) as store:
+        assert len(store) == 24
