@@ -19,7 +19,7 @@ from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
 from minisim.geometry import Path
 from minisim.streams import stream
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import MODELS, EngineVehicle
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -32,6 +32,9 @@ STOP_MARGIN = 0.25
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
 #: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
 LATERAL_ACCELERATION = 5.5
+
+#: Values of `Law.model`.
+IDM, IIDM, KRAUSS, CC = range(len(MODELS))
 
 #: Values of the field `status`.
 WAITING, DRIVING, ARRIVED = 0, 1, 2
@@ -155,7 +158,8 @@ class Law(NamedTuple):
     headway: float
     min_gap: float
     delta: float
-    improved: bool
+    model: int  # car-following law, `IDM` and its siblings
+    semi_implicit: bool  # how positions follow from speeds: by `semi_implicit`, or ballistic
     length: float
     width: float
     entry: float  # s of the junction entry
@@ -239,7 +243,8 @@ def build_law(
         headway=vehicle.headway,
         min_gap=vehicle.min_gap,
         delta=vehicle.exponent,
-        improved=vehicle.model == "iidm",
+        model=MODELS.index(vehicle.model),
+        semi_implicit=vehicle.model in ("krauss", "cc"),
         length=vehicle.length,
         width=vehicle.width,
         entry=entry,
