@@ -9,7 +9,7 @@ from numbers import Real
 from baselines.signals import Heads, Phase, Program, stopping_sight
 from baselines.webster import SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, integer, number, numbers
+from minisim.errors import InputError, instance, integer, items, number, numbers
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,9 @@ class FixedTime:
         number("max_cycle [s]", self.max_cycle, above=0, high=3600)
         number("all_red [s]", self.all_red, low=0, high=60)
         if self.order is not None:
-            lanes = tuple(integer("lane", lane, low=0) for lane in numbers("order", self.order))
-            object.__setattr__(self, "order", lanes)
+            lanes = items("order", self.order, "lanes")
+            order = tuple(integer("lane in order", lane, low=0) for lane in lanes)
+            object.__setattr__(self, "order", order)
         instance("name", self.name, str)
 
     def timing(self, site: Site) -> SignalTiming:
