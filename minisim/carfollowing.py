@@ -15,6 +15,9 @@ from minisim.jit import njit, njit_inline
 #: would never end (SUMO's `NUMERICAL_EPS`, in the same place).
 STILL = 1e-3
 
+#: What a next speed must exceed to be none of standing, over dt [m/s²] (`NUMERICAL_EPS_SPEED`).
+STANDSTILL = 1e-4
+
 
 @njit_inline
 def free_road(v: float, v0: float, a: float, b: float, delta: float) -> float:
@@ -131,8 +134,8 @@ def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) ->
     Above the desired speed (a limit that begins late) it brakes at b at most.
     Source: Krauß 1998, §3.1, without the random part (SUMO's sigma = 0).
     """
-    wanted = max(v0, v - b * dt)
-    return min(v + a * dt, wanted, v_safe)
+    v_new = min(v + a * dt, max(v0, v - b * dt), v_safe)
+    return v_new if v_new >= STANDSTILL * dt else 0.0
 
 
 @njit_inline

@@ -248,6 +248,6 @@ def _cell(split: str, density: int, arms: int, controller: str) -> Cell:
     )
     if cell not in GRID and cell not in BASELINE_GRID:
         raise InputError(
-            f"the paper has no run of {cell}; 3 and 5 arms were balanced, and of DIM only"
+            f"the paper has no run of {cell}; 3 and 5 arms were balanced only, and DIM's"
         )
     return cell
