@@ -16,16 +16,13 @@ import math
 
 import numpy as np
 
-from minisim.carfollowing import cruise_control, distance_control, engine_lag
+from minisim.carfollowing import STANDSTILL, cruise_control, distance_control, engine_lag
 from minisim.crossings import Meeting
 from minisim.jit import njit, njit_inline
 from minisim.state import DRIVING, POSITION_EPS, Engine, Floats, Ints, Law, Records, Road
 
 #: Vehicles inside the junction at once, at most.
 INSIDE = 64
-
-#: What a step must exceed to be none of standing, times dt [m/s²]: SUMO's `NUMERICAL_EPS_SPEED`.
-STANDSTILL = 1e-4
 
 CROSS, JOIN, PART = int(Meeting.CROSS), int(Meeting.JOIN), int(Meeting.PART)
 

@@ -9,9 +9,16 @@ import csv
 from functools import lru_cache
 from importlib import resources
 
+import numpy as np
+
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
-from minisim.geometry import Way
+from minisim.geometry import ARM_NAMES, Way
+
+#: From 10 August 2023 on, when the runs at 4:1:4:1 were made, the authors' networks call the arms,
+#: clockwise from north, by these letters (`my_network.net.xml` of that time: b+ comes from the
+#: south, c+ from the east).
+RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
 #: Arm counts of the published junctions.
 PUBLISHED_ARMS = (3, 4, 5)
@@ -36,20 +43,26 @@ def _way(row: dict[str, str]) -> Way:
     return Way(points, float(row["length_m"]), float(row["wait_m"]))
 
 
-def published_arrivals(split: str, density: int, arms: int) -> Arrivals:
-    """The arrivals of a published DIM run.
+def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
+    """The arrivals of a published run, by the arms of our junctions (clockwise from north).
 
     Args:
         split: "balanced", "4:3:2:1" or "4:1:4:1".
         density: mean inflow a lane [veh/h].
         arms: of the junction.
+        controller: "dim", "fts", "ats" or "v2ic".
 
     Raises:
         InputError: no such run was published.
     """
     folder = resources.files("scenarios") / "data" / "arrivals"
     names = sorted(f.name for f in folder.iterdir() if f.name.endswith(".csv"))
-    wanted = f"{split.replace(':', '')}_{density}_dim_{arms}way.csv"
-    choice("published DIM run", wanted, names)
+    wanted = f"{split.replace(':', '')}_{density}_{controller}_{arms}way.csv"
+    choice("published run", wanted, names)
     with resources.as_file(folder / wanted) as path:
-        return read_arrivals(path, arms)
+        arrivals = read_arrivals(path, arms)
+    if split != RENAMED:
+        return arrivals
+    lane = np.array([ARM_NAMES.index(letter) for letter in RENAMED_ARMS]).argsort()[arrivals.lane]
+    order = np.lexsort((arrivals.manoeuvre, lane, arrivals.time))
+    return Arrivals(arrivals.time[order], lane[order], arrivals.manoeuvre[order])

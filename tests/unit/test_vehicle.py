@@ -37,7 +37,7 @@ def test_is_a_frozen_value() -> None:
         ("exponent", 0.5, "exponent"),
         ("max_deceleration", 7.9, r"max_deceleration must be at least 7\.93"),
         ("speed_deviation", 0.6, "speed_deviation"),
-        ("model", "krauss", "car-following model 'krauss'; allowed: idm, iidm"),
+        ("model", "gipps", "car-following model 'gipps'; allowed: idm, iidm, krauss"),
     ],
 )
 def test_each_field_is_checked(field: str, value: object, message: str) -> None:
