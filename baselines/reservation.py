@@ -281,27 +281,39 @@ class ReservationSession:
     def _revoke(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
     ) -> Iterator[int]:
-        """Renew what differs from its prediction; the ids of those who lose their reservation."""
+        """Renew what differs from its prediction; the ids of those who lose their reservation.
+
+        First those who can not stop: they keep theirs in any case, and if one no longer fits,
+        every reservation of those who can stop is checked again.
+        """
         slots = self.manager.slots
+        stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}
         changed: set[int] = set()
-        for vehicle in list(slots):
-            me = seen.get(vehicle)
-            if me is None or (slots[vehicle].expects(me, now) and ahead[vehicle] not in changed):
-                continue
-            changed.add(vehicle)
+        misfit = False
+        for vehicle in sorted(stops, key=stops.__getitem__):
             leader = ahead[vehicle]
-            slot = None
-            if leader is None or leader in slots:
-                slot = self.manager.predict(
-                    me, now, slots.get(leader) if leader is not None else None
-                )
+            slot: Slot | None = slots[vehicle]
+            if not slots[vehicle].expects(seen[vehicle], now) or leader in changed:
+                changed.add(vehicle)
+                slot = self._predict(seen[vehicle], now, leader)
+            elif not (misfit and stops[vehicle]):
+                continue
             if slot is not None and self.manager.fits(slot, last=False):
                 slots[vehicle] = slot
-            elif can_stop(me, self._brakes):
+            elif stops[vehicle]:
+                changed.add(vehicle)
                 del slots[vehicle]
                 yield vehicle
-            elif slot is not None:
-                slots[vehicle] = slot
+            else:
+                misfit = True
+                slots[vehicle] = slot or slots[vehicle]
+
+    def _predict(self, me: Observed, now: int, leader: int | None) -> Slot | None:
+        """A vehicle's passage behind its leader; None behind one without a reservation."""
+        ahead = None if leader is None else self.manager.slots.get(leader)
+        if leader is not None and ahead is None:
+            return None
+        return self.manager.predict(me, now, ahead)
 
     def _grant(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
@@ -309,12 +321,7 @@ class ReservationSession:
         """Grant what is possible; the ids of the new holders."""
         slots = self.manager.slots
         for vehicle in list(self._requests):
-            leader = ahead[vehicle]
-            if leader is not None and leader not in slots:
-                continue
-            slot = self.manager.predict(
-                seen[vehicle], now, slots.get(leader) if leader is not None else None
-            )
+            slot = self._predict(seen[vehicle], now, ahead[vehicle])
             if slot is not None and self.manager.fits(slot, last=True):
                 slots[vehicle] = slot
                 del self._requests[vehicle]
