@@ -1,6 +1,17 @@
 """What DIM is compared with: controllers that need infrastructure or a fixed rule."""
 
 from baselines.fixed_time import FixedTime
+from baselines.reservation import Reservation
+from baselines.v2i import V2IC
+from baselines.v2i_as_run import V2ICAsRun
 from baselines.webster import SignalTiming, webster, webster_delay
 
-__all__ = ["FixedTime", "SignalTiming", "webster", "webster_delay"]
+__all__ = [
+    "V2IC",
+    "FixedTime",
+    "Reservation",
+    "SignalTiming",
+    "V2ICAsRun",
+    "webster",
+    "webster_delay",
+]

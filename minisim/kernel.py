@@ -251,12 +251,18 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def follow(v: float, v0: float, z: float, law: Law) -> float:
-    """Acceleration of the car-following law."""
+    """Acceleration of the car-following law.
+
+    A desired speed of 0 is the IDM's limit from above: comfortable braking, and the leader's share
+    on it.
+    """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
         return (krauss(v, v0, v_safe, law.a, law.b, law.dt) - v) / law.dt
     if v0 <= 0.0:
-        return -law.b
+        if law.model == IIDM:
+            return -law.b + min(law.a * (1.0 - z * z), 0.0)
+        return -law.b - law.a * z * z
     if law.model == IIDM:
         return iidm(v, v0, z, law.a, law.b, law.delta)
     return idm(v, v0, z, law.a, law.b, law.delta)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import FixedTime
+from baselines import V2IC, FixedTime, Reservation, V2ICAsRun
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -14,6 +14,11 @@ from scenarios.scenario import AS_RUN, Profile, profile_named
 def _dim(profile: Profile) -> Controller:
     """DIM as the profile has it: the authors' own rules go with the vehicle of their runs."""
     return AsRunDim() if profile.name == AS_RUN.name else Dim()
+
+
+def _v2ic(profile: Profile) -> Controller:
+    """V2I-C as the profile has it: the published one goes with the vehicle of the paper's runs."""
+    return V2ICAsRun() if profile.name == AS_RUN.name else V2IC()
 
 
 #: Name -> what makes the controller for a profile. A new controller needs one line here.
@@ -27,6 +32,10 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
+    "v2ic": _v2ic,
+    "v2ic-as-run": lambda _: V2ICAsRun(),
+    "v2ic-as-run-14": lambda _: V2ICAsRun(approach_speed=14.0),
+    "reservation": lambda _: Reservation(),
     "unregulated": lambda _: Unregulated(),
 }
 

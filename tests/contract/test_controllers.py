@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import FixedTime
+from baselines import V2IC, FixedTime, Reservation
 from dim import Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -51,6 +51,10 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),
     FixedTime(equal_greens=True, max_cycle=90.0),
+    V2IC(),
+    V2IC(reach=100.0, period=0.2),
+    Reservation(),
+    Reservation(reach=120.0, buffer=0.0, period=0.2),
 )
 
 

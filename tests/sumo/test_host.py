@@ -20,7 +20,7 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import FixedTime
+from baselines import V2IC, FixedTime, Reservation
 from dim import Dim
 from minisim.control import (
     Advise,
@@ -89,7 +89,9 @@ def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Ru
 
 
 @pytest.mark.parametrize(
-    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
+    "controller",
+    [Dim(), Dim(gate="harmonious"), FixedTime(), V2IC(), Reservation()],
+    ids=lambda c: c.name,
 )
 def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None:
     check_controller(controller, arms=(4,), horizon=60.0, host="sumo")
@@ -97,7 +99,9 @@ def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
+    "controller",
+    [Dim(), Dim(gate="harmonious"), FixedTime(), V2IC(), Reservation()],
+    ids=lambda c: c.name,
 )
 def test_controllers_keep_their_contract_on_other_junctions(controller: Controller) -> None:
     check_controller(controller, arms=(3, 5), horizon=120.0, host=simulate)

@@ -15,11 +15,22 @@ import pytest
 import minisim
 from baselines import FixedTime
 from dim import Dim
-from minisim.control import Advise, Close, Go, Hold, Marking, Open, Plan, Unregulated, Wake
+from minisim.control import (
+    LATERAL_ACCELERATION,
+    Advise,
+    Close,
+    Go,
+    Hold,
+    Marking,
+    Open,
+    Plan,
+    Unregulated,
+    Wake,
+)
 from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.simulation import Simulation
-from minisim.state import LATERAL_ACCELERATION
 from minisim.trips import METRICS, TRIP_COLUMNS
+from minisim.vehicle import VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.runs import Fixed, digest, replayed
@@ -392,3 +403,22 @@ for scenario, controller in (
     )
     assert len(done.stdout.split()) == 3
     return done.stdout
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm"])
+def test_advised_to_stand_a_follower_still_brakes_for_its_leader(model: str) -> None:
+    """Both are told to stand, the leader later: comfortable braking alone would run into it."""
+    vehicle = VehicleType(deceleration=1.5, acceleration=3.0, max_deceleration=6.0, model=model)
+    profile = Profile(name="test", vehicle=vehicle, speed_limit=14.0)
+    scenario = replayed(four_way(100, profile=profile), (0.0, 0, 2), (0.0, 0, 2), horizon=120.0)
+    simulation = Simulation(
+        scenario, Fixed(Plan(lanes_open=True)), record="all", on_collision="record"
+    )
+    simulation.advance(20.0)
+    rows = simulation._vehicles
+    rows["v"][0], rows["advice"][:] = 2.0, 0.0  # the leader, suddenly slow
+    rows["s"][1] = rows["s"][0] - vehicle.length - 40.0
+    rows["v"][1] = 12.0  # stops in 48 m when comfortable, the leader in 1.3 m
+    simulation.advance(60.0)
+    assert simulation.collisions == ()
+    assert rows["v"][1] == 0.0
