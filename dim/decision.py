@@ -252,6 +252,7 @@ def _key(clique: Movements, order: str, ranks: tuple[int, ...]) -> tuple[int, li
 
 
 def choose(cliques: list[Movements], order: str, ranks: tuple[int, ...]) -> Movements:
+    """The clique of `maximal_cliques` that is preferred, whatever order they come in."""
     return min(cliques, key=lambda clique: _key(clique, order, ranks), default=())
 
 
