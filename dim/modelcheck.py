@@ -38,8 +38,8 @@ class Exploration:
     Attributes:
         protocol: what was searched.
         states, transitions: how many were visited.
-        complete: whether that were all; a search ends at the first unsafe state.
-        unsafe: the shortest path to two conflicting movements inside, or None.
+        complete: whether that were all; a search ends with the nearest unsafe states.
+        unsafe: the shortest paths to two conflicting movements inside, one for each such state.
         stuck: the shortest path to a state in which nobody can go on, or None.
     """
 
@@ -47,7 +47,7 @@ class Exploration:
     states: int
     transitions: int
     complete: bool
-    unsafe: Path | None
+    unsafe: tuple[Path, ...]
     stuck: Path | None
 
 
@@ -71,7 +71,7 @@ class Lasso:
 def explore(
     protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
 ) -> Exploration:
-    """Visit every reachable state, nearest first, or stop at the first unsafe one.
+    """Visit every reachable state, nearest first, or stop behind the nearest unsafe ones.
 
     Raises:
         InputError: there are more than `max_states`.
@@ -81,9 +81,12 @@ def explore(
     reached: Reached = {protocol.start: None}
     queue = deque([protocol.start])
     transitions = 0
-    unsafe = stuck = None
-    while queue and unsafe is None:
+    unsafe: list[Path] = []
+    stuck = None
+    while queue:
         state = queue.popleft()
+        if unsafe and len(_path(reached, state)) == len(unsafe[0]):
+            break
         if stuck is None and is_stuck(protocol, state):
             stuck = _path(reached, state)
         for event, after in protocol.successors(state):
@@ -93,13 +96,12 @@ def explore(
             reached[after] = state, event
             queue.append(after)
             if event.what == "enter" and protocol.conflict(after):
-                unsafe = _path(reached, after)
-                break
+                unsafe.append(_path(reached, after))
         if len(reached) > max_states:
             raise InputError(f"more than {max_states} states: too many to visit them all")
         if progress is not None and transitions % 1024 < 8:
             progress(len(reached))
-    return Exploration(protocol, len(reached), transitions, unsafe is None, unsafe, stuck)
+    return Exploration(protocol, len(reached), transitions, not unsafe, tuple(unsafe), stuck)
 
 
 def is_stuck(protocol: Protocol, state: State) -> bool:
@@ -128,9 +130,10 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
             for event, after in prompt(protocol, state):
                 if _waits(after, lane):
                     graph.add_edge(state, after, event=event)
-    parts = [graph.subgraph(p) for p in nx.strongly_connected_components(graph) if len(p) > 1]
-    fair = [part for part in parts if is_fair(protocol, _steps(part))]
-    return _shortest(protocol, nx.compose_all(fair), reached, lane) if fair else None
+    for part in list(nx.strongly_connected_components(graph)):
+        if len(part) == 1 or not is_fair(protocol, _steps(graph, part)):
+            graph.remove_nodes_from(part)
+    return _shortest(protocol, graph, reached, lane) if graph else None
 
 
 def prompt(protocol: Protocol, state: State) -> Iterator[tuple[Event, State]]:
@@ -169,7 +172,7 @@ def _shortest(
     distance: dict[State, int] = {}
     for state, came_from in reached.items():
         distance[state] = 0 if came_from is None else distance[came_from[0]] + 1
-    starts = sorted(graph, key=distance.__getitem__)
+    starts = [state for state in reached if state in graph]
     total = distance[starts[0]] + 1
     while True:
         total += 1
@@ -226,8 +229,14 @@ def is_fair(protocol: Protocol, steps: Steps) -> bool:
     return able <= moving and staying <= passing
 
 
-def _steps(graph: nx.DiGraph[State]) -> Steps:
-    return tuple((state, data["event"]) for state, _, data in graph.edges(data=True))
+def _steps(graph: nx.DiGraph[State], part: set[State]) -> Steps:
+    """All that is done without leaving `part`."""
+    return tuple(
+        (state, data["event"])
+        for state in part
+        for after, data in graph[state].items()
+        if after in part
+    )
 
 
 def _path(reached: Reached, state: State) -> Path:

@@ -107,6 +107,14 @@ KeepFiles = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Keep SUMO's network, routes, log and trips there."),
 ]
+Order = Annotated[
+    str,
+    typer.Option(
+        metavar="size|lanes",
+        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
+        "(its published runs).",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
