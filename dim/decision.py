@@ -211,7 +211,7 @@ class DecisionTable:
         return self.case(m for m in self.participants(case) if free(m))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def decision_table(
     matrix: HarmonyMatrix, order: str = "size", priorities: tuple[int, ...] | None = None
 ) -> DecisionTable:

@@ -29,6 +29,7 @@ ControllerName = Annotated[
         "--controller", "-c", metavar="NAME",
         help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
         "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
+        "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
         "dim-paper-commit, dim-as-run, dim-as-run-size, fixed-time, fixed-time-equal, "
         "unregulated.",
     ),
