@@ -31,6 +31,10 @@ from tests.runs import replayed
 #: Short roads: from insertion to the yellow zone it takes a few seconds.
 ARM_LENGTH = 80.0
 HORIZON = 2000.0
+#: After so long a few vehicles have left the junction behind [s].
+EMPTIED = 30.0
+
+LANES, TURNS = st.integers(0, 4), st.integers(1, 4)
 
 
 class Traffic(RuleBasedStateMachine):
@@ -52,7 +56,7 @@ class Traffic(RuleBasedStateMachine):
         self.time = 0.0
         self.lead = self._time_to_yellow_zone()
 
-    @rule(lane=st.integers(0, 4), manoeuvre=st.integers(1, 4))
+    @rule(lane=LANES, manoeuvre=TURNS)
     def comes_now(self, lane: int, manoeuvre: int) -> None:
         """Somebody wants to enter the road."""
         self._add(self.time, lane, manoeuvre)
@@ -61,19 +65,21 @@ class Traffic(RuleBasedStateMachine):
     def time_passes(self, tenths: int) -> None:
         self._run_to(self.time + tenths / 10)
 
-    @rule(lane=st.integers(0, 4), manoeuvre=st.integers(1, 4), tenths=st.integers(-10, 10))
+    @rule(lane=LANES, manoeuvre=TURNS, tenths=st.integers(-10, 10))
     @precondition(lambda self: self.trips)
     def comes_when_another_does(self, lane: int, manoeuvre: int, tenths: int) -> None:
         """A late arrival in the yellow zone: just as the last one rolls through it."""
         latest = max(time for time, _, _ in self.trips)
         self._add(max(self.time, latest + tenths / 10), lane, manoeuvre)
 
-    @rule(lane=st.integers(0, 4), manoeuvre=st.integers(1, 4), delay=st.integers(0, 15))
-    @precondition(lambda self: self.trips)
-    def comes_to_revoke(self, lane: int, manoeuvre: int, delay: int) -> None:
-        """Somebody comes, and time passes to when it is about to take part."""
-        self._add(self.time, lane, manoeuvre)
-        self._run_to(self.time + self.lead + delay / 10)
+    @rule(first=st.tuples(LANES, TURNS), second=st.tuples(LANES, TURNS), tenths=st.integers(0, 15))
+    def a_pair_comes(self, first: tuple[int, int], second: tuple[int, int], tenths: int) -> None:
+        """Two come on an empty road, so fast that the second may revoke what the first was given
+        when that one can no longer stop."""
+        self._run_to(self.time + EMPTIED)
+        self._add(self.time, *first)
+        self._add(self.time + tenths / 10, *second)
+        self._run_to(self.time + self.lead + 3.0)
 
     def teardown(self) -> None:
         """In the end everybody has been served."""
@@ -97,7 +103,7 @@ class Traffic(RuleBasedStateMachine):
     def _obeys(self, vehicle: Observed) -> None:
         """Who cannot stop any more before the junction has the right of way."""
         b = self.road.profile.vehicle.deceleration
-        if vehicle.distance >= 0.0 and not can_stop(vehicle, b) and vehicle.distance < 2.0:
+        if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
             assert vehicle.id in self.going
 
     def _view(self) -> View:
@@ -122,7 +128,7 @@ class Traffic(RuleBasedStateMachine):
 
 
 TestTraffic = Traffic.TestCase
-TestTraffic.settings = settings(max_examples=15, stateful_step_count=20)
+TestTraffic.settings = settings(max_examples=15, stateful_step_count=15)
 
 
 class CarelessTraffic(Traffic):
@@ -134,10 +140,10 @@ class CarelessTraffic(Traffic):
 def test_the_machine_finds_what_the_papers_commit_rule_does() -> None:
     wanted = settings(
         max_examples=60,
-        stateful_step_count=20,
+        stateful_step_count=15,
         phases=[Phase.generate],
         report_multiple_bugs=False,
         print_blob=False,
     )
-    with pytest.raises((CollisionError, AssertionError)):
+    with pytest.raises(CollisionError):
         run_state_machine_as_test(CarelessTraffic, settings=wanted)
