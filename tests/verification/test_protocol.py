@@ -31,10 +31,11 @@ def paper(n: int) -> HarmonyMatrix:
     return HarmonyMatrix.paper(n)
 
 
-def states_of(protocol: Protocol) -> list[State]:
+def states_of(protocol: Protocol, at_most: int = 10_000) -> list[State]:
+    """The nearest ones."""
     seen = {protocol.start: None}
     queue = deque(seen)
-    while queue:
+    while queue and len(seen) < at_most:
         for _, after in protocol.successors(queue.popleft()):
             if after not in seen:
                 seen[after] = None
@@ -179,7 +180,7 @@ def agents_say(protocol: Protocol, state: State, table: DecisionTable) -> list[b
 def test_in_every_state_the_agents_decide_as_the_model(gate: str, commit: str, order: str) -> None:
     protocol = Protocol(paper(3), order, gate, commit)
     table = DecisionTable(paper(3), order)
-    for state in states_of(protocol)[:1500]:
+    for state in states_of(protocol, 3000):
         after = protocol.look(state)
         assert protocol.look(after) == after
         assert [f.goes for f in after.fronts if f] == agents_say(protocol, state, table)
@@ -234,8 +235,9 @@ def test_lanes_first_with_changing_priorities_starves_nobody(priorities: str) ->
     assert starvation(Protocol(paper(3), "lanes", priorities=priorities)) == (None,) * 3
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("priorities", PRIORITIES)
+@pytest.mark.parametrize(
+    ("order", "priorities"), [("size", "fixed"), ("lanes", "rotating"), ("lanes", "waiting")]
+)
 def test_the_harmonious_gate_starves_every_lane(order: str, priorities: str) -> None:
     """Those in harmony with who is inside go on for ever past one in conflict with it."""
     protocol = Protocol(paper(3), order, "harmonious", priorities=priorities)
@@ -265,7 +267,7 @@ def test_fixed_priorities_of_4_arms() -> None:
     st.sampled_from(ORDERS),
     st.sampled_from(COMMITS),
 )
-@settings(max_examples=40)
+@settings(max_examples=30)
 def test_every_run_is_a_path_of_the_model(
     scenario: Scenario, seed: int, gate: str, order: str, commit: str
 ) -> None:
