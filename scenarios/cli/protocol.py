@@ -30,8 +30,8 @@ MAX_ARMS = 4
 
 
 @app.command(
-    epilog="Exit code 1 where the protocol is unsafe or gets stuck. 4 arms take a minute, and "
-    "much longer with --priorities rotating (two minutes, 1.2 GB) or waiting.\n\n[bold]Examples[/bold]\n\n"
+    epilog="Exit code 1 where the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
+    "--priorities rotating or waiting two minutes and a gigabyte.\n\n[bold]Examples[/bold]\n\n"
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
     "minisim protocol four-way --commit paper --counterexample two.csv\n\n"
