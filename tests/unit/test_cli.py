@@ -477,3 +477,91 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_controllers_are_called_what_they_say(name: str) -> None:
     assert controller_named(name, "fair").name == name
+
+
+# --- verify and protocol ---------------------------------------------------------------------
+
+
+def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) -> None:
+    text = ok(capsys, "verify", "four-way")
+    assert "four-way, 4 arms: all 255 cases, order size" in text
+    assert "130 (51%)" in text
+    assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
+
+
+def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(ok(capsys, "verify", "three-way", "--json"))
+    assert (found["arms"], found["cases"], found["most_cliques_tied"]) == (3, 26, 3)
+    assert all(claim["holds"] for claim in found["claims"])
+    assert found["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
+    assert found["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
+
+
+def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    (false,) = [claim for claim in found["claims"] if not claim["holds"]]
+    assert (false["name"], false["failures"]) == ("largest", 1)
+    assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
+
+
+def test_verify_draws(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    picture = tmp_path / "cases.png"
+    assert f"wrote {picture}" in ok(capsys, "verify", "four-way", "--plot", str(picture))
+    with Image.open(picture) as image:
+        assert image.width > 2 * image.height
+
+
+def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> None:
+    text = ok(capsys, "protocol", "three-way", "--order", "lanes")
+    assert "872, with 3259 transitions\n" in text
+    assert "safe         yes" in text
+    assert "live         yes" in text
+    assert "lane a       never starves" in text
+    assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
+
+
+def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    rules = ("--order", "lanes", "--priorities", "waiting")
+    found = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
+    assert found["all_states"] is True
+    assert (found["unsafe"], found["stuck"]) == ([], None)
+    assert found["starving"] == {"a": None, "b": None, "c": None}
+
+
+def test_protocol_writes_a_counterexample_that_collides(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "two.csv"
+    assert main(["protocol", "three-way", "--commit", "paper", "--counterexample", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "safe         no: arrive b1, look, roll b1, arrive a2, look," in text
+    assert f"wrote {file}" in text
+    run = ("run", "three-way", "--arrivals", str(file), "-c")
+    assert "touched" in fails(capsys, *run, "dim-paper-commit", "--horizon", "120", code=1)
+    assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
+        (("verify", "four-way", "--order", "sise"), "unknown order 'sise'"),
+        (("verify", "four-way", "--plot", "x.txt"), "a figure file ends in .png, .pdf, .svg"),
+        (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
+        (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
+        (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
+        (("protocol", "three-way", "--commit", "shut"), "unknown commit rule 'shut'"),
+        (("protocol", "three-way", "--priorities", "inflow"), "unknown priorities 'inflow'"),
+        (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
+        (("protocol", "three-way", "--counterexample", "/nowhere/x.csv"), "there is no folder"),
+        (("protocol", "three-way", "--counterexample", "x.csv"), "there is no counterexample"),
+    ],
+)
+def test_bad_input_to_the_proofs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert message in fails(capsys, *arguments)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,333 @@
+"""All states of the protocol: safe, live, and who starves; the agents decide as the model does."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import minisim
+from dim import DecisionTable, Dim, HarmonyMatrix
+from dim.agent import GATES, Agent, Rules
+from dim.conformance import Checked, ConformanceError
+from dim.decision import ORDERS
+from dim.modelcheck import Lasso, explore, is_stuck, starvation
+from dim.perception import COMMITS, Percept
+from dim.protocol import COMMITTED, PRIORITIES, ROLLING, WAITING, Event, Front, Protocol, State
+from minisim.control import Go, Hold, Site, View
+from minisim.errors import InputError
+from scenarios import Scenario, four_way, three_way
+from scenarios.counterexample import colliding_arrivals
+from tests.runs import digest, drained
+from tests.strategies import scenarios
+
+
+@cache
+def paper(n: int) -> HarmonyMatrix:
+    return HarmonyMatrix.paper(n)
+
+
+def states_of(protocol: Protocol, at_most: int = 10_000) -> list[State]:
+    """The nearest ones."""
+    seen = {protocol.start: None}
+    queue = deque(seen)
+    while queue and len(seen) < at_most:
+        for _, after in protocol.successors(queue.popleft()):
+            if after not in seen:
+                seen[after] = None
+                queue.append(after)
+    return list(seen)
+
+
+# --- safety and liveness ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("n", "gate", "states"),
+    [
+        (3, "clear", 872),
+        (3, "harmonious", 2620),
+        (4, "clear", 37552),
+        pytest.param(4, "harmonious", 165632, marks=pytest.mark.slow),
+    ],
+)
+def test_the_stoppable_rule_is_safe_and_never_stuck(n: int, gate: str, states: int) -> None:
+    found = explore(Protocol(paper(n), gate=gate))
+    assert (found.complete, found.unsafe, found.stuck) == (True, (), None)
+    assert found.states == states
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("priorities", PRIORITIES)
+@pytest.mark.parametrize("gate", GATES)
+def test_so_it_is_whoever_comes_first(gate: str, priorities: str, order: str) -> None:
+    found = explore(Protocol(paper(3), order, gate, priorities=priorities))
+    assert (found.complete, found.unsafe, found.stuck) == (True, (), None)
+
+
+@pytest.mark.parametrize(("n", "gate"), [(3, "clear"), (3, "harmonious"), (4, "clear")])
+def test_the_papers_commit_rule_is_not_safe(n: int, gate: str) -> None:
+    found = explore(Protocol(paper(n), gate=gate, commit="paper"))
+    assert not found.complete
+    assert found.stuck is None
+    assert {len(path) for path in found.unsafe} == {11}
+    for path in found.unsafe:
+        assert sum(event.what == "arrive" for event in path) == 2
+
+
+@pytest.mark.parametrize(
+    "scenario", [three_way(), three_way(profile="fair")], ids=["paper", "fair"]
+)
+def test_its_counterexample_collides_in_the_simulator(scenario: Scenario) -> None:
+    site = scenario.site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    paths = explore(Protocol(matrix, commit="paper")).unsafe
+    dim = Dim(commit="paper")
+    arrivals = colliding_arrivals(scenario, dim, paths)
+    assert arrivals is not None
+    assert len(arrivals) == 2
+    scenario = replace(scenario, recorded=arrivals, horizon=200.0)
+    assert minisim.simulate(scenario, dim, on_collision="record").collisions
+    run = minisim.simulate(scenario, Dim())
+    assert run.columns.arrived.all()
+
+
+def test_safe_paths_collide_nowhere() -> None:
+    path = (Event("arrive", 0, 2), Event("arrive", 1, 2))
+    short = replace(four_way(), horizon=100.0)
+    assert colliding_arrivals(short, Dim(), [path]) is None
+
+
+def test_with_the_stoppable_rule_all_who_go_are_in_harmony() -> None:
+    """Why it is safe: an invariant of all states."""
+    for gate in GATES:
+        protocol = Protocol(paper(3), gate=gate)
+        for state in states_of(protocol):
+            going = state.inside
+            for lane, front in enumerate(state.fronts):
+                if front is not None and front.goes:
+                    going |= 1 << lane * 2 + front.manoeuvre - 1
+            assert protocol.conflict(State((None,) * 3, going)) is None
+
+
+def test_a_stuck_state_is_found() -> None:
+    protocol = Protocol(paper(4))
+    assert not is_stuck(protocol, protocol.start)
+    silent = Front(2, WAITING, False)
+    assert not is_stuck(protocol, State((silent, None, None, None)))
+    # Somebody committed without the right of way would block the others for ever...
+    waiting = State((Front(2, COMMITTED, False), silent, None, None))
+    assert not is_stuck(protocol, waiting)  # ...but others grant it that.
+
+    class Mute(Protocol):
+        def look(self, state: State) -> State:
+            return state
+
+    assert is_stuck(Mute(paper(4)), State((silent, None, None, None)))
+
+
+def test_too_many_states_are_refused() -> None:
+    with pytest.raises(InputError, match="more than 100 states"):
+        explore(Protocol(paper(4)), max_states=100)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"matrix": "paper"}, "matrix must be a HarmonyMatrix"),
+        ({"order": "sizes"}, "unknown order 'sizes'"),
+        ({"gate": "closed"}, "unknown gate 'closed'"),
+        ({"commit": "never"}, "unknown commit rule 'never'"),
+        ({"priorities": "inflow"}, "unknown priorities 'inflow'"),
+    ],
+)
+def test_rules_are_checked(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Protocol(**{"matrix": paper(4), **arguments})  # type: ignore[arg-type]
+
+
+# --- the agents ------------------------------------------------------------------------------
+
+
+def agents_say(protocol: Protocol, state: State, table: DecisionTable) -> list[bool]:
+    """Whether each front vehicle goes after it has looked, by its own agent."""
+    n, movements = protocol.matrix.n, protocol.matrix.movements
+    present = [(lane, f) for lane, f in enumerate(state.fronts) if f is not None]
+    participants = [(lane, f) for lane, f in present if f.phase != COMMITTED]
+    crossing = [(lane, f) for lane, f in present if f.phase == COMMITTED]
+    inside = [k for k in range(len(movements)) if state.inside >> k & 1]
+    percept = Percept(
+        participants=tuple(lane for lane, _ in participants),
+        crossing=tuple(lane for lane, _ in crossing) + tuple(100 + k for k in inside),
+        case=sum(f.manoeuvre * n**lane for lane, f in participants),
+        occupied=state.inside | sum(1 << lane * (n - 1) + f.manoeuvre - 1 for lane, f in crossing),
+    )
+    answers = []
+    for lane, front in present:
+        agent = Agent(lane, lane, Rules(table, protocol.gate, protocol.commit))
+        agent.right_of_way = front.goes
+        answers.append(agent.decide(percept))
+    return answers
+
+
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("commit", COMMITS)
+@pytest.mark.parametrize("order", ORDERS)
+def test_in_every_state_the_agents_decide_as_the_model(gate: str, commit: str, order: str) -> None:
+    protocol = Protocol(paper(3), order, gate, commit)
+    table = DecisionTable(paper(3), order)
+    for state in states_of(protocol, 3000):
+        after = protocol.look(state)
+        assert protocol.look(after) == after
+        assert [f.goes for f in after.fronts if f] == agents_say(protocol, state, table)
+
+
+# --- starvation ------------------------------------------------------------------------------
+
+
+def replay(protocol: Protocol, lasso: Lasso) -> None:
+    """Follow a lasso: everybody looks after each event, and the vehicle never goes."""
+    state = protocol.start
+    for event in lasso.stem:
+        state = follow(protocol, state, event)
+    first = state
+    for event in lasso.cycle:
+        front = state.fronts[lasso.lane]
+        assert front is not None
+        assert (front.phase, front.goes) == (WAITING, False)
+        state = follow(protocol, state, event)
+    assert state == first
+    assert any(event.what == "enter" for event in lasso.cycle)
+
+
+def follow(protocol: Protocol, state: State, event: Event) -> State:
+    (after,) = [after for possible, after in protocol.successors(state) if possible == event]
+    return protocol.look(after)
+
+
+def test_fixed_priorities_starve_all_but_the_first_lane() -> None:
+    protocol = Protocol(paper(3), "lanes")
+    first, *others = starvation(protocol)
+    assert first is None
+    for lane, lasso in enumerate(others, start=1):
+        assert lasso is not None
+        assert lasso.lane == lane
+        assert (len(lasso.stem), len(lasso.cycle)) == (2, 4)
+        replay(protocol, lasso)
+
+
+@pytest.mark.parametrize("priorities", PRIORITIES)
+def test_largest_first_starves_every_lane_whoever_comes_first(priorities: str) -> None:
+    protocol = Protocol(paper(3), "size", priorities=priorities)
+    for lasso in starvation(protocol):
+        assert lasso is not None
+        replay(protocol, lasso)
+        if priorities == "rotating":
+            assert "turn" in {event.what for event in lasso.cycle}
+
+
+@pytest.mark.parametrize("priorities", ["rotating", "waiting"])
+def test_lanes_first_with_changing_priorities_starves_nobody(priorities: str) -> None:
+    assert starvation(Protocol(paper(3), "lanes", priorities=priorities)) == (None,) * 3
+
+
+@pytest.mark.parametrize(
+    ("order", "priorities"), [("size", "fixed"), ("lanes", "rotating"), ("lanes", "waiting")]
+)
+def test_the_harmonious_gate_starves_every_lane(order: str, priorities: str) -> None:
+    """Those in harmony with who is inside go on for ever past one in conflict with it."""
+    protocol = Protocol(paper(3), order, "harmonious", priorities=priorities)
+    for lasso in starvation(protocol):
+        assert lasso is not None
+        replay(protocol, lasso)
+
+
+@pytest.mark.slow
+def test_fixed_priorities_of_4_arms() -> None:
+    protocol = Protocol(paper(4), "lanes")
+    first, *others = starvation(protocol)
+    assert first is None
+    for lasso in others:
+        assert lasso is not None
+        assert (len(lasso.stem), len(lasso.cycle)) == (2, 4)
+        replay(protocol, lasso)
+
+
+# --- simulated runs are paths of the model ---------------------------------------------------
+
+
+@given(
+    scenarios(max_arms=5, max_density=600.0, horizon=60.0),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(GATES),
+    st.sampled_from(ORDERS),
+    st.sampled_from(COMMITS),
+)
+@settings(max_examples=30)
+def test_every_run_is_a_path_of_the_model(
+    scenario: Scenario, seed: int, gate: str, order: str, commit: str
+) -> None:
+    dim = Dim(gate=gate, order=order, commit=commit)
+    scenario = drained(scenario, seed, 1500.0)
+    checked = minisim.simulate(scenario, Checked(dim), seed=seed, on_collision="record")
+    plain = minisim.simulate(scenario, dim, seed=seed, on_collision="record")
+    assert digest(checked) == digest(plain)
+
+
+def test_a_run_that_leaves_the_model_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One rule of the model is not the one of the session: each shows."""
+    scenario = four_way(density=350.0, horizon=300.0)
+
+    def run(dim: Dim, **model: str) -> None:
+        start = Checked.start
+
+        def other(self: Checked, site: Site) -> object:
+            session = start(self, site)
+            session.protocol = replace(session.protocol, **model)
+            return session
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Checked, "start", other)
+            minisim.simulate(scenario, Checked(dim), seed=1, on_collision="record")
+
+    run(Dim())
+    for dim, model in [
+        (Dim(), {"gate": "harmonious"}),
+        (Dim(gate="harmonious"), {"gate": "clear"}),
+        (Dim(order="lanes"), {"order": "size"}),
+        (Dim(commit="paper"), {"commit": "stoppable"}),
+    ]:
+        with pytest.raises(ConformanceError, match=r"at [0-9.]+ s"):
+            run(dim, **model)
+
+
+@pytest.mark.parametrize("wrong", ["everybody goes", "nobody goes"])
+def test_a_session_that_disobeys_is_found(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    kind = Go if wrong == "everybody goes" else Hold
+
+    def decide(self: object, view: View) -> list[Go | Hold]:
+        return [kind(v.id) for v in view.vehicles]
+
+    monkeypatch.setattr("dim.controller.DimSession.decide", decide)
+    with pytest.raises(ConformanceError):
+        minisim.simulate(four_way(horizon=300.0), Checked(Dim()), seed=1, on_collision="record")
+
+
+def test_only_the_lanes_own_priorities_are_checked() -> None:
+    with pytest.raises(InputError, match="own priorities only"):
+        Checked(Dim(priorities="rotating"))
+    assert Checked(Dim(gate="harmonious")).name == "dim-harmonious"
+
+
+def test_rolling_is_known_to_the_papers_rule_only() -> None:
+    phases = {
+        commit: {
+            f.phase for s in states_of(Protocol(paper(3), commit=commit)) for f in s.fronts if f
+        }
+        for commit in COMMITS
+    }
+    assert phases == {"stoppable": {WAITING, COMMITTED}, "paper": {WAITING, ROLLING, COMMITTED}}
