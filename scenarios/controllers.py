@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import V2IC, FixedTime, Reservation, V2ICAsRun
+from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation, V2ICAsRun
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -36,6 +36,9 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
+    "adaptive": lambda _: Adaptive(),
+    "all-way-stop": lambda _: AllWayStop(),
+    "longest-queue": lambda _: LongestQueue(),
     "v2ic": _v2ic,
     "v2ic-as-run": lambda _: V2ICAsRun(),
     "v2ic-as-run-14": lambda _: V2ICAsRun(approach_speed=14.0),

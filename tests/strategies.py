@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from hypothesis import settings
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from minisim.arrivals import Demand
 from minisim.geometry import MIN_ANGLE, Intersection, Movement
 from minisim.vehicle import VehicleType
-from scenarios.scenario import FAIR, PAPER, Profile, Scenario
+from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario
 
 SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 
@@ -119,4 +120,20 @@ def scenarios(
         demand=draw(demands(intersection.n, max_density)),
         profile=draw(profiles()),
         horizon=horizon,
+    )
+
+
+@st.composite
+def emptying(draw: st.DrawFn) -> Scenario:
+    """A random junction with demand for a minute, then an hour for any rule to serve it."""
+    intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
+    demand = draw(demands(intersection.n))
+    arrivals = demand.draw(intersection.n, 60.0, seed=draw(st.integers(0, 1000)))
+    return Scenario(
+        name="random",
+        intersection=intersection,
+        demand=demand,
+        profile=PROFILES[draw(st.sampled_from(sorted(PROFILES)))],
+        horizon=3600.0,
+        recorded=arrivals,
     )

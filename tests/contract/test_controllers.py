@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import V2IC, FixedTime, Reservation
+from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -54,6 +54,12 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),
     FixedTime(equal_greens=True, max_cycle=90.0),
+    Adaptive(),
+    Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
+    LongestQueue(),
+    LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
+    AllWayStop(),
+    AllWayStop(reaction=0.0),
     V2IC(),
     V2IC(reach=100.0, period=0.2),
     Reservation(),

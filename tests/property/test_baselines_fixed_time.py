@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
 from baselines import FixedTime
 from minisim.safety import encroachments
-from scenarios.scenario import PROFILES, Scenario
-from tests.strategies import demands, floats, intersections
-
-#: Demand for a minute, then time for any of these signals to serve it [s].
-DEMAND_TIME, HORIZON = 60.0, 3600.0
+from scenarios.scenario import Scenario
+from tests.strategies import emptying, floats
 
 
 @st.composite
@@ -24,22 +19,6 @@ def signals(draw: st.DrawFn) -> FixedTime:
         greens=draw(st.none() | floats(2.0, 20.0)),
         amber=draw(st.sampled_from([0.0, 2.0, 3.03])),
         all_red=draw(st.sampled_from([0.0, 1.0])),
-    )
-
-
-@st.composite
-def emptying(draw: st.DrawFn) -> Scenario:
-    """A random junction whose demand ends long before the run does."""
-    intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
-    demand = draw(demands(intersection.n))
-    arrivals = demand.draw(intersection.n, DEMAND_TIME, seed=draw(st.integers(0, 1000)))
-    return Scenario(
-        name="random",
-        intersection=intersection,
-        demand=demand,
-        profile=PROFILES[draw(st.sampled_from(sorted(PROFILES)))],
-        horizon=HORIZON,
-        recorded=arrivals,
     )
 
 
