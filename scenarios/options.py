@@ -98,7 +98,8 @@ Host = Annotated[
 SumoModel = Annotated[
     str | None,
     typer.Option(
-        metavar="IDM|Krauss", help="SUMO's car-following model; IDM by default.",
+        metavar="IDM|Krauss|CC",
+        help="SUMO's car-following model; by default CC under the profile as_run, else IDM.",
         show_default=False,
     ),
 ]  # fmt: skip
@@ -106,6 +107,10 @@ Gui = Annotated[bool, typer.Option("--gui", help="Show the run in sumo-gui.")]
 KeepFiles = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Keep SUMO's network, routes, log and trips there."),
+]
+SumoFcd = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write SUMO's own floating-car data (XML) of every step."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
