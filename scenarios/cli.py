@@ -178,7 +178,7 @@ def run(
         str,
         typer.Option(
             metavar="stop|record|teleport",
-            help="Stop with a report; note the collision and go on; or, in SUMO only, do as it does "
+            help="Stop with a report; note the collision and go on; or, in SUMO only, what it does "
             "by default and did in the published runs: take who ran into another off the road.",
         ),
     ] = "stop",

@@ -514,7 +514,7 @@ def test_wrong_arguments_are_told(options: dict[str, Any], message: str) -> None
 def test_sumo_has_no_improved_idm() -> None:
     profile = replace(FAIR, vehicle=VehicleType(model="iidm"))
     scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
-    with pytest.raises(InputError, match="IDM does not drive vehicles of the model 'iidm'; .*Krau"):
+    with pytest.raises(InputError, match=r"IDM does not drive .* 'iidm'; choose Krauss"):
         simulate(scenario, Unregulated())
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 
