@@ -145,8 +145,6 @@ def demo(
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
-    "minisim run four-way -c dim --profile as_run --arrivals FILE --host sumo "
-    "--on-collision record\n\n"
     "[bold]Exit codes[/bold]\n\n"
     "0 done; 1 a collision stopped the run, or stdout cannot be written; 2 bad input."
 )
