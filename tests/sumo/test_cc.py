@@ -109,23 +109,32 @@ def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
 
 
-@pytest.mark.parametrize(
-    ("controller", "dt"),
-    [(FixedTime(), 0.05), pytest.param(AsRunDim(), 0.01, marks=pytest.mark.slow)],
-    ids=lambda value: getattr(value, "name", ""),
-)
-def test_the_contract_holds_with_the_vehicle_of_the_published_runs(
-    controller: Controller, dt: float
-) -> None:
-    """`check_controller` has vehicles of its own; here they are those of the profile."""
+def test_the_contract_holds_with_the_vehicle_of_the_published_runs() -> None:
+    """`check_controller` has vehicles of its own; here they are those of the profile.
+
+    `AsRunDim` is outside the contract in every host: it still advises vehicles that have left its
+    view, as the authors' driver does.
+    """
 
     def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
-        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=dt, depart_speed=0.0)
+        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=0.05, depart_speed=0.0)
         return simulate(small, controller, seed, **options)
 
     check_controller(
-        controller, arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
+        FixedTime(), arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
     )
+
+
+def test_the_same_replay_gives_the_same_trips_twice() -> None:
+    scenario = until(replay("balanced", 150, 4), 100.0)
+    first, second = (
+        simulate(scenario, AsRunDim(), on_collision="record", record=kind)
+        for kind in (None, "junction")
+    )
+    assert first.trips.drop(columns="time_loss_s").equals(second.trips.drop(columns="time_loss_s"))
+    # one is glanced at now and then after the junction, the other is watched a little longer
+    loss = (first.columns.time_loss - second.columns.time_loss)[first.columns.departed]
+    assert np.abs(loss).max() < 0.05
 
 
 @pytest.mark.parametrize("hold_distance", [0.0, 20.0])
