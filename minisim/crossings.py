@@ -1,8 +1,8 @@
 """Where two ways through a junction meet, as SUMO sees it.
 
-SUMO's vehicles follow not only who is ahead of them, but also who is about to cross or join their
-way inside the junction. This is the table of those places: for every two movements, how far before
-the end of its own way each of them is when it meets the other, and how wide the other is there.
+SUMO's vehicles follow not only who is ahead of them, but also who is about to join their way inside
+the junction, or has just left it. This is the table of those places: for every two movements, how
+far before the end of its own way each of them is when it meets the other.
 Source: `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.28).
 """
 
@@ -28,28 +28,26 @@ class Meeting(IntEnum):
     """How two ways meet."""
 
     NOWHERE = 0
-    CROSS = 1
-    JOIN = 2  # they end in one exit lane
-    PART = 3  # they begin on one approach lane
+    JOIN = 1  # they end in one exit lane
+    PART = 2  # they begin on one approach lane
 
 
 def meetings(intersection: Intersection) -> Floats:
-    """How, where and how wide every two movements meet, shape (m, m, 3).
+    """How and where every two movements meet, shape (m, m, 2).
 
-    `[p, q]` holds the kind (`Meeting`), the distance on way p from where it meets way q to the
-    junction exit [m], and the width of the crossing on way p [m] (0 for `JOIN` and `PART`).
+    `[p, q]` holds the kind (`Meeting`) and the distance on way p from where it meets way q to the
+    junction exit [m].
     """
     curves = [_Curve.of(path, intersection) for path in intersection.paths]
-    table = np.zeros((len(curves), len(curves), 3))
+    table = np.zeros((len(curves), len(curves), 2))
     for p, (path, curve) in enumerate(zip(intersection.paths, curves, strict=True)):
         for q, (rival, other) in enumerate(zip(intersection.paths, curves, strict=True)):
+            if p == q:
+                continue
             if path.movement.origin == rival.movement.origin:
-                table[p, q] = (Meeting.NOWHERE, 0.0, 0.0) if p == q else _part(curve, other)
+                table[p, q] = _part(curve, other)
             elif path.exit_arm == rival.exit_arm:
                 table[p, q] = _join(curve.behind_wait, other.behind_wait)
-            else:
-                width = intersection.lane_width
-                table[p, q] = _cross(curve.behind_wait, other.behind_wait, width)
     return table
 
 
@@ -102,35 +100,16 @@ class _Curve(NamedTuple):
         return _Curve(self.points[k:], self.length - self.wait)
 
 
-Place = tuple[int, float, float]
+Place = tuple[int, float]
 
 
 def _part(way: _Curve, other: _Curve) -> Place:
     apart = _parted(way, other) * way.scale
-    return Meeting.PART, max(way.length - apart, 0.0), 0.0
+    return Meeting.PART, max(way.length - apart, 0.0)
 
 
 def _join(way: _Curve, other: _Curve) -> Place:
-    return Meeting.JOIN, _parted(way.backwards, other.backwards) * way.scale, 0.0
-
-
-def _cross(way: _Curve, other: _Curve, lane_width: float) -> Place:
-    points = shapely.get_coordinates(shapely.intersection(way.line, other.line))
-    if not len(points):
-        return Meeting.NOWHERE, 0.0, 0.0
-    at = max(float(way.line.project(shapely.Point(point))) for point in points)
-    behind = max(float(other.line.project(shapely.Point(point))) for point in points)
-    angle = abs(_bearing(way, at) - _bearing(other, behind)) % (2.0 * math.pi)
-    sine = math.sin(min(angle, 2.0 * math.pi - angle))
-    width = min(lane_width * (2.0 / max(sine, 0.2) - 1.0), way.length)
-    return Meeting.CROSS, way.length - max(at - width / 2.0, 0.0) * way.scale, width
-
-
-def _bearing(curve: _Curve, at: float) -> float:
-    """Direction of the polyline's segment at a distance along it [rad]."""
-    steps = np.diff(curve.points, axis=0)
-    k = min(int(np.searchsorted(curve.distances[1:], at)), len(steps) - 1)
-    return math.atan2(steps[k, 1], steps[k, 0])
+    return Meeting.JOIN, _parted(way.backwards, other.backwards) * way.scale
 
 
 def _parted(one: _Curve, two: _Curve) -> float:

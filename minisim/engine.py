@@ -5,9 +5,14 @@ that any of its leaders asks for (`MSVehicle::planMoveInternal`, with the model'
 
 - the vehicle ahead on the stretch of road that it is on (approach, way through the junction, exit);
 - the last vehicle on every later stretch, wherever that one came from and however far it is;
-- who is inside the junction on a way that meets its own (`minisim.crossings`) and was there
-  before it. On the approach SUMO's radar shows less: to the lane's first vehicle only, and of
-  those who will leave by its own exit the nearest.
+- who is inside the junction on a way that begins or ends with its own (`minisim.crossings`) and
+  was there before it, as long as there is room to the place where the ways meet;
+- the radar's leader: for those without anybody ahead on their own lane or way, the nearest who
+  will leave by the same exit, as if just ahead where there is no room any more.
+
+Who only crosses its way is no leader: for those SUMO asks of a vehicle no more than to be able to
+stop before the crossing (`adaptToJunctionLeader`), and the CC model answers that question with the
+radar's leader, whoever is meant.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from minisim.state import DRIVING, POSITION_EPS, Engine, Floats, Ints, Law, Reco
 #: Vehicles inside the junction at once, at most.
 INSIDE = 64
 
-CROSS, JOIN, PART = int(Meeting.CROSS), int(Meeting.JOIN), int(Meeting.PART)
+NOWHERE, JOIN, PART = int(Meeting.NOWHERE), int(Meeting.JOIN), int(Meeting.PART)
 
 
 @njit
@@ -63,7 +68,7 @@ def accelerate_engines(
                     if on_way:
                         break
                 if count and not (led and s < law.entry) and law.entry - s <= engine.radar:
-                    u = min(u, meet(vehicles, ends, law, engine, inside, count, i))
+                    u = min(u, meet(vehicles, ends, law, engine, inside, count, i, led))
                 j = lanes[int(ends[p, 2])]["tail"]
             else:
                 j = me["ahead"]
@@ -107,6 +112,7 @@ def meet(
     inside: Ints,
     count: int,
     i: int,
+    led: bool,
 ) -> float:
     """Acceleration that those inside the junction on other ways ask vehicle i for [m/s²].
 
@@ -117,14 +123,13 @@ def meet(
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
     to_exit = ends[p, 0] - s
     approaching = s < law.entry
-    u = math.inf
-    shortest = math.inf
+    u = shown = shortest = math.inf  # shown: what the radar's leader asks for
     for k in range(count):
         j = inside[k]
         other = vehicles[j]
         q = other["path"]
         kind = int(meetings[p, q, 0])
-        if kind == 0 or q == p or (approaching and kind != JOIN):
+        if kind == NOWHERE or (approaching and kind != JOIN):
             continue
         wait = waits[q, 0]
         driven = other["s"] - law.entry
@@ -134,12 +139,10 @@ def meet(
         elif driven < wait:
             continue  # not yet on the part that others can meet
         to_meeting = to_exit - meetings[p, q, 1]
-        width = meetings[p, q, 2]
-        if to_meeting + width < 0.0 and kind != JOIN:
+        if to_meeting < 0.0 and kind != JOIN:
             continue
-        own_width = meetings[q, p, 2]
         behind = ends[q, 0] - law.entry - meetings[q, p, 1] - (driven - law.length)
-        past = behind + own_width + waits[p, 1] < 0.0
+        past = behind + waits[p, 1] < 0.0
         entered = behind < law.length
         in_the_way = entered and (
             (not past and to_meeting > 0.0) or (kind == JOIN and to_meeting > behind - law.length)
@@ -150,19 +153,19 @@ def meet(
             continue
         if past and kind != JOIN:
             continue
-        if not approaching and not in_the_way and not before(vehicles, i, j):
+        leads = approaching or before(vehicles, i, j)
+        if not leads and not in_the_way:
             continue
         if kind == JOIN and behind < 0.0:
             behind += max(meetings[q, p, 1] - meetings[p, q, 1], 0.0)
-        gap = to_meeting - law.min_gap - behind - own_width
-        if approaching:
-            if gap + other["v"] < shortest:
-                shortest = gap + other["v"]
-                to_part = law.entry + waits[p, 0] - s  # of its way that the other can meet
-                u = follow(v, gap if gap >= 0.0 else to_part, other["v"], engine)
-        else:
-            u = min(u, follow(v, gap, other["v"], engine) if gap >= 0.0 else math.inf)
-    return u
+        gap = to_meeting - law.min_gap - behind
+        if kind == JOIN and leads and not led and gap + other["v"] < shortest:
+            shortest = gap + other["v"]
+            to_part = law.entry + waits[p, 0] - s  # of its way that the other can meet
+            shown = follow(v, gap if gap >= 0.0 else max(to_part, 0.0), other["v"], engine)
+        if not approaching and gap >= 0.0:
+            u = min(u, follow(v, gap, other["v"], engine))
+    return min(u, shown)
 
 
 @njit_inline

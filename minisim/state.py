@@ -126,7 +126,7 @@ class Engine(NamedTuple):
     """What a run of `minisim.vehicle.EngineVehicle` needs beside `Law` (SI units).
 
     Attributes:
-        meetings: (p, p, 3), see `minisim.crossings.meetings`.
+        meetings: (p, p, 2), see `minisim.crossings.meetings`.
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
     """
 

@@ -121,6 +121,8 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
         SumoError: there are no trips, or not those of the arrivals.
     """
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
+    # SUMO does not tell of those who want to come when the run is over.
+    values[arrivals.time > end - 1.5 * job.law.dt] = -1.0, -1.0, 0.0
     try:
         for trip in ET.parse(folder / TRIPS).getroot().iter("tripinfo"):
             values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]

@@ -169,7 +169,7 @@ class Worker:
         passed = False
         for name, values in sumo.vehicle.getAllSubscriptionResults().items():
             travelled = values[distance]
-            if travelled >= 0.0:  # it is not where SUMO has a vehicle in the air
+            if travelled >= 0.0:  # not while SUMO teleports it
                 passed |= self._move(self._cars[name], travelled, values[speed])
         return passed
 
@@ -205,8 +205,10 @@ class Worker:
         return car.cleared and self._job.law.record_from == NEVER
 
     def _glance(self, car: Car) -> None:
-        self._travel(car, self._locate(car))
-        car.v = self._libsumo.vehicle.getSpeed(car.name)
+        s = self._locate(car)
+        if s is not None:
+            self._travel(car, s)
+            car.v = self._libsumo.vehicle.getSpeed(car.name)
 
     def _travel(self, car: Car, s: float) -> None:
         """Book the time lost since the last look, and move on to `s`."""
@@ -247,9 +249,10 @@ class Worker:
             return float(law.entry + inside * self._stretch[p])
         return float(self._exit[p] + inside - network.inside[p])
 
-    def _locate(self, car: Car) -> float:
-        """`s` of any vehicle on the road [m], watched or not."""
-        return self._position(car.path, self._libsumo.vehicle.getDistance(car.name))
+    def _locate(self, car: Car) -> float | None:
+        """`s` of any vehicle on the road [m], watched or not; None while SUMO teleports it."""
+        travelled = self._libsumo.vehicle.getDistance(car.name)
+        return self._position(car.path, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
         """Its rear has left the junction: nobody but SUMO steers it any more."""
@@ -277,23 +280,26 @@ class Worker:
     def _collide(self) -> None:
         """Note each pair that SUMO finds touching, once."""
         for found in self._libsumo.simulation.getCollisions():
-            i, j = sorted((int(found.collider), int(found.victim)))
-            if (i, j) not in self._collisions:
-                self._collisions[i, j] = self._describe(self._cars[str(i)], self._cars[str(j)])
+            pair = int(found.collider), int(found.victim)
+            if (key := (min(pair), max(pair))) not in self._collisions:
+                self._collisions[key] = self._describe(found)
 
-    def _describe(self, *cars: Car) -> Collision:
-        vehicle, movements = self._libsumo.vehicle, self._job.movements
-        first, second = (
-            (
-                car.id,
-                str(movements[car.path]),
-                self._locate(car),
-                vehicle.getSpeed(car.name),
+    def _describe(self, found: Any) -> Collision:
+        movements = self._job.movements
+        both = [
+            (car.id, str(movements[car.path]), self._touched(car, found), float(speed))
+            for car, speed in (
+                (self._cars[found.collider], found.colliderSpeed),
+                (self._cars[found.victim], found.victimSpeed),
             )
-            for car in cars
-        )
+        ]
         time = round(self._tick * self._job.law.dt, 6)
-        return Collision(time, *zip(first, second, strict=True))
+        return Collision(time, *zip(*sorted(both), strict=True))
+
+    def _touched(self, car: Car, found: Any) -> float:
+        """`s` of a vehicle in a collision [m]; one that was taken off the road was near its end."""
+        s = self._locate(car) if car.present else None
+        return self._exit[car.path] + float(found.pos) if s is None else s
 
 
 def _record_start(job: Job) -> float:

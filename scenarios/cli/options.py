@@ -101,7 +101,8 @@ Host = Annotated[
 SumoModel = Annotated[
     str | None,
     typer.Option(
-        metavar="IDM|Krauss", help="SUMO's car-following model; IDM by default.",
+        metavar="IDM|Krauss|CC",
+        help="SUMO's car-following model; by default CC under the profile as_run, else IDM.",
         show_default=False,
     ),
 ]  # fmt: skip
@@ -117,6 +118,10 @@ Order = Annotated[
         help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
         "(its published runs).",
     ),
+]
+SumoFcd = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write SUMO's own floating-car data (XML) of every step."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 

@@ -499,7 +499,7 @@ def test_the_gui_needs_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"model": "idm"}, "unknown SUMO model 'idm'; allowed: IDM, Krauss"),
+        ({"model": "idm"}, "unknown SUMO model 'idm'; allowed: IDM, Krauss, CC"),
         ({"record": "some"}, "unknown record 'some'"),
         ({"on_collision": "explode"}, "unknown on_collision"),
         ({"keep_files": 3}, "keep_files must be a str or PathLike"),
@@ -515,7 +515,7 @@ def test_wrong_arguments_are_told(options: dict[str, Any], message: str) -> None
 def test_sumo_has_no_improved_idm() -> None:
     profile = replace(FAIR, vehicle=VehicleType(model="iidm"))
     scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
-    with pytest.raises(InputError, match="SUMO has no car-following model 'iidm'"):
+    with pytest.raises(InputError, match=r"IDM does not drive .* 'iidm'; choose Krauss"):
         simulate(scenario, Unregulated())
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 
@@ -582,7 +582,7 @@ def test_the_command_line_prints_a_table_of_sumos_run(
     ("options", "message"),
     [
         (("--host", "vissim"), "unknown host 'vissim'; allowed: minisim, sumo"),
-        (("--gui",), "--gui and --keep-files need --host sumo"),
+        (("--gui",), "--gui, --keep-files and --sumo-fcd need --host sumo"),
         (("--sumo-model", "IDM"), "need --host sumo"),
         (("--host", "sumo", "--sumo-model", "CACC"), "unknown SUMO model 'CACC'"),
     ],

@@ -1,0 +1,213 @@
+"""SUMO's CC model in the host: the vehicle and the junctions of the published runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import minisim
+from baselines import FixedTime
+from dim import AsRunDim
+from minisim.control import Advise, Controller, Plan, Unregulated
+from minisim.errors import InputError, SumoError
+from minisim.simulation import Run
+from minisim.sumo import simulate
+from minisim.testing import check_controller, small_scenario
+from scenarios import four_way
+from scenarios.cli import main
+from scenarios.paper import MAKERS, Cell, replay
+from scenarios.scenario import AS_RUN, FAIR, Scenario
+from tests.runs import Fixed, replayed
+
+AS_RUN_FOUR = four_way(profile="as_run")
+
+
+def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Run]:
+    options = {"on_collision": "record", **options}
+    return minisim.simulate(scenario, controller, **options), simulate(
+        scenario, controller, **options
+    )
+
+
+def until(scenario: Scenario, horizon: float) -> Scenario:
+    return replace(scenario, horizon=horizon)
+
+
+@pytest.mark.parametrize("manoeuvre", [1, 2, 3])
+@pytest.mark.parametrize("controller", [Unregulated(), AsRunDim()], ids=lambda c: c.name)
+def test_a_vehicle_alone_drives_alike(controller: Controller, manoeuvre: int) -> None:
+    """as_run.md: DIM left, straight and right 63.99, 64.26 and 64.24 s."""
+    scenario = replayed(AS_RUN_FOUR, (0.0, 0, manoeuvre), horizon=80.0)
+    ours, theirs = both(scenario, controller, record="all")
+    a, b = ours.trace, theirs.trace
+    assert len(a) == pytest.approx(len(b), abs=1)  # minisim has no line of the insertion itself
+    b = b[b["tick"] > 0][: len(a)]
+    a = a[: len(b)]
+    assert b["tick"].tolist() == a["tick"].tolist()
+    assert b["s"] == pytest.approx(a["s"], abs=1e-4)
+    assert b["v"] == pytest.approx(a["v"], abs=1e-4)
+    for column in ("travel_time_s", "waiting_time_s"):
+        assert theirs.trips[column].tolist() == pytest.approx(ours.trips[column].tolist())
+    assert theirs.columns.time_loss == pytest.approx(ours.columns.time_loss, abs=0.1)
+    if isinstance(controller, AsRunDim):
+        published = {1: 63.99, 2: 64.26, 3: 64.24}[manoeuvre]
+        assert theirs.columns.travel_time == pytest.approx([published], abs=0.011)
+
+
+@pytest.mark.parametrize("arms", [3, 4, 5])
+def test_the_published_junctions_have_the_published_lengths(arms: int, tmp_path: Path) -> None:
+    from minisim.sumo import host, network
+
+    junction = MAKERS[arms](profile="as_run").intersection
+    made = network.build_network(junction, 14.0, tmp_path, host.sumo_home())
+    for path, approach, inside in zip(junction.paths, made.approach, made.inside, strict=True):
+        assert approach == pytest.approx(path.entry, abs=0.006)
+        assert inside == pytest.approx(path.exit - path.entry, abs=0.011)
+
+
+def test_ways_that_are_not_netconverts_are_refused() -> None:
+    junction = AS_RUN_FOUR.intersection
+    assert junction.ways is not None
+    longer = (junction.ways[0]._replace(length=9.5), *junction.ways[1:])
+    scenario = replace(AS_RUN_FOUR, intersection=replace(junction, ways=longer))
+    with pytest.raises(SumoError, match=r"way of a1 9.03 m long, the intersection has 9.50 m"):
+        simulate(scenario, Unregulated())
+
+
+@pytest.mark.parametrize("cell", [Cell("balanced", 350, 4), Cell("balanced", 150, 3)], ids=str)
+def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
+    ours, theirs = both(until(replay(*cell), 240.0), AsRunDim())
+    ended = ours.columns.arrived & theirs.columns.arrived
+    assert ended.sum() > 10
+    assert (ours.columns.arrived == theirs.columns.arrived).mean() > 0.99
+    for metric in ("travel_time_s", "waiting_time_s"):
+        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
+        assert (apart <= 0.1 + 1e-9).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "cell",
+    [Cell("balanced", density, 4) for density in (150, 200, 250, 300)] + [Cell("balanced", 150, 3)],
+    ids=str,
+)
+def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
+    """The issue asks for 90 % of the trips within 0.1 s."""
+    ours, theirs = both(replay(*cell), AsRunDim())
+    ended = ours.columns.arrived & theirs.columns.arrived
+    close = np.ones(ended.sum(), bool)
+    for metric in ("travel_time_s", "waiting_time_s"):
+        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
+        close &= apart <= 0.1 + 1e-9
+    assert close.mean() >= 0.99
+    assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
+
+
+def test_the_contract_holds_with_the_vehicle_of_the_published_runs() -> None:
+    """`check_controller` has vehicles of its own; here they are those of the profile.
+
+    `AsRunDim` is outside the contract in every host: it still advises vehicles that have left its
+    view, as the authors' driver does.
+    """
+
+    def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
+        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=0.05, depart_speed=0.0)
+        return simulate(small, controller, seed, **options)
+
+    check_controller(
+        FixedTime(), arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
+    )
+
+
+def test_the_same_replay_gives_the_same_trips_twice() -> None:
+    scenario = until(replay("balanced", 150, 4), 100.0)
+    first, second = (
+        simulate(scenario, AsRunDim(), on_collision="record", record=kind)
+        for kind in (None, "junction")
+    )
+    assert first.trips.drop(columns="time_loss_s").equals(second.trips.drop(columns="time_loss_s"))
+    # one is glanced at now and then after the junction, the other is watched a little longer
+    loss = (first.columns.time_loss - second.columns.time_loss)[first.columns.departed]
+    assert np.abs(loss).max() < 0.05
+
+
+@pytest.mark.parametrize("hold_distance", [0.0, 20.0])
+def test_a_held_vehicle_stops_at_its_line(hold_distance: float) -> None:
+    scenario = replayed(AS_RUN_FOUR, (0.0, 0, 2), (4.0, 0, 1), horizon=70.0)
+    ours, theirs = both(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
+    line = theirs.site.intersection.approach_length - hold_distance
+    for run in (ours, theirs):
+        last = run.trace[run.trace["tick"] == 7000]
+        front, behind = last["s"].max(), last["s"].min()
+        assert 0.0 <= line - front <= 0.3
+        assert front - 4.0 - behind >= 2.0
+        assert not run.columns.arrived.any()
+    assert theirs.columns.waiting_time[0] == pytest.approx(ours.columns.waiting_time[0], abs=0.3)
+
+
+def test_advice_comes_before_and_after_insertion() -> None:
+    scenario = replayed(AS_RUN_FOUR, (2.0, 0, 2), horizon=90.0)
+    early = Fixed(Plan(lanes_open=True), (Advise(0, 8.0),))
+    ours, theirs = both(scenario, early)
+    assert ours.columns.travel_time[0] > 80.0 or not ours.columns.arrived[0]
+    assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
+
+
+def test_teleporting_is_sumos_default(tmp_path: Path) -> None:
+    scenario = replayed(AS_RUN_FOUR, (0.0, 0, 2), horizon=2.0)
+    for reaction, kept in (("teleport", False), ("record", True)):
+        folder = tmp_path / reaction
+        simulate(scenario, AsRunDim(), on_collision=reaction, keep_files=folder)
+        text = (folder / "minisim.sumocfg").read_text()
+        for option in ("time-to-teleport", "collision.action", "collision.check-junctions"):
+            assert (option in text) is kept
+
+
+@pytest.mark.slow
+def test_teleport_takes_who_runs_into_another_off_the_road() -> None:
+    """4:3:2:1 at 350: in SUMO 1.28 b2 of 2606 s runs into a3 of 2611 s, at 2649.93 s."""
+    scenario = until(replay("4:3:2:1", 350, 4), 2660.0)
+    run = simulate(scenario, AsRunDim(), on_collision="teleport")
+    (collision,) = run.collisions
+    assert collision.time == pytest.approx(2649.93)
+    assert collision.movements in (("a3", "b2"), ("b2", "a3"))
+    hit = collision.vehicles[collision.movements.index("b2")]
+    assert run.columns.arrival[hit] == pytest.approx(2649.93, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    ("profile", "model", "message"),
+    [
+        (FAIR, "CC", "model CC does not drive vehicles of the model 'idm'; choose IDM or Krauss"),
+        (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
+        (
+            replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)),
+            None,
+            "CC keeps a spacing of 2 m and sees 250 m far, the vehicles 2 m and 100 m",
+        ),
+    ],
+)
+def test_models_that_do_not_fit_are_told(profile: Any, model: str | None, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(replace(AS_RUN_FOUR, profile=profile), Unregulated(), model=model)
+
+
+def test_the_command_line_replays_in_sumo(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    source = resources.files("scenarios") / "data" / "arrivals" / "balanced_150_dim_4way.csv"
+    command = ["run", "four-way", "--profile", "as_run", "--host", "sumo", "--horizon", "120"]
+    command += ["--arrivals", str(source), "--on-collision", "record", "--json", "--no-safety"]
+    assert main(command) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["host"] == "sumo"
+    assert printed["travel_time_s"] == pytest.approx(66.0, abs=4.0)
+    assert simulate(
+        small_scenario(4, demand_time=5.0, drain=5.0), Unregulated()
+    ).provenance["sumo_model"] == "IDM"  # fmt: skip
