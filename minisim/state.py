@@ -19,7 +19,7 @@ from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
 from minisim.geometry import Path
 from minisim.streams import stream
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import EngineVehicle, VehicleType
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -245,7 +245,7 @@ def build_law(
         entry=entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        slack=POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0,
+        slack=insertion_slack(vehicle),
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -281,6 +281,12 @@ def build_engine(site: Site) -> Engine | None:
 #: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
 #: and counts it as arrived this far before the end of the road.
 POSITION_EPS = 0.1
+
+
+def insertion_slack(vehicle: VehicleType) -> float:
+    """How far past its length a vehicle is inserted, and how far before the road's end it ends."""
+    return POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0
+
 
 #: Reach of a recording of the junction alone, before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
