@@ -61,7 +61,7 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
 
 
 def means_figure(results: Sequence[Result]) -> Figure:
-    """Means with their 95 % intervals over density: minisim, SUMO and, where there are, the paper's.
+    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's.
 
     Args:
         results: of one junction, split and controller, by density.
@@ -225,7 +225,10 @@ def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
 def _name_trip(axes: Axes, time: float, distance: float, trip: object) -> None:
     """Write what the vehicle wants beside the start of its line."""
     name = f"{trip[VEHICLE].iloc[0]}: {trip[LANE].iloc[0]}{trip[MANOEUVRE].iloc[0]}"  # type: ignore[index]
-    axes.text(time + 0.15, distance + 3.0, name, fontsize=7, color=style.MUTED, clip_on=True)
+    axes.text(
+        time - 0.25, distance + 2.0, name, fontsize=7.5, color=style.INK, ha="right", va="bottom",
+        clip_on=True,
+    )  # fmt: skip
 
 
 def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:

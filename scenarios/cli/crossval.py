@@ -138,14 +138,15 @@ def crossval(
 def _cases(wanted: Wanted) -> list[Case]:
     from scenarios.crossval import drawn_cases, replayed_cases
 
-    horizon = wanted.horizon or (QUICK_HORIZON if wanted.quick else 3600.0)
+    usual = QUICK_HORIZON if wanted.quick else 3600.0
+    horizon = usual if wanted.horizon is None else wanted.horizon
     if wanted.replay:
         return replayed_cases(
             wanted.scenarios,
             wanted.controllers or ["dim"],
             wanted.densities or (list(QUICK_DENSITIES) if wanted.quick else []),
             wanted.splits or (["balanced"] if wanted.quick else []),
-            wanted.profile or "as_run",
+            "as_run" if wanted.profile is None else wanted.profile,
             horizon,
         )
     return drawn_cases(
@@ -153,7 +154,7 @@ def _cases(wanted: Wanted) -> list[Case]:
         wanted.controllers or CONTROLLERS,
         wanted.densities or (QUICK_DENSITIES if wanted.quick else DENSITIES),
         wanted.splits or ["balanced"],
-        wanted.profile or "fair",
+        "fair" if wanted.profile is None else wanted.profile,
         horizon,
     )
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 CLOSE: Final = 0.1
 
 #: Two positions farther apart than this are not the same [m].
-APART: Final = 0.1
+APART: Final = 0.5
 
 #: A trip is judged by these two.
 JUDGED: Final = ("waiting_time_s", "travel_time_s")

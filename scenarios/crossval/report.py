@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
-from scenarios.crossval.comparison import APART, CLOSE, Row
+from scenarios.crossval.comparison import APART, CLOSE, Divergence, Row
 from scenarios.crossval.results import HOST_SHARE, HOST_TOLERANCES, Film, Result
 from scenarios.statistics import Interval
 
@@ -159,10 +159,10 @@ def _tolerances() -> list[str]:
         "trip's time (0 the same, 1 apart).",
         "",
         f"The hosts agree when, each with its own car following, they differ by at most: {hosts}; "
-        f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the trips "
-        f"have waiting and travel times within {CLOSE:g} s of each other. A replay meets the paper "
-        "when mean waiting is within 10 % and mean travel within 0.5 s of the published number, at "
-        "350 veh/h within 3 s.",
+        f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
+        f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
+        "the paper when mean waiting is within 10 % and mean travel within 0.5 s of the published "
+        "number, at 350 veh/h within 3 s.",
     ]
 
 
@@ -224,38 +224,34 @@ def _cells(case: Case, row: Row) -> tuple[str, ...]:
 
 
 def _partings(results: Sequence[Result]) -> list[str]:
-    films = [(result.case, result.film) for result in results if result.film is not None]
-    same = [result.case.name for result in results if result.rows and result.film is None]
+    apart = [(result, result.divergence) for result in results if result.divergence is not None]
+    same = [result.case.name for result in results if result.rows and result.divergence is None]
     lines = [f"No trip differs: {', '.join(same)}.", ""] if same else []
-    if not films:
+    if not apart:
         return lines
     return [
         *lines,
         "The first trip, in order of demand, whose waiting or travel time differs by more than "
-        f"{CLOSE:g} s; and the first vehicle, in the {_BEFORE_TEXT}, that is more than {APART:g} m "
-        "from where the other host has it.",
+        f"{CLOSE:g} s; and the first vehicle, from half a minute before it came on the road on, "
+        f"that is more than {APART:g} m from where the other host has it.",
         "",
         *_table(
             ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",
              "travel minisim / SUMO", "first apart", "where minisim / SUMO [m]",
              "speed minisim / SUMO [m/s]"),
-            ((case.name, *_film_cells(film)) for case, film in films),
+            ((result.case.name, *_parting(found, result.film)) for result, found in apart),
         ),
     ]  # fmt: skip
 
 
-_BEFORE_TEXT: Final = "trajectories from half a minute before it on"
-
-
-def _film_cells(film: Film) -> tuple[str, ...]:
-    found, parting = film.divergence, film.parting
+def _parting(found: Divergence, film: Film | None) -> tuple[str, ...]:
     first = (
         str(found.seed),
         f"vehicle {found.vehicle} ({found.movement}), on the road from {found.depart:.2f} s",
         f"{found.waiting[0]:.2f} / {found.waiting[1]:.2f}",
         f"{found.travel[0]:.2f} / {found.travel[1]:.2f}",
     )
-    if parting is None:
+    if film is None or (parting := film.parting) is None:
         return *first, NOTHING, NOTHING, NOTHING
     return (
         *first,

@@ -33,13 +33,11 @@ class Film:
     """Trajectories of both hosts around the first trip that differs.
 
     Attributes:
-        divergence: the trip.
         minisim, sumo: trajectories.
         parting: where they part; None where no vehicle does while it is recorded.
         movement: of the vehicle that parts.
     """
 
-    divergence: Divergence
     minisim: pd.DataFrame
     sumo: pd.DataFrame
     parting: Parting | None
@@ -58,7 +56,8 @@ class Result:
         collisions: in minisim and in SUMO, over the pairs.
         failures: the runs that failed.
         sumo: version of SUMO, empty where it did not run.
-        film: None where no trip of the first pair differs.
+        divergence: the first trip of the first pair that differs; None where none does.
+        film: what led to it; None until it is recorded.
     """
 
     case: Case
@@ -68,6 +67,7 @@ class Result:
     collisions: tuple[int, int]
     failures: tuple[Failure, ...]
     sumo: str
+    divergence: Divergence | None
     film: Film | None = None
 
     def row(self, metric: str, lane: str = "all") -> Row:

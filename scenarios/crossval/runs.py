@@ -72,20 +72,17 @@ def film(
     results: Sequence[Result], executor: Executor, progress: Progress | None = None
 ) -> list[Result]:
     """Add the trajectories around the first trip that differs, from a second, shorter run."""
-    first = [first_divergence(result.pairs[0]) if result.pairs else None for result in results]
     tasks = [
-        (result.case, host, divergence)
-        for result, divergence in zip(results, first, strict=True)
-        if divergence is not None
+        (result.case, host, result.divergence)
+        for result in results
+        if result.divergence is not None
         for host in HOSTS
     ]
     frames = iter(_gather(executor, _record, tasks, progress))
     return [
-        result if divergence is None else replace(
-            result, film=_film(divergence, next(frames), next(frames))
-        )
-        for result, divergence in zip(results, first, strict=True)
-    ]  # fmt: skip
+        result if result.divergence is None else _filmed(result, next(frames), next(frames))
+        for result in results
+    ]
 
 
 class _Outcome(NamedTuple):
@@ -183,9 +180,7 @@ def _gather(
 
 def _result(case: Case, outcomes: dict[tuple[str, int], _Outcome | BaseException]) -> Result:
     ended = {
-        run: _Outcome(error=f"{type(made).__name__}: {made}")
-        if isinstance(made, BaseException)
-        else made
+        run: _Outcome(error=_reason(made)) if isinstance(made, BaseException) else made
         for run, made in outcomes.items()
     }
     both = [
@@ -206,20 +201,29 @@ def _result(case: Case, outcomes: dict[tuple[str, int], _Outcome | BaseException
             Failure(host, seed, made.error) for (host, seed), made in ended.items() if made.error
         ),
         sumo=next((made.sumo for made in ended.values() if made.sumo), ""),
+        divergence=first_divergence(pairs[0]) if pairs else None,
     )
 
 
-def _film(
-    divergence: Divergence,
-    minisim: pd.DataFrame | BaseException,
-    sumo: pd.DataFrame | BaseException,
-) -> Film | None:
-    """None where one of the runs did not work a second time."""
+def _filmed(
+    result: Result, minisim: pd.DataFrame | BaseException, sumo: pd.DataFrame | BaseException
+) -> Result:
     if isinstance(minisim, BaseException) or isinstance(sumo, BaseException):
-        return None
+        made = dict(zip(HOSTS, (minisim, sumo), strict=True))
+        failed = tuple(
+            Failure(host, result.pairs[0].seed, f"recording again: {_reason(error)}")
+            for host, error in made.items()
+            if isinstance(error, BaseException)
+        )
+        return replace(result, failures=result.failures + failed)
     parting = first_parting(minisim, sumo)
     movement = ""
     if parting is not None:
         who = minisim[minisim[VEHICLE] == parting.vehicle].iloc[0]
         movement = f"{who[LANE]}{who[MANOEUVRE]}"
-    return Film(divergence, minisim, sumo, parting, movement)
+    return replace(result, film=Film(minisim, sumo, parting, movement))
+
+
+def _reason(error: BaseException) -> str:
+    kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+    return f"{kind}{error}"
