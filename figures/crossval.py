@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,9 @@ from minisim.geometry import ARM_NAMES, Floats
 from minisim.recording import LANE, MANOEUVRE, TIME, VEHICLE, S
 from scenarios.crossval import Result
 from scenarios.crossval.comparison import times
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 METRICS: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
 
@@ -137,7 +140,7 @@ def parting_figure(result: Result) -> Figure:
             axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
             axes.plot(trip[TIME], trip[S] - entry, color=colour, linestyle=dashes, linewidth=width)
             if dashes == "-":
-                _name_trip(axes, trip[TIME].iloc[0], trip[S].iloc[0] - entry, trip)
+                _name_trip(axes, trip, entry)
     for axes, lane in zip(panels, ARM_NAMES, strict=False):
         style.plot_axes(axes, "", "", f"lane {lane} [m]")
         axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
@@ -222,12 +225,13 @@ def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
         yield pair.minisim.travel_time[ended], pair.sumo.travel_time[ended]
 
 
-def _name_trip(axes: Axes, time: float, distance: float, trip: object) -> None:
-    """Write what the vehicle wants beside the start of its line."""
-    name = f"{trip[VEHICLE].iloc[0]}: {trip[LANE].iloc[0]}{trip[MANOEUVRE].iloc[0]}"  # type: ignore[index]
+def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
+    """Write who it is, and what it wants, beside the start of its line."""
+    first = trip.iloc[0]
     axes.text(
-        time - 0.25, distance + 2.0, name, fontsize=7.5, color=style.INK, ha="right", va="bottom",
-        clip_on=True,
+        first[TIME] - 0.25, first[S] - entry + 2.0,
+        f"{first[VEHICLE]}: {first[LANE]}{first[MANOEUVRE]}", fontsize=7.5, color=style.INK,
+        ha="right", va="bottom", clip_on=True,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from minisim.errors import InputError, choice, instance
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
 from scenarios.library import scenario_named
-from scenarios.paper import DENSITIES, GRID, Cell, reference, replay
+from scenarios.paper import DENSITIES, GRID, SPLITS, Cell, reference, replay
 from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
@@ -139,7 +139,9 @@ def replayed_cases(
     """
     cases = []
     for split in splits:
-        choice("split of a published run", split, list(dict.fromkeys(c.split for c in GRID)))
+        choice("split of a published run", split, SPLITS)
+    for name in names:
+        choice("junction of a published run", name, ("three-way", "four-way", "five-way"))
     for cell in GRID:
         scenario = replace(replay(*cell, profile=profile), horizon=horizon)
         chosen = (
@@ -148,13 +150,11 @@ def replayed_cases(
             and (not splits or cell.split in splits)
         )
         cases += [Case(scenario, controller, cell) for controller in controllers if chosen]
-    known = sorted({case.scenario.name for case in cases})
-    for name in names:
-        choice("junction of a published run", name, known or ["three-way", "four-way", "five-way"])
     if not cases:
+        wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]
         raise InputError(
-            f"the paper has no DIM run at {', '.join(f'{d:g}' for d in densities)} veh/h; "
-            f"it has {', '.join(map(str, DENSITIES))}"
+            f"the paper has no DIM run of {', '.join(wanted)}; it has "
+            f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only"
         )
     return cases
 

@@ -227,7 +227,11 @@ def test_replays_are_the_published_grid_and_its_numbers() -> None:
     ("arguments", "message"),
     [
         ((["four-wy"], [], []), "junction of a published run"),
-        (([], [400], []), "no DIM run at 400 veh/h; it has 150, 200, 250, 300, 350"),
+        (([], [400], []), "no DIM run of 400 veh/h; it has 150, 200, 250, 300, 350"),
+        (
+            (["five-way"], [], ["4:3:2:1"]),
+            "no DIM run of five-way, 4:3:2:1; .* 5 arms balanced only",
+        ),
         (([], [], ["1:1:1:1"]), "unknown split of a published run"),
     ],
 )
@@ -378,7 +382,7 @@ BAD = [
     (("--horizon", "0"), "horizon"),
     (("--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("--replay", "6-way"), "unknown junction of a published run"),
-    (("--replay", "-d", "400"), "no DIM run at 400"),
+    (("--replay", "-d", "400"), "no DIM run of 400"),
 ]
 
 
