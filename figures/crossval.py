@@ -51,7 +51,8 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
     for group, members in groups.items():
         ordered = sorted(members, key=lambda result: result.case.density)
         title = ", ".join(group)
-        yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
+        if len(ordered) > 1:
+            yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
         yield _file("trips", *group), f"{title}: every trip", trips_figure(ordered)
     for result in results:
         if result.film is not None and result.film.parting is not None:
@@ -85,8 +86,8 @@ def means_figure(results: Sequence[Result]) -> Figure:
             _line(axes, "published", 0.0, [r for r, _ in paper], [v for _, v in paper])
         style.plot_axes(axes, name, "density [veh/h/lane]", "mean [s]")
         axes.set_xticks(sorted({result.case.density for result in results}))
+        axes.margins(x=0.08, y=0.1)
         axes.set_ylim(bottom=0.0)
-        axes.margins(x=0.08)
     _head(figure, panels[0], results[0])
     return figure
 
@@ -232,6 +233,7 @@ def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
         first[TIME] - 0.25, first[S] - entry + 2.0,
         f"{first[VEHICLE]}: {first[LANE]}{first[MANOEUVRE]}", fontsize=7.5, color=style.INK,
         ha="right", va="bottom", clip_on=True,
+        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
     )  # fmt: skip
 
 
