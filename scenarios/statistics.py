@@ -1,4 +1,4 @@
-"""Means over seeds, how sure they are, and whether a run was in equilibrium at all."""
+"""Means over seeds, how sure they are, and whether a run was in equilibrium; distributions."""
 
 from __future__ import annotations
 
@@ -149,3 +149,20 @@ def _between(angle: float, freedom: int) -> float:
         term *= cosine * cosine * (k - 1) / k
         total += term
     return 2.0 / math.pi * (angle + sine * total) if odd else sine * total
+
+
+def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
+    """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
+
+    The two-sample statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for
+    samples that do not overlap.
+
+    Raises:
+        InputError: a sample is empty or holds something that is not finite.
+    """
+    samples = [np.sort(np.asarray(numbers("sample", s))) for s in (first, second)]
+    if not all(map(len, samples)):
+        raise InputError("a distance of distributions needs at least one value in each sample")
+    steps = np.concatenate(samples)
+    one, other = (np.searchsorted(s, steps, side="right") / len(s) for s in samples)
+    return float(np.abs(one - other).max())

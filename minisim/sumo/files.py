@@ -128,9 +128,10 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
             values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
     except (OSError, ET.ParseError, LookupError, ValueError) as error:
         raise SumoError(f"SUMO's trips cannot be read: {error}") from error
-    if np.isnan(values).any():
-        missing = int(np.isnan(values).any(axis=1).argmax())
-        raise SumoError(f"SUMO's trips do not tell of vehicle {missing}")
+    # SUMO tells nothing of vehicles that would have come later.
+    missing = np.isnan(values).any(axis=1) & (arrivals.time < end - job.law.dt)
+    if missing.any():
+        raise SumoError(f"SUMO's trips do not tell of vehicle {int(missing.argmax())}")
     depart, arrival, waiting = values.T
     # SUMO inserts once more at the very end: a vehicle without a step is not on the road yet.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)

@@ -1,0 +1,263 @@
+"""What a cross-validation shows: means over density, every trip, and where the hosts part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from figures import style
+from minisim.geometry import ARM_NAMES, Floats
+from minisim.recording import LANE, MANOEUVRE, TIME, VEHICLE, S
+from scenarios.crossval import Result
+from scenarios.crossval.comparison import times
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+METRICS: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
+
+#: Colour, marker and line of each source: told apart without colour too.
+LOOKS: Final = {
+    "minisim": (style.BLUE, "o", "-"),
+    "SUMO": (style.ORANGE, "s", "--"),
+    "published": (style.BLACK, "D", ":"),
+}
+#: Lines are drawn so far apart that their interval bars do not cover each other [veh/h/lane].
+DODGE: Final = 2.5
+
+#: What a trajectory figure shows: around the parting [s], and around the junction entry [m].
+SHOWN_BEFORE, SHOWN_AFTER = 12.0, 28.0
+SHOWN_FROM, SHOWN_TO = -90.0, 40.0
+
+#: Distributions are shown up to this quantile; the few trips beyond would take all the room.
+TAIL: Final = 0.995
+
+
+def group_of(result: Result) -> tuple[str, str, str]:
+    """What is drawn together: all densities of a junction, split and controller."""
+    return result.case.scenario.name, result.case.split, result.case.controller
+
+
+def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figure]]:
+    """Every figure of a comparison: name of its file, caption, and the figure itself."""
+    groups: dict[tuple[str, str, str], list[Result]] = {}
+    for result in results:
+        if result.rows:
+            groups.setdefault(group_of(result), []).append(result)
+    for group, members in groups.items():
+        ordered = sorted(members, key=lambda result: result.case.density)
+        title = ", ".join(group)
+        if len(ordered) > 1:
+            yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
+        yield _file("trips", *group), f"{title}: every trip", trips_figure(ordered)
+    for result in results:
+        if result.film is not None and result.film.parting is not None:
+            name = result.case.name
+            yield (
+                _file("parting", *name.split()),
+                f"{name}: where the hosts part",
+                parting_figure(result),
+            )
+
+
+def means_figure(results: Sequence[Result]) -> Figure:
+    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's.
+
+    Args:
+        results: of one junction, split and controller, by density.
+    """
+    figure = style.new_figure(8.6, 4.0)
+    panels = figure.subplots(1, len(METRICS))
+    figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
+    for axes, (metric, name) in zip(panels, METRICS.items(), strict=True):
+        for k, host in enumerate(("minisim", "sumo")):
+            intervals = [getattr(result.row(metric), host) for result in results]
+            label = "SUMO" if host == "sumo" else host
+            _line(
+                axes, label, DODGE * (k - 0.5), results,
+                [i.mean for i in intervals], [i.half_width for i in intervals],
+            )  # fmt: skip
+        paper = [(r, v) for r in results if (v := r.case.reference(metric, "all")) is not None]
+        if paper:
+            _line(axes, "published", 0.0, [r for r, _ in paper], [v for _, v in paper])
+        style.plot_axes(axes, name, "density [veh/h/lane]", "mean [s]")
+        axes.set_xticks(sorted({result.case.density for result in results}))
+        axes.margins(x=0.08, y=0.1)
+        axes.set_ylim(bottom=0.0)
+    _head(figure, panels[0], results[0])
+    return figure
+
+
+def trips_figure(results: Sequence[Result]) -> Figure:
+    """Distributions of both hosts above, the same trip in both below; one column a density.
+
+    Args:
+        results: of one junction, split and controller, by density.
+    """
+    columns = len(results)
+    figure = style.new_figure(max(6.4, 2.7 * columns + 0.9), 7.6)
+    panels = figure.subplots(3, columns, squeeze=False)
+    figure.subplots_adjust(
+        left=0.62 / figure.get_figwidth(), right=1.0 - 0.15 / figure.get_figwidth(), top=0.865,
+        bottom=0.065, wspace=0.3, hspace=0.5,
+    )  # fmt: skip
+    for k, result in enumerate(results):
+        for axes, (metric, name) in zip(panels[:2, k], METRICS.items(), strict=True):
+            _distributions(axes, result, metric)
+            title = f"{result.case.density:g} veh/h/lane" if axes is panels[0, k] else ""
+            ylabel = "share of trips" if k == 0 else ""
+            style.plot_axes(axes, title, f"{name.lower()} [s]", ylabel)
+        _scatter(panels[2, k], result)
+        ylabel = "travel time in SUMO [s]" if k == 0 else ""
+        style.plot_axes(panels[2, k], "", "in minisim [s]", ylabel)
+    _head(figure, panels[0, 0], results[0])
+    return figure
+
+
+def parting_figure(result: Result) -> Figure:
+    """Distance to the junction over time, one panel a lane, both hosts over each other."""
+    film = result.film
+    if film is None or film.parting is None:
+        raise ValueError("the hosts do not part in this result")
+    site = result.case.scenario.site()
+    entry, arms = site.intersection.approach_length, site.intersection.n
+    start = film.parting.time - SHOWN_BEFORE
+    figure = style.new_figure(9.6, 1.25 + 1.45 * arms)
+    height = figure.get_figheight()
+    panels = figure.subplots(arms, 1, sharex=True, squeeze=False)[:, 0]
+    figure.subplots_adjust(
+        left=0.085, right=0.985, top=1.0 - 0.95 / height, bottom=0.55 / height, hspace=0.14
+    )
+    for frame, look in ((film.minisim, LOOKS["minisim"]), (film.sumo, LOOKS["SUMO"])):
+        shown = frame[(frame[TIME] >= start) & (frame[TIME] <= start + SHOWN_BEFORE + SHOWN_AFTER)]
+        near = shown[(shown[S] >= entry + SHOWN_FROM) & (shown[S] <= entry + SHOWN_TO)]
+        colour, _, dashes = look
+        width = 1.3 if dashes == "-" else 1.8
+        for _, trip in near.groupby(VEHICLE):
+            axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
+            axes.plot(trip[TIME], trip[S] - entry, color=colour, linestyle=dashes, linewidth=width)
+            if dashes == "-":
+                _name_trip(axes, trip, entry)
+    for axes, lane in zip(panels, ARM_NAMES, strict=False):
+        style.plot_axes(axes, "", "", f"lane {lane} [m]")
+        axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
+        axes.set_ylim(SHOWN_FROM, SHOWN_TO)
+        axes.set_xlim(start, start + SHOWN_BEFORE + SHOWN_AFTER)
+    lane = panels[ARM_NAMES.index(film.movement[0])]
+    lane.plot(
+        film.parting.time, film.parting.positions[0] - entry, "o", markersize=13,
+        markerfacecolor="none", markeredgecolor=style.VERMILLION, markeredgewidth=1.8,
+    )  # fmt: skip
+    panels[-1].set_xlabel("time [s]", fontsize=9.5, color=style.INK)
+    for host in ("minisim", "SUMO"):
+        panels[0].plot([], [], color=LOOKS[host][0], linestyle=LOOKS[host][2], label=host)
+    panels[0].plot(
+        [], [], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, label="first apart"
+    )
+    _head(figure, panels[0], result, "front bumper before (−) and behind (+) the junction entry")
+    return figure
+
+
+def _line(
+    axes: Axes,
+    source: str,
+    aside: float,
+    results: Sequence[Result],
+    means: Sequence[float],
+    half_widths: Sequence[float] | None = None,
+) -> None:
+    colour, marker, dashes = LOOKS[source]
+    densities = np.array([result.case.density for result in results])
+    axes.errorbar(
+        densities + aside, means, yerr=half_widths, color=colour, marker=marker, linestyle=dashes,
+        linewidth=1.8, markersize=5.5, capsize=3.5, elinewidth=1.2, label=source, zorder=3,
+    )  # fmt: skip
+
+
+def _distributions(axes: Axes, result: Result, metric: str) -> None:
+    """Share of the trips up to a time, in both hosts, and the distance of the two."""
+    values = {
+        "minisim": np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
+        "SUMO": np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
+    }
+    for host, found in values.items():
+        colour, _, dashes = LOOKS[host]
+        ordered = np.sort(found)
+        shares = np.arange(1, len(ordered) + 1) / len(ordered)
+        axes.step(
+            ordered, shares, where="post", color=colour, linestyle=dashes, linewidth=1.6, label=host
+        )  # fmt: skip
+    low, high = np.quantile(np.concatenate(list(values.values())), (0.0, TAIL))
+    room = 0.03 * max(high - low, 1.0)
+    axes.set_xlim(low - room, high + room)
+    axes.set_ylim(0.0, 1.02)
+    axes.text(
+        0.97, 0.06, f"KS {result.row(metric).ks:.3f}", transform=axes.transAxes, ha="right",
+        fontsize=9, color=style.INK,
+    )  # fmt: skip
+
+
+def _scatter(axes: Axes, result: Result) -> None:
+    """Travel time of each trip that ended in both hosts."""
+    ours, theirs = (np.concatenate(part) for part in zip(*_both(result), strict=True))
+    axes.plot(
+        ours, theirs, linestyle="none", marker="o", markersize=2.6, markeredgewidth=0,
+        color=style.BLUE, alpha=0.35, rasterized=True,
+    )  # fmt: skip
+    low, high = np.quantile(np.concatenate([ours, theirs]), (0.0, TAIL))
+    room = 0.03 * max(high - low, 1.0)
+    limits = (low - room, high + room)
+    axes.plot(limits, limits, color=style.VERMILLION, linewidth=1.0, zorder=1)
+    axes.set_xlim(limits)
+    axes.set_ylim(limits)
+    axes.text(
+        0.05, 0.9, f"same: {100 * result.row('travel_time_s').within:.1f} %",
+        transform=axes.transAxes, fontsize=9, color=style.INK,
+    )  # fmt: skip
+
+
+def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
+    for pair in result.pairs:
+        ended = pair.minisim.arrived & pair.sumo.arrived
+        yield pair.minisim.travel_time[ended], pair.sumo.travel_time[ended]
+
+
+def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
+    """Write who it is, and what it wants, beside the start of its line."""
+    first = trip.iloc[0]
+    axes.text(
+        first[TIME] - 0.25, first[S] - entry + 2.0,
+        f"{first[VEHICLE]}: {first[LANE]}{first[MANOEUVRE]}", fontsize=7.5, color=style.INK,
+        ha="right", va="bottom", clip_on=True,
+        bbox={"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
+    )  # fmt: skip
+
+
+def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
+    """Title, note and legend above the panels."""
+    case = result.case
+    height = figure.get_figheight()
+    left = figure.subplotpars.left
+    where = case.name if note else ", ".join(group_of(result))
+    arrivals = "drawn" if case.published is None else "published"
+    title = f"{where} · profile {case.scenario.profile.name}, {arrivals} arrivals"
+    figure.text(left, 1 - 0.2 / height, title, fontsize=10.5, color=style.INK, va="center")
+    if note:
+        figure.text(
+            0.985, 1 - 0.2 / height, note, fontsize=9, color=style.MUTED, va="center", ha="right"
+        )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="upper left", bbox_to_anchor=(left - 0.01, 1 - 0.28 / height),
+        ncols=len(labels), frameon=False, fontsize=10, handlelength=2.6, columnspacing=2.2,
+        labelcolor=style.INK,
+    )  # fmt: skip
+
+
+def _file(kind: str, *words: str) -> str:
+    """A file name without what is special in links and file systems."""
+    return "_".join([kind, *words]).replace(":", "-").replace(" ", "_")

@@ -1,0 +1,98 @@
+"""What the comparison of a cell gives, and whether that is within the stated tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from scenarios.crossval.cases import Case
+from scenarios.crossval.comparison import Divergence, Pair, Parting, Row, Tolerance
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: What the means of the two hosts may differ by where each has its own car following.
+HOST_TOLERANCES: Final = {
+    "travel_time_s": Tolerance(0.03),
+    "waiting_time_s": Tolerance(0.10, 0.3),
+}
+#: Share of the trips that must be the same where both hosts have the same car following.
+HOST_SHARE: Final = 0.9
+
+
+class Failure(NamedTuple):
+    """A run that did not end well: where, with which seed, and why."""
+
+    host: str
+    seed: int
+    error: str
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Trajectories of both hosts around the first trip that differs.
+
+    Attributes:
+        minisim, sumo: trajectories.
+        parting: where they part; None where no vehicle does while it is recorded.
+        movement: of the vehicle that parts.
+    """
+
+    minisim: pd.DataFrame
+    sumo: pd.DataFrame
+    parting: Parting | None
+    movement: str
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a case gave.
+
+    Attributes:
+        case: the case.
+        pairs: the seeds that both hosts finished.
+        rows: the statistics; empty without a pair.
+        agreement: share of the trips that are the same; NaN without a pair.
+        collisions: in minisim and in SUMO, over the pairs.
+        failures: the runs that failed.
+        sumo: version of SUMO, empty where it did not run.
+        divergence: the first trip of the first pair that differs; None where none does.
+        film: what led to it; None until it is recorded.
+    """
+
+    case: Case
+    pairs: tuple[Pair, ...]
+    rows: tuple[Row, ...]
+    agreement: float
+    collisions: tuple[int, int]
+    failures: tuple[Failure, ...]
+    sumo: str
+    divergence: Divergence | None
+    film: Film | None = None
+
+    def row(self, metric: str, lane: str = "all") -> Row:
+        """The statistics of a metric and lane."""
+        return next(row for row in self.rows if (row.metric, row.lane) == (metric, lane))
+
+    @property
+    def hosts_agree(self) -> bool:
+        """Whether the hosts agree within the stated tolerances."""
+        if not self.rows:
+            return False
+        if self.case.same_law:
+            return self.agreement >= HOST_SHARE
+        return all(
+            tolerance.holds(self.row(metric).minisim.mean, self.row(metric).difference.mean)
+            for metric, tolerance in HOST_TOLERANCES.items()
+        )
+
+    def meets_paper(self, host: str) -> bool | None:
+        """Whether a host's means are within the tolerances of the published ones; None: no such."""
+        judged = [
+            tolerance.holds(value, getattr(self.row(metric), host).mean - value)
+            for metric in HOST_TOLERANCES
+            if self.rows
+            and (value := self.case.reference(metric, "all")) is not None
+            and (tolerance := self.case.reference_tolerance(metric)) is not None
+        ]
+        return all(judged) if judged else None

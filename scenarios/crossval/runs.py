@@ -1,0 +1,229 @@
+"""The runs behind a comparison: every cell with every seed in both hosts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+
+from minisim.arrivals import Arrivals
+from minisim.control import Site
+from minisim.errors import MinisimError
+from minisim.recording import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
+from minisim.trips import Trips
+from scenarios.controllers import controller_named
+from scenarios.crossval.cases import Case
+from scenarios.crossval.comparison import (
+    Divergence,
+    Pair,
+    agreement,
+    compare,
+    first_divergence,
+    first_parting,
+)
+from scenarios.crossval.results import Failure, Film, Result
+from scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from minisim.run import Run
+
+HOSTS: Final = ("minisim", "sumo")
+
+#: Recorded before the departure of the first trip that differs, and after its arrival [s].
+BEFORE, AFTER = 30.0, 5.0
+
+Progress = Callable[[int, int], None]
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+
+def crossvalidate(
+    cases: Sequence[Case],
+    seeds: Sequence[int],
+    executor: Executor,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Run every case with every seed in both hosts, and compare.
+
+    A run that fails becomes a `Failure` of its case. Replays have one run, for nothing in them
+    is drawn.
+    """
+    runs = [
+        [
+            (case, host, seed)
+            for seed in (seeds if case.published is None else [0])
+            for host in HOSTS
+        ]
+        for case in cases
+    ]
+    tasks = [run for of_case in runs for run in of_case]
+    outcomes = iter(_gather(executor, _run, tasks, progress))
+    return [
+        _result(case, {run[1:]: next(outcomes) for run in of_case})
+        for case, of_case in zip(cases, runs, strict=True)
+    ]
+
+
+def film(
+    results: Sequence[Result], executor: Executor, progress: Progress | None = None
+) -> list[Result]:
+    """Add the trajectories around the first trip that differs, from a second, shorter run."""
+    tasks = [
+        (result.case, host, result.divergence)
+        for result in results
+        if result.divergence is not None
+        for host in HOSTS
+    ]
+    frames = iter(_gather(executor, _record, tasks, progress))
+    return [
+        result if result.divergence is None else _filmed(result, next(frames), next(frames))
+        for result in results
+    ]
+
+
+class _Outcome(NamedTuple):
+    """What a run gave: its trips, or its error."""
+
+    trips: Trips | None = None
+    collisions: int = 0
+    sumo: str = ""
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class _Excerpt:
+    """The first seconds of a scenario, with its own arrivals and demand (a `ScenarioLike`)."""
+
+    scenario: Scenario
+    horizon: float
+
+    @property
+    def name(self) -> str:
+        return self.scenario.name
+
+    @property
+    def profile_name(self) -> str:
+        return self.scenario.profile_name
+
+    @property
+    def density(self) -> float:
+        return self.scenario.density
+
+    @property
+    def depart_speed(self) -> float | None:
+        return self.scenario.depart_speed
+
+    def site(self, seed: int = 0) -> Site:
+        return self.scenario.site(seed)
+
+    def arrivals(self, seed: int) -> Arrivals:
+        return self.scenario.arrivals(seed)
+
+
+def _run(task: tuple[Case, str, int]) -> _Outcome:
+    case, host, seed = task
+    try:
+        run = _simulate(case, case.scenario, host, seed)
+    except MinisimError as error:
+        return _Outcome(error=str(error))
+    return _Outcome(run.columns, len(run.collisions), run.host.get("sumo", ""))
+
+
+def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:
+    case, host, divergence = task
+    end = min(divergence.end + AFTER, case.scenario.horizon)
+    window = (max(0.0, divergence.depart - BEFORE), end)
+    run = _simulate(
+        case, _Excerpt(case.scenario, end), host, divergence.seed,
+        record="all", record_window=window,
+    )  # fmt: skip
+    return run.trajectories[[TIME, VEHICLE, LANE, MANOEUVRE, S, SPEED]]
+
+
+def _simulate(
+    case: Case, scenario: Scenario | _Excerpt, host: str, seed: int, **options: Any
+) -> Run:
+    """Run in a host; vehicles of the published runs do touch, anybody else's must not."""
+    options["on_collision"] = "record" if case.same_law else "stop"
+    controller = controller_named(case.controller, case.scenario.profile)
+    if host == "minisim":
+        from minisim.simulation import simulate
+
+        return simulate(scenario, controller, seed, **options)
+    from minisim.sumo import simulate as simulate_in_sumo
+
+    return simulate_in_sumo(scenario, controller, seed, **options)
+
+
+def _gather(
+    executor: Executor,
+    function: Callable[[Task], Answer],
+    tasks: Sequence[Task],
+    progress: Progress | None,
+) -> list[Answer | BaseException]:
+    """The function's answers in the order of the tasks; in place of one, what was raised."""
+    futures: list[Future[Answer]] = [executor.submit(function, task) for task in tasks]
+    try:
+        for done, _ in enumerate(as_completed(futures), start=1):
+            if progress is not None:
+                progress(done, len(futures))
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    return [future.exception() or future.result() for future in futures]
+
+
+def _result(case: Case, outcomes: dict[tuple[str, int], _Outcome | BaseException]) -> Result:
+    ended = {
+        run: _Outcome(error=_reason(made)) if isinstance(made, BaseException) else made
+        for run, made in outcomes.items()
+    }
+    both = [
+        (seed, ended[HOSTS[0], seed], made) for (h, seed), made in ended.items() if h == HOSTS[1]
+    ]
+    pairs = tuple(
+        Pair(seed, ours.trips, theirs.trips)
+        for seed, ours, theirs in both
+        if ours.trips is not None and theirs.trips is not None
+    )
+    return Result(
+        case=case,
+        pairs=pairs,
+        rows=tuple(compare(pairs, case.scenario.intersection.n)) if pairs else (),
+        agreement=agreement(pairs) if pairs else math.nan,
+        collisions=(sum(o.collisions for _, o, _ in both), sum(o.collisions for _, _, o in both)),
+        failures=tuple(
+            Failure(host, seed, made.error) for (host, seed), made in ended.items() if made.error
+        ),
+        sumo=next((made.sumo for made in ended.values() if made.sumo), ""),
+        divergence=first_divergence(pairs[0]) if pairs else None,
+    )
+
+
+def _filmed(
+    result: Result, minisim: pd.DataFrame | BaseException, sumo: pd.DataFrame | BaseException
+) -> Result:
+    if isinstance(minisim, BaseException) or isinstance(sumo, BaseException):
+        made = dict(zip(HOSTS, (minisim, sumo), strict=True))
+        failed = tuple(
+            Failure(host, result.pairs[0].seed, f"recording again: {_reason(error)}")
+            for host, error in made.items()
+            if isinstance(error, BaseException)
+        )
+        return replace(result, failures=result.failures + failed)
+    parting = first_parting(minisim, sumo)
+    movement = ""
+    if parting is not None:
+        who = minisim[minisim[VEHICLE] == parting.vehicle].iloc[0]
+        movement = f"{who[LANE]}{who[MANOEUVRE]}"
+    return replace(result, film=Film(minisim, sumo, parting, movement))
+
+
+def _reason(error: BaseException) -> str:
+    kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+    return f"{kind}{error}"
