@@ -1,0 +1,128 @@
+"""The runs of a study, found among all that was ever simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from minisim.errors import integer, number, numbers
+from scenarios.experiment import Experiment
+from scenarios.statistics import growing
+from scenarios.studies import Case, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Gives for each experiment its row of a sweep, or None where it was never run.
+Find = Callable[[Sequence[Experiment]], Sequence[Mapping[str, Any] | None]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is simulated for a study.
+
+    Attributes:
+        seeds: runs a case, the seeds 1 … `seeds`.
+        horizon: of each run [s].
+        densities: only cases with these demands [veh/h/lane]; None is all.
+    """
+
+    seeds: int = 10
+    horizon: float = 3600.0
+    densities: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        integer("seeds", self.seeds, low=2, high=10_000)
+        number("horizon [s]", self.horizon, above=0)
+        if self.densities is not None:
+            object.__setattr__(self, "densities", numbers("densities", self.densities))
+
+    @classmethod
+    def quick(cls, seeds: int = 2) -> Effort:
+        """A smoke test: the same cases at three demands, five minutes each."""
+        return cls(seeds=seeds, horizon=300.0, densities=(150.0, 350.0, 800.0))
+
+    def cases(self, study: Study) -> tuple[Case, ...]:
+        """The cases of a study that are run."""
+        chosen = self.densities
+        return tuple(case for case in study.cases if chosen is None or case.density in chosen)
+
+    def experiments(self, study: Study) -> list[Experiment]:
+        """The runs of a study, seed by seed within each case."""
+        return [
+            case.experiment(seed, self.horizon)
+            for case in self.cases(study)
+            for seed in range(1, self.seeds + 1)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What is known about a study.
+
+    Attributes:
+        study: what was asked.
+        effort: how much of it was.
+        rows: one a run found: the columns of a sweep, with those of its `Case`.
+        missing: cases without a successful run.
+    """
+
+    study: Study
+    effort: Effort
+    rows: pd.DataFrame
+    missing: tuple[Case, ...]
+
+    @property
+    def good(self) -> pd.DataFrame:
+        """The rows of runs that did not fail."""
+        return self.rows[self.rows["error"].isna()]
+
+    @property
+    def failed(self) -> pd.DataFrame:
+        """The rows of runs that failed."""
+        return self.rows[self.rows["error"].notna()]
+
+
+def collect(study: Study, effort: Effort, find: Find) -> Results:
+    """Look up every run of a study.
+
+    Args:
+        study: whose cases.
+        effort: which of them, with which seeds and horizon.
+        find: where to look.
+    """
+    import pandas as pd
+
+    cases = effort.cases(study)
+    found = find(effort.experiments(study))
+    rows = [
+        {**row, **case._asdict()}
+        for k, case in enumerate(cases)
+        for row in found[k * effort.seeds : (k + 1) * effort.seeds]
+        if row is not None
+    ]
+    done = {tuple(row[key] for key in Case._fields) for row in rows if not row["error"]}
+    columns = None if rows else [*Case._fields, "seed", "error"]
+    return Results(
+        study, effort, pd.DataFrame(rows, columns=columns),
+        tuple(case for case in cases if case not in done),
+    )  # fmt: skip
+
+
+def saturated(cell: pd.DataFrame) -> bool:
+    """Whether queues kept growing in the runs of one cell, taken together.
+
+    Of the whole junction or of one lane: `scenarios.statistics.growing` over the sums of the
+    runs, which sees slower growth than each run for itself.
+    """
+    tested = [("queue_growth", "trips")] + [
+        (column, column.replace("queue_growth", "trips"))
+        for column in cell.columns
+        if column.startswith("lanes_") and column.endswith("_queue_growth")
+    ]
+    return any(
+        growing(float(cell[growth].sum()), int(cell[trips].sum()))
+        for growth, trips in tested
+        if cell[growth].notna().all()
+    )
