@@ -92,7 +92,7 @@ def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> Non
         FileError: the file cannot be written; nothing is left behind.
     """
     check_trajectories(frame)
-    _write_table(frame, path)
+    write_table(frame, path)
 
 
 def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
@@ -101,7 +101,7 @@ def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     What is not known of an unfinished trip is an empty cell.
     """
     _check_columns(frame, TRIP_COLUMNS)
-    _write_table(frame, path)
+    write_table(frame, path)
 
 
 def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> None:
@@ -174,7 +174,8 @@ def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
         raise InputError(f"the frame has no column {', '.join(missing)}")
 
 
-def _write_table(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+def write_table(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write a table as CSV or Parquet, by the suffix of `path`; raises as `write_trajectories`."""
     instance("output file", path, (str, os.PathLike))
     writers: dict[str, Callable[[Path], None]] = {
         ".csv": lambda file: frame.round(CSV_DECIMALS).to_csv(

@@ -124,6 +124,8 @@ class Scenario:
     @property
     def density(self) -> float:
         """Mean inflow a lane [veh/h], as demanded or as recorded."""
+        if self.recorded is None:
+            return self.demand.density
         rates = self.rates
         return sum(rates) / len(rates)
 

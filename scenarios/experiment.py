@@ -1,0 +1,233 @@
+"""One experiment: what is run, the key under which a store knows it, and the row that it gives."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import platform
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from numbers import Integral, Real
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from minisim.control import Controller
+from minisim.errors import InputError, MinisimError, choice, instance, integer, show
+from minisim.geometry import ARM_NAMES
+from minisim.hosting import ON_COLLISION
+from minisim.trips import Trips
+from minisim.version import __version__
+from scenarios.scenario import Scenario
+from scenarios.statistics import growing, queue_growth
+
+#: Raised by one whenever the same experiment gives another row than before, while the version of
+#: the package stays: rows of older results are then computed again.
+RESULTS = 1
+
+#: Columns that a repetition of the same run measures anew.
+MEASURED = ("cpu_s",)
+
+Row = dict[str, Any]
+
+
+def results_version() -> str:
+    """What rows depend on besides their experiment."""
+    return f"{__version__}/{RESULTS}"
+
+
+class Outcome(NamedTuple):
+    """What a run left: its row, and where that came from."""
+
+    row: Row
+    provenance: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One run to be made: what is simulated, who decides, and the seed.
+
+    Attributes:
+        scenario, controller, seed: of the run.
+        label: what rows call the controller; empty is its own name.
+        on_collision: "stop" makes a run that collides a failed one, "record" counts and goes on.
+    """
+
+    scenario: Scenario
+    controller: Controller
+    seed: int = 0
+    label: str = ""
+    on_collision: str = "stop"
+
+    def __post_init__(self) -> None:
+        instance("scenario", self.scenario, Scenario)
+        if isinstance(self.controller, type) or not isinstance(self.controller, Controller):
+            raise InputError(f"controller must be a Controller, got {show(self.controller)}")
+        integer("seed", self.seed, low=0)
+        instance("label", self.label, str)
+        choice("on_collision", self.on_collision, ON_COLLISION)
+
+    @property
+    def name(self) -> str:
+        """What rows call the controller."""
+        return self.label or self.controller.name
+
+    @property
+    def description(self) -> str:
+        """Every parameter as JSON: two experiments are the same when their descriptions are.
+
+        Raises:
+            InputError: a controller that is not made of dataclasses, numbers, texts and arrays.
+        """
+        return json.dumps(canonical(self), separators=(",", ":"), allow_nan=True)
+
+    @property
+    def key(self) -> str:
+        """What a store knows it by."""
+        return key_of(self.description)
+
+    def identity(self) -> Row:
+        """The columns that tell what was run."""
+        scenario = self.scenario
+        demand, intersection = scenario.demand, scenario.intersection
+        recorded = scenario.recorded is not None
+        return {
+            "controller": self.name,
+            "scenario": scenario.name,
+            "arms": intersection.n,
+            "side": intersection.side,
+            "profile": scenario.profile.name,
+            "density": scenario.density,
+            "split": "recorded" if recorded else _shares(demand.split, "balanced"),
+            "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
+            "seed": self.seed,
+            "horizon_s": scenario.horizon,
+        }
+
+
+def key_of(description: str) -> str:
+    """SHA-256 of a description."""
+    return hashlib.sha256(description.encode()).hexdigest()
+
+
+def canonical(value: object) -> Any:
+    """The parameters of a recipe as JSON values, alike for equal recipes.
+
+    Dataclasses become their class and fields, numbers floats (350 and 350.0 are the same density),
+    arrays their type, shape and SHA-256.
+
+    Raises:
+        InputError: anything else, since what cannot be compared cannot be found again.
+    """
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, Integral | Real):
+        return _canonical_number(value)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+        plain = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("<"))
+        digest = hashlib.sha256(plain.tobytes()).hexdigest()
+        return {"array": plain.dtype.str, "shape": list(plain.shape), "sha256": digest}
+    if is_dataclass(value) and not isinstance(value, type):
+        kind = type(value)
+        return {
+            "class": f"{kind.__module__}.{kind.__qualname__}",
+            **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
+        }
+    if isinstance(value, tuple | list):
+        return [canonical(item) for item in value]
+    if isinstance(value, Mapping):
+        pairs = [[canonical(key), canonical(item)] for key, item in value.items()]
+        return {"mapping": sorted(pairs, key=json.dumps)}
+    if isinstance(value, set | frozenset):
+        return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
+    raise InputError(
+        f"{show(value)} cannot be stored: experiments are made of dataclasses, numbers, texts, "
+        "arrays and collections of them"
+    )
+
+
+def _canonical_number(value: Real | Integral) -> float | str:
+    number = float(value)
+    return number + 0.0 if number == value or math.isnan(number) else str(value)
+
+
+def run_experiment(experiment: Experiment) -> Outcome:
+    """Run one experiment; a `MinisimError` becomes part of the row."""
+    from minisim.simulation import simulate
+
+    scenario, controller = experiment.scenario, experiment.controller
+    began = time.thread_time()
+    try:
+        run = simulate(scenario, controller, experiment.seed, on_collision=experiment.on_collision)
+    except MinisimError as error:
+        return failed(experiment, error)
+    cpu = time.thread_time() - began
+    identity = experiment.identity()
+    summary = {key: value for key, value in _flat(run.summary()) if key not in identity}
+    row = {
+        **identity,
+        **summary,
+        **_growth(run.columns, scenario.intersection.n),
+        "arrivals": _fingerprint(run.columns),
+        "cpu_s": cpu,
+        "version": results_version(),
+        "error": None,
+    }
+    return Outcome(row, _provenance())
+
+
+def failed(experiment: Experiment, error: BaseException) -> Outcome:
+    """The outcome of a run that gave none."""
+    kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+    row = {**experiment.identity(), "version": results_version(), "error": f"{kind}{error}"}
+    return Outcome(row, _provenance())
+
+
+def _growth(trips: Trips, n: int) -> Row:
+    """Growth of the queues, total and by lane, and whether it is more than chance."""
+    demanded = trips.demand_time <= trips.end
+    leave = np.where(trips.arrived, trips.arrival, math.inf)
+
+    def of(chosen: Any) -> tuple[float, int]:
+        grown = queue_growth(trips.demand_time[chosen], leave[chosen], trips.end)
+        return grown, int(chosen.sum())
+
+    lanes = [of(demanded & (trips.lane == lane)) for lane in range(n)]
+    total = of(demanded)
+    return {
+        "queue_growth": total[0],
+        **{f"lanes_{ARM_NAMES[i]}_queue_growth": grown for i, (grown, _) in enumerate(lanes)},
+        "growing": any(growing(*tested) for tested in (total, *lanes)),
+    }
+
+
+def _fingerprint(trips: Trips) -> str:
+    """Names the arrivals: rows of common arrivals have the same."""
+    digest = hashlib.sha256()
+    for column in (trips.demand_time, trips.lane, trips.manoeuvre):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _provenance() -> dict[str, str]:
+    return {
+        "minisim": __version__,
+        "results": str(RESULTS),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in summary.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}_")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _shares(shares: tuple[float, ...] | None, equal: str) -> str:
+    return equal if shares is None else ":".join(f"{share:g}" for share in shares)

@@ -1,0 +1,203 @@
+"""Results on disk: one SQLite file, one row a run.
+
+Every run is a transaction of its own, written ahead (WAL) and forced to the disk, so whatever
+kills a sweep, what it had stored before is there. Several processes may write at once: each waits
+for the other's transaction, and what two of them computed is one row.
+
+A row belongs to an experiment by its key and is valid while the version of the results is. SQLite
+needs a local disk: network file systems do not lock files as it must.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from minisim.errors import FileError, instance
+from scenarios.experiment import Experiment, Outcome, Row, key_of, results_version
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: In the header of the file: that it is a store ("DIMs"), and the layout of its table.
+APPLICATION = 0x44494D73
+SCHEMA = 1
+
+#: How long a transaction of another process is waited for [s].
+PATIENCE = 30.0
+
+_CREATE = f"""
+BEGIN EXCLUSIVE;
+CREATE TABLE IF NOT EXISTS runs (
+    key TEXT PRIMARY KEY,
+    version TEXT NOT NULL,
+    error TEXT,
+    experiment TEXT NOT NULL,
+    provenance TEXT NOT NULL,
+    row TEXT NOT NULL
+) WITHOUT ROWID;
+PRAGMA application_id = {APPLICATION};
+PRAGMA user_version = {SCHEMA};
+COMMIT;
+"""
+
+#: SQLite keeps these at bytes 60 and 68 of the file, 4 bytes each, big endian; the file begins
+#: with the magic text (SQLite, "Database File Format", 1.3).
+_MAGIC = b"SQLite format 3\0"
+
+
+class Store:
+    """The rows of experiments in a file; close it, or use it in a `with` statement.
+
+    Args:
+        path: of the file; made when it is not there and `create` is true.
+        create: whether it may be made.
+
+    Raises:
+        FileError: no such file, no store, one of another layout, or a damaged one; it stays as it
+            was.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, create: bool = True) -> None:
+        instance("store", path, (str, os.PathLike))
+        self.path = Path(path)
+        fresh = _is_fresh(self.path)
+        if fresh and not create:
+            raise FileError(f"there is no store {self.path}")
+        with self._guarded("open"):
+            self._database = sqlite3.connect(
+                self.path, timeout=PATIENCE, isolation_level=None, cached_statements=16
+            )
+        try:
+            with self._guarded("open"):
+                self._prepare(fresh)
+        except BaseException:
+            self._database.close()
+            raise
+
+    def put(self, experiment: Experiment, outcome: Outcome) -> None:
+        """Store an outcome, in place of what was known of the experiment.
+
+        Raises:
+            FileError: the disk is full, another process does not let go, …; what was stored stays.
+            InputError: an experiment that cannot be described (`canonical`).
+        """
+        description = experiment.description
+        row = outcome.row
+        with self._guarded("write"):
+            self._database.execute(
+                "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?)",
+                (
+                    key_of(description),
+                    row["version"],
+                    row["error"],
+                    description,
+                    json.dumps(outcome.provenance),
+                    json.dumps(row, allow_nan=False),
+                ),
+            )
+
+    def valid(self, keys: Iterable[str]) -> dict[str, Row]:
+        """The rows of these keys that need not be computed: no failure, no older result."""
+        wanted = set(keys)
+        with self._guarded("read"):
+            found = self._database.execute(
+                "SELECT key, row FROM runs WHERE error IS NULL AND version = ?",
+                (results_version(),),
+            )
+            return {key: self._row(row) for key, row in found if key in wanted}
+
+    def __len__(self) -> int:
+        with self._guarded("read"):
+            (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
+        return int(count)
+
+    def frame(self) -> pd.DataFrame:
+        """All rows with the columns of `sweep`, ordered by what was run."""
+        import pandas as pd
+
+        with self._guarded("read"):
+            rows = [self._row(row) for (row,) in self._database.execute("SELECT row FROM runs")]
+        frame = pd.DataFrame(rows)
+        order = ["scenario", "profile", "split", "density", "controller", "horizon_s", "seed"]
+        return frame.sort_values(order, ignore_index=True) if rows else frame
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._database.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _prepare(self, fresh: bool) -> None:
+        if fresh:
+            # In the roll-back journal, which makes the header part of the transaction.
+            self._database.executescript(_CREATE)
+        problem = self._database.execute("PRAGMA quick_check(1)").fetchone()[0]
+        if problem != "ok":
+            raise FileError(f"store {self.path} is damaged: {problem}")
+        self._database.execute("PRAGMA journal_mode = WAL")
+        self._database.execute("PRAGMA synchronous = FULL")
+
+    def _row(self, text: str) -> Row:
+        try:
+            row: Row = json.loads(text)
+        except ValueError as error:
+            raise FileError(f"store {self.path} is damaged: {error}") from error
+        return row
+
+    @contextmanager
+    def _guarded(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError, ValueError) as error:
+            message = f"cannot {what} store {self.path}: {error}"
+            if what == "write":
+                message += "; what was stored before is safe, and the same sweep goes on from there"
+            raise FileError(message) from error
+
+
+def _is_fresh(path: Path) -> bool:
+    """Whether the store is still to be made; raises `FileError` for a file that is none.
+
+    Asked of the bytes, not of SQLite, which would begin to repair what is not ours.
+    """
+    try:
+        if not path.parent.is_dir():
+            raise FileError(f"cannot open store {path}: there is no folder {path.parent}")
+        if path.exists() and not path.is_file():
+            raise FileError(f"cannot open store {path}: it is not an ordinary file")
+        header = _head(path) if path.exists() else b""
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot open store {path}: {error}") from error
+    if not header:
+        return True
+    application = int.from_bytes(header[68:72], "big")
+    if header[:16] != _MAGIC or application != APPLICATION:
+        raise FileError(f"{path} is not a store of minisim; it was left as it is")
+    schema = int.from_bytes(header[60:64], "big")
+    if schema != SCHEMA:
+        raise FileError(
+            f"store {path} has layout {schema}, this version of minisim reads layout {SCHEMA}; "
+            "it was left as it is"
+        )
+    return False
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(100)
