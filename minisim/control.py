@@ -24,6 +24,10 @@ from minisim.vehicle import VehicleType
 #: around each body in Dresner & Stone, JAIR 31 (2008), §3.
 CLEARANCE = 0.5
 
+#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
+#: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
+LATERAL_ACCELERATION = 5.5
+
 #: Margin before a vehicle counts as unable to stop [m]: less than what a held vehicle leaves
 #: before its line (`minisim.state.STOP_MARGIN`), so that a vehicle that brakes for the junction
 #: entry never counts as committed; more than rounding, so that one that can stop always does.

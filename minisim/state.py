@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import Arrivals
-from minisim.control import Plan, Site
+from minisim.control import LATERAL_ACCELERATION, Plan, Site
 from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
 from minisim.geometry import Path
@@ -28,10 +28,6 @@ Records = npt.NDArray[np.void]
 #: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
 #: is allowed, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
 STOP_MARGIN = 0.25
-
-#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
-#: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
-LATERAL_ACCELERATION = 5.5
 
 #: Values of the field `status`.
 WAITING, DRIVING, ARRIVED = 0, 1, 2

@@ -18,7 +18,7 @@ from dim import Dim
 from minisim.control import Advise, Close, Go, Hold, Marking, Open, Plan, Unregulated, Wake
 from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.simulation import Simulation
-from minisim.state import LATERAL_ACCELERATION
+from minisim.control import LATERAL_ACCELERATION
 from minisim.trips import METRICS, TRIP_COLUMNS
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile

@@ -1,0 +1,302 @@
+"""Space-time reservation, first come first served, on pairwise conflict zones.
+
+Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
+passage; the manager looks ahead how it would drive, and grants the passage if the space that it
+needs is free at the time. Theirs is a grid of tiles, ours the conflict zones of the movements
+(`baselines.zones`): only pairs matter, and for a pair their stretches are exact.
+
+The protocol
+- The first vehicle of a lane asks, and whoever follows a holder; from `reach` before the junction
+  on. Its passage is predicted at full acceleration up to the limits (`baselines.prediction`),
+  behind the vehicle ahead in its lane and behind the last to enter its exit lane before it.
+- The passage is granted when with every other holder in conflict one of the two has left its zone
+  `buffer` seconds before the other enters its own. Into one exit lane holders go in the order of
+  their grants, so a later grant never slows down an earlier one.
+- Whoever is refused drives up to its stop line, slowing down as late as is comfortable, and is
+  considered again every `period`, in the order of first requests.
+
+What safety rests on: not on far predictions. Every `period` the manager compares holders with
+what was predicted. For one that differs it predicts anew, from what it sees. A holder that no
+longer fits, with a new prediction, among all others, loses its reservation if it can still stop;
+so does whoever follows it. So when a vehicle becomes unable to stop, its passage fits those of all
+others that can not, and whoever still can yields to it. What remains is the error of a prediction
+over a vehicle's last few seconds before its zones, from a state that is at most a period old, and
+`buffer` is there for it. In minisim, where drivers differ in nothing, predictions are those of the
+simulator itself and the error is 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.prediction import NOBODY, Floats, Leader, Motion, predict, ways
+from baselines.zones import conflict_zones
+from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake, can_stop
+from minisim.errors import InputError, instance, number
+from minisim.vehicle import EngineVehicle
+
+#: Differences from the prediction that are none [m], [m/s].
+POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
+
+#: How far past the junction exit a rear is followed, for those behind it [m].
+BEYOND = 60.0
+
+
+@dataclass(frozen=True)
+class Reservation:
+    """Space-time reservation, first come first served, for vehicles that follow the IDM.
+
+    Attributes:
+        reach: how far before the junction vehicles ask [m].
+        buffer: between one vehicle's leaving a conflict zone and the other's entering its own [s]:
+            0.25 s on either side, as at the edge tiles of the AIM4 simulator.
+        period: time between two looks at holders and requests [s].
+        name: short name.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    reach: float = 100.0
+    buffer: float = 0.5
+    period: float = 0.5
+    name: str = "reservation"
+
+    def __post_init__(self) -> None:
+        number("reach [m]", self.reach, low=1, high=1000)
+        number("buffer [s]", self.buffer, low=0, high=10)
+        number("period [s]", self.period, low=0.01, high=10)
+        instance("name", self.name, str)
+
+    def start(self, site: Site) -> ReservationSession:
+        """Begin a run; raises `InputError` for vehicles whose motion is not predicted."""
+        return ReservationSession(self, site)
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """A reservation: how a vehicle will cross.
+
+    Attributes:
+        vehicle: its id.
+        lane: its approach lane.
+        movement: index of its movement.
+        start: when the prediction was made [steps].
+        s, v: position past the entry [m] and speed [m/s], one a step from `start` on.
+        enters: when its front is in the junction [steps].
+        zones: of each movement in conflict, the last step before and the first step past the
+            conflict zone.
+    """
+
+    vehicle: int
+    lane: int
+    movement: int
+    start: int
+    s: Floats
+    v: Floats
+    enters: int
+    zones: dict[int, tuple[int, int]]
+
+    @property
+    def ends(self) -> int:
+        """The last step that is predicted."""
+        return self.start + len(self.s) - 1
+
+    def leader(self, now: int, until: float = math.inf, shift: float = 0.0) -> Leader:
+        """What a follower sees of it from `now` [steps] on."""
+        return Leader(self.s[now - self.start :], self.v[now - self.start :], until, shift)
+
+    def expects(self, seen: Observed, now: int) -> bool:
+        """Whether the vehicle is where it was predicted to be."""
+        k = now - self.start
+        return (
+            abs(self.s[k] + seen.distance) <= POSITION_TOLERANCE
+            and abs(self.v[k] - seen.speed) <= SPEED_TOLERANCE
+        )
+
+
+class Manager:
+    """Who holds which reservation, and which are possible; times in steps of the host.
+
+    Args:
+        site: where.
+        buffer: see `Reservation` [s].
+
+    Attributes:
+        slots: the reservations by vehicle, in the order of their grants.
+    """
+
+    def __init__(self, site: Site, buffer: float) -> None:
+        instance("site", site, Site)
+        if isinstance(site.vehicle, EngineVehicle):
+            raise InputError(
+                "reservation predicts vehicles that follow the IDM, not an EngineVehicle; "
+                "use the profile paper or fair"
+            )
+        self.slots: dict[int, Slot] = {}
+        self._motion = Motion.of(site)
+        self._ways = ways(site)
+        self._zones: list[dict[int, tuple[float, float]]] = [
+            {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
+            for row in conflict_zones(site).tolist()
+        ]
+        entry = site.intersection.approach_length
+        self._branch = site.intersection.branch(site.vehicle) - entry
+        self._manoeuvres = site.intersection.n - 1
+        self._buffer = math.ceil(buffer / site.dt - 1e-6)
+
+    def predict(self, seen: Observed, now: int, ahead: Slot | None) -> Slot | None:
+        """The passage of a vehicle behind `ahead` in its lane; None where there is none in sight.
+
+        Behind the holder that is last to enter the same exit lane, too, but for itself.
+        """
+        p = seen.lane * self._manoeuvres + seen.manoeuvre - 1
+        way = self._ways[p]
+        lane = NOBODY
+        if ahead is not None and ahead.ends >= now:
+            lane = ahead.leader(now, until=float(self._branch[ahead.movement, p]))
+        rival = self._before(way.exit_arm, seen)
+        exit_lane = NOBODY
+        if rival is not None and rival.ends >= now:
+            crossing = self._ways[rival.movement].crossing
+            exit_lane = rival.leader(now, shift=way.crossing - crossing)
+        motion = predict(
+            self._motion, way, -seen.distance, seen.speed,
+            lane=lane, exit_lane=exit_lane, beyond=BEYOND,
+        )  # fmt: skip
+        if motion is None:
+            return None
+        s, v = motion
+        return Slot(
+            seen.id, seen.lane, p, now, s, v,
+            enters=now + int(np.searchsorted(s, 0.0)),
+            zones={
+                q: (
+                    now + int(np.searchsorted(s, first, side="right")) - 1,
+                    now + int(np.searchsorted(s, last)),
+                )
+                for q, (first, last) in self._zones[p].items()
+            },
+        )  # fmt: skip
+
+    def fits(self, slot: Slot, *, last: bool) -> bool:
+        """Whether a passage is compatible with every other reservation.
+
+        Args:
+            slot: the passage.
+            last: whether it must come after those that share its exit lane.
+        """
+        exit_arm = self._ways[slot.movement].exit_arm
+        for other in self.slots.values():
+            if other.vehicle == slot.vehicle or other.movement not in slot.zones:
+                continue
+            merges = self._ways[other.movement].exit_arm == exit_arm
+            if self._before_other(other, slot, merges):
+                continue
+            if (last and merges) or not self._before_other(slot, other, merges):
+                return False
+        return True
+
+    def _before_other(self, first: Slot, second: Slot, merges: bool) -> bool:
+        """Whether `first` is through before `second` comes; into one exit lane, enters before."""
+        through = first.zones[second.movement][1] + self._buffer <= second.zones[first.movement][0]
+        return through and (not merges or first.enters < second.enters)
+
+    def _before(self, exit_arm: int, seen: Observed) -> Slot | None:
+        """The last holder to enter an exit lane before a vehicle; of all, where it holds none."""
+        own = self.slots.get(seen.id)
+        latest = math.inf if own is None else own.enters
+        rivals = [
+            slot
+            for slot in self.slots.values()
+            if self._ways[slot.movement].exit_arm == exit_arm
+            and slot.vehicle != seen.id
+            and slot.enters < latest
+        ]
+        return max(rivals, key=lambda slot: slot.enters, default=None)
+
+
+class ReservationSession:
+    """One run: keeps reservations true to what is seen, and serves requests.
+
+    Attributes:
+        manager: holds the reservations.
+        plan: a wake-up where vehicles begin to ask; later ones are asked for.
+    """
+
+    def __init__(self, controller: Reservation, site: Site) -> None:
+        self.manager = Manager(site, controller.buffer)
+        self.plan = Plan(marks=(controller.reach,), sight=controller.reach)
+        self._period = controller.period
+        self._dt = site.dt
+        self._brakes = site.vehicle.deceleration
+        self._requests: dict[int, None] = {}  # in the order of first requests
+
+    def decide(self, view: View) -> Iterable[Command]:
+        """Check the reservations, then consider the requests in the order of the first ones."""
+        now = round(view.time / self._dt)
+        manager = self.manager
+        seen = {vehicle.id: vehicle for vehicle in view.vehicles}
+        manager.slots = {v: slot for v, slot in manager.slots.items() if slot.ends >= now}
+        ahead = dict(self._followers(view))
+        commands: list[Command] = [Hold(v) for v in self._revoke(seen, ahead, now)]
+        for vehicle in seen:
+            if vehicle not in manager.slots:
+                self._requests.setdefault(vehicle)
+        self._requests = {v: None for v in self._requests if v in seen and v not in manager.slots}
+        commands += [Go(v) for v in self._grant(seen, ahead, now)]
+        if seen:
+            commands.append(Wake(view.time + self._period))
+        return commands
+
+    def _followers(self, view: View) -> Iterator[tuple[int, int | None]]:
+        """Each vehicle's id with that of the one ahead of it in its lane."""
+        lane, ahead = -1, None
+        for vehicle in view.vehicles:
+            ahead = ahead if vehicle.lane == lane else None
+            yield vehicle.id, ahead
+            lane, ahead = vehicle.lane, vehicle.id
+
+    def _revoke(
+        self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
+    ) -> Iterator[int]:
+        """Renew what differs from its prediction; the ids of those who lose their reservation."""
+        slots = self.manager.slots
+        changed: set[int] = set()
+        for vehicle in list(slots):
+            me = seen.get(vehicle)
+            if me is None or (slots[vehicle].expects(me, now) and ahead[vehicle] not in changed):
+                continue
+            changed.add(vehicle)
+            leader = ahead[vehicle]
+            slot = None
+            if leader is None or leader in slots:
+                slot = self.manager.predict(me, now, slots.get(leader) if leader is not None else None)
+            if slot is not None and self.manager.fits(slot, last=False):
+                slots[vehicle] = slot
+            elif can_stop(me, self._brakes):
+                del slots[vehicle]
+                yield vehicle
+            elif slot is not None:
+                slots[vehicle] = slot
+
+    def _grant(
+        self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
+    ) -> Iterator[int]:
+        """Grant what is possible; the ids of the new holders."""
+        slots = self.manager.slots
+        for vehicle in list(self._requests):
+            leader = ahead[vehicle]
+            if leader is not None and leader not in slots:
+                continue
+            slot = self.manager.predict(
+                seen[vehicle], now, slots.get(leader) if leader is not None else None
+            )
+            if slot is not None and self.manager.fits(slot, last=True):
+                slots[vehicle] = slot
+                del self._requests[vehicle]
+                yield vehicle
