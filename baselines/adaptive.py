@@ -1,0 +1,119 @@
+"""The adaptive signal: a phase lasts while delayed vehicles can still make use of it.
+
+The rule of SUMO's traffic light type `delay_based` (`MSDelayBasedTrafficLightLogic`; its
+documentation cites Oertel & Wagner, TRB 2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from baselines.actuated import ActuatedSession, Verdict, on_detector
+from minisim.control import Site, View
+from minisim.errors import InputError, instance, number
+
+#: An idle signal looks again after so long [s]; fixed in SUMO's code.
+IDLE = 1.0
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """A signal that prolongs a green for vehicles that have lost time before the junction.
+
+    One phase an approach, in the order a, b, c…; none is left out. A vehicle that has lost more
+    than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
+    it takes to the stop line at the speed limit, if that is before `max_green`. While nobody is on
+    the other lanes, a green goes on too.
+
+    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
+    its way. Time lost is that against the speed limit, whatever a driver would like.
+
+    Attributes:
+        detector_range: [m]; SUMO's default.
+        min_time_loss: [s]; SUMO's default.
+        min_green: [s]; the authors' network (`minDur`).
+        max_green: [s]; the authors' network (`maxDur`).
+        extend_max_green: while nobody is on the other lanes, a green may last longer than
+            `max_green` (SUMO's `extendMaxDur`, off there as here).
+        amber: [s]; the authors' network.
+        name: short name.
+    """
+
+    detector_range: float = 100.0
+    min_time_loss: float = 1.0
+    min_green: float = 3.0
+    max_green: float = 50.0
+    extend_max_green: bool = False
+    amber: float = 2.0
+    name: str = "adaptive"
+
+    def __post_init__(self) -> None:
+        number("detector_range [m]", self.detector_range, low=1, high=1000)
+        number("min_time_loss [s]", self.min_time_loss, low=0, high=3600)
+        number("min_green [s]", self.min_green, low=0.5, high=3600)
+        number("max_green [s]", self.max_green, low=0.5, high=3600)
+        if self.max_green < self.min_green:
+            raise InputError(
+                f"max_green must be at least min_green, {self.min_green:g} s, "
+                f"got {self.max_green:g} s"
+            )
+        instance("extend_max_green", self.extend_max_green, bool)
+        number("amber [s]", self.amber, low=0, high=60)
+        instance("name", self.name, str)
+
+    def start(self, site: Site) -> ActuatedSession:
+        """Begin a run."""
+        return ActuatedSession(
+            site,
+            DelayRule(self, site),
+            detector_range=self.detector_range,
+            min_green=self.min_green,
+            amber=self.amber,
+        )
+
+
+class DelayRule:
+    """Which vehicles prolong a green, and by how much."""
+
+    def __init__(self, signal: Adaptive, site: Site) -> None:
+        self._signal = signal
+        self._speed_limit = site.speed_limit
+        self._lanes = site.intersection.n
+        self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
+
+    def see(self, view: View) -> None:
+        """Note when and where everybody comes onto a detector."""
+        present = on_detector(view, self._signal.detector_range)
+        self._entered = {v.id: self._entered.get(v.id, (view.time, v.distance)) for v in present}
+
+    def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
+        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        signal = self._signal
+        present = on_detector(view, signal.detector_range)
+        prolongation = max(self._passing_time(view, lane, elapsed), signal.min_green - elapsed)
+        idle = all(v.lane == lane for v in present)
+        if idle and (elapsed < signal.max_green or signal.extend_max_green):
+            prolongation = max(prolongation, IDLE)
+        else:
+            prolongation = min(prolongation, signal.max_green - elapsed)
+        if prolongation > 0.0:
+            return Verdict(lane, prolongation)
+        return Verdict((lane + 1) % self._lanes, 0.0)
+
+    def _passing_time(self, view: View, lane: int, elapsed: float) -> float:
+        """How long until the last delayed vehicle passes that can before `max_green` [s]."""
+        times = [
+            v.distance / self._speed_limit
+            for v in on_detector(view, self._signal.detector_range)
+            if v.lane == lane and v.distance > 0.0 and self.time_loss(view, v.id, v.distance)
+            > self._signal.min_time_loss
+        ]
+        return max((t for t in times if elapsed + t <= self._signal.max_green), default=0.0)
+
+    def time_loss(self, view: View, vehicle: int, distance: float) -> float:
+        """∫ (1 − v/limit) dt since it came onto the detector [s].
+
+        That is the time since then, less what the same way takes at the limit.
+        """
+        time, start = self._entered[vehicle]
+        return view.time - time - (start - distance) / self._speed_limit
