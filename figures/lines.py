@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -75,10 +75,9 @@ def draw_published(
         look = style.look(name)
         chosen = table[table["series"] == name]
         x = chosen["density"].astype(float) + offset(rows, place, len(series))
-        common = {"linestyle": "none", "markerfacecolor": style.PAPER, "zorder": 5}
         axes.plot(
             x, chosen["paper"], marker=look.marker, markersize=8.0, markeredgewidth=1.2,
-            markeredgecolor=look.colour, alpha=0.95, **{**common, "markerfacecolor": "none"},
+            markeredgecolor=look.colour, markerfacecolor="none", linestyle="none", zorder=5,
         )  # fmt: skip
         crossed = (chosen["comparable"] != "yes").to_numpy()
         axes.plot(
@@ -116,7 +115,9 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.set_ylim(low, high)
 
 
-def series_legend(figure: Figure, series: Iterable[str], left: float, top: float, **more: object) -> None:
+def series_legend(
+    figure: Figure, series: Iterable[str], left: float, top: float, **more: object
+) -> None:
     """A legend of lines and markers by series."""
     looks = [style.look(name) for name in series]
     handles = [
@@ -124,34 +125,43 @@ def series_legend(figure: Figure, series: Iterable[str], left: float, top: float
                markersize=5.5)
         for k in looks
     ]  # fmt: skip
-    _legend(figure, handles, [k.label for k in looks], left, top, **more)
+    _legend(figure, handles, [k.label for k in looks], left, top, ncols=ncols)
 
 
 def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> None:
     """A legend of what markers mean, whatever the series."""
-    grey = style.MUTED
-    bar = Line2D([], [], color=grey, marker="o", linestyle="-", markersize=5.0)
-    hollow = Line2D([], [], color=grey, marker="o", linestyle="none", markersize=8.0,
-                    markerfacecolor="none")  # fmt: skip
-    cross = Line2D([], [], color=grey, marker="x", linestyle="none", markersize=7.0)
-    up = Line2D([], [], color=grey, marker=r"$\uparrow$", linestyle="none", markersize=8.0)
-    handles: list[object] = [bar]
+    handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
     labels = ["ours, mean and 95 % interval"]
     if paper:
-        handles += [hollow, (hollow, cross)]
+        hollow = _mark("o", 8.0, markerfacecolor="none")
+        handles += [hollow, (hollow, _mark("x", 7.0))]
         labels += ["the paper's value", "not the run that its label says"]
-    _legend(figure, [*handles, up], [*labels, "queue still growing at the end"], left, top, fontsize=8.5)
+    handles.append(_mark(r"$\uparrow$", 8.0))
+    labels.append("queue still growing at the end")
+    _legend(figure, handles, labels, left, top, fontsize=8.5)
+
+
+def _mark(marker: str, size: float, **look: Any) -> Line2D:
+    return Line2D(
+        [], [], color=style.MUTED, marker=marker, linestyle="none", markersize=size, **look
+    )
 
 
 def _legend(
-    figure: Figure, handles: Sequence[object], labels: Sequence[str], left: float, top: float,
-    fontsize: float = 9.5, **more: object,
-) -> None:  # fmt: skip
-    options = {"ncols": len(labels), "columnspacing": 1.7, **more}
+    figure: Figure,
+    handles: Sequence[Any],
+    labels: Sequence[str],
+    left: float,
+    top: float,
+    *,
+    fontsize: float = 9.5,
+    ncols: int | None = None,
+) -> None:
     figure.legend(
         handles, labels, loc="upper left", bbox_to_anchor=(left, top), frameon=False,
         fontsize=fontsize, handlelength=2.4, labelcolor=style.INK, borderaxespad=0.0,
-        handletextpad=0.6, handler_map={tuple: HandlerTuple(ndivide=1)}, **options,
+        handletextpad=0.6, handler_map={tuple: HandlerTuple(ndivide=1)}, columnspacing=1.7,
+        ncols=len(labels) if ncols is None else ncols,
     )  # fmt: skip
 
 

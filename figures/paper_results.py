@@ -17,7 +17,6 @@ from scenarios.paper import DENSITIES
 if TYPE_CHECKING:
     import pandas as pd
 
-    from scenarios.results import Results
 
 #: The paper's controllers, in the order of its text.
 SERIES = ("dim", "fixed-time", "adaptive", "v2ic")
@@ -57,7 +56,7 @@ def split_figure(archive: Archive, metric: str, split: str) -> Figure:
         lines.draw_published(axes, wanted, rows, SERIES)
         _dress(axes, PANELS[found.study.name], metric)
     name = "equal inflow" if split == "balanced" else f"inflow {split}"
-    _head(figure, f"Mean {METRICS[metric]}, 4 arms, {name}", results, SERIES)
+    _head(figure, f"Mean {METRICS[metric]}, 4 arms, {name}", SERIES)
     lines.footnote(figure, missing_note(results, lambda c: c.arms == 4 and c.split == split))
     return figure
 
@@ -75,7 +74,7 @@ def arms_figure(archive: Archive, metric: str) -> Figure:
         lines.draw_means(axes, rows, metric, names)
         lines.draw_published(axes, wanted, rows, names)
         _dress(axes, PANELS[found.study.name], metric)
-    _head(figure, f"Mean {METRICS[metric]} under DIM by number of arms", results, names)
+    _head(figure, f"Mean {METRICS[metric]} under DIM by number of arms", names)
     lines.footnote(
         figure, missing_note(results, lambda c: c.series == "dim" and c.split == "balanced")
     )
@@ -108,9 +107,7 @@ def _dress(axes: Axes, title: str, metric: str) -> None:
     axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
 
 
-def _head(
-    figure: Figure, title: str, results: tuple[Results, ...], series: tuple[str, ...]
-) -> None:
+def _head(figure: Figure, title: str, series: tuple[str, ...]) -> None:
     figure.axes[0].set_ylabel("seconds (logarithmic)", fontsize=9.5, color=style.INK)
     figure.text(0.012, 0.965, title, fontsize=13, fontweight="bold", color=style.INK, va="center")
     lines.series_legend(figure, series, 0.012, 0.925)

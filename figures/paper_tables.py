@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Mapping
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from baselines import webster, webster_delay
 from dim import HarmonyMatrix
@@ -27,7 +28,7 @@ HEADINGS = {"as-run": "as the published runs were made", "text": "as the text pr
 def webster_table() -> Table:
     """Green times of the fixed-time signal: ours from Webster's formula, and those printed."""
     file = resources.files("scenarios") / "data" / "webster_table.csv"
-    with file.open(encoding="utf-8", newline="") as text:
+    with file.open(encoding="utf-8") as text:
         printed = list(csv.DictReader(text))
     rows = []
     for row in printed:
@@ -83,9 +84,7 @@ def lane_table(archive: Archive) -> Table:
     Raises:
         MissingRunsError: nothing was run.
     """
-    tables = {
-        results.study.name: compare(results.good) for results in archive.need(*HEADINGS)
-    }
+    tables = {results.study.name: compare(results.good) for results in archive.need(*HEADINGS)}
     rows = []
     for arms in (3, 4, 5):
         for lane in ARM_NAMES[:arms]:
@@ -118,16 +117,7 @@ def comparison_table(archive: Archive, study: str) -> Table:
     """
     (results,) = archive.need(study)
     table = compare(results.good)
-    rows = []
-    for row in table.to_dict("records"):
-        rows.append((
-            style.look(row["series"]).label, f"{row['arms']}", row["split"],
-            row["metric"].removesuffix("_time_s") + ("" if row["lane"] == "all" else
-                                                     f", lane {row['lane']}"),
-            f"{row['density']:g}", f"{row['paper']:.2f}{_mark(row)}", _number(row["mean"]),
-            _number(row["sd"]), _range(row), _inside(row),
-            " ".join(f"{known.number}" for known in causes(study, row)),
-        ))  # fmt: skip
+    rows = [_compared(row, study) for row in table.to_dict("records")]
     return Table(
         f"The paper's values and ours, {HEADINGS[study]} [s]",
         ("controller", "arms", "inflow", "metric", "veh/h/lane", "paper", "ours", "sd",
@@ -184,22 +174,33 @@ _EXPLAINED = (
 )
 
 
-def _one(table: pd.DataFrame, **wanted: object) -> dict[str, object]:
+def _one(table: pd.DataFrame, **wanted: object) -> Mapping[Any, Any]:
     for key, value in wanted.items():
         table = table[table[key] == value]
     (row,) = table.to_dict("records")
-    return {str(key): value for key, value in row.items()}
+    return dict(row)
 
 
-def _mark(row: dict[str, object]) -> str:
+def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
+    lane = "" if row["lane"] == "all" else f", lane {row['lane']}"
+    return (
+        style.look(row["series"]).label, f"{row['arms']}", row["split"],
+        row["metric"].removesuffix("_time_s") + lane,
+        f"{row['density']:g}", f"{row['paper']:.2f}{_mark(row)}", _number(row["mean"]),
+        _number(row["sd"]), _range(row), _inside(row),
+        " ".join(f"{known.number}" for known in causes(study, row)),
+    )  # fmt: skip
+
+
+def _mark(row: Mapping[Any, Any]) -> str:
     return "" if row["comparable"] == "yes" else " *"
 
 
-def _ours(row: dict[str, object]) -> str:
+def _ours(row: Mapping[Any, Any]) -> str:
     return f"{_number(row['mean'])} ({_range(row)})" if row["seeds"] else "–"
 
 
-def _range(row: dict[str, object]) -> str:
+def _range(row: Mapping[Any, Any]) -> str:
     arrow = " ↑" if row["saturated"] else ""
     return f"{_number(row['low'])} … {_number(row['high'])}{arrow}"
 
@@ -208,8 +209,8 @@ def _number(value: object) -> str:
     return f"{value:.2f}" if isinstance(value, float) and math.isfinite(value) else "–"
 
 
-def _inside(row: dict[str, object]) -> str:
-    return {True: "yes", False: "no"}.get(row["inside"], "–")  # type: ignore[call-overload, no-any-return]
+def _inside(row: Mapping[Any, Any]) -> str:
+    return "–" if row["inside"] is None else "yes" if row["inside"] else "no"
 
 
 def _whole(interval: Interval | None) -> str:

@@ -141,7 +141,9 @@ def _draw_cliques(axes: Axes, told: Explanation) -> None:
     for clique, (colour, dashes) in zip(told.tied, CLIQUES, strict=False):
         points = np.array([places[m] for m in clique])
         if len(clique) > 2:
-            points = np.array(shapely.Polygon(points).buffer(-0.075, join_style="mitre").exterior.xy).T
+            points = np.array(
+                shapely.Polygon(points).buffer(-0.075, join_style="mitre").exterior.xy
+            ).T
             axes.add_patch(Polygon(points, facecolor=colour, alpha=0.12, zorder=1.5))
         axes.plot(*points.T, color=colour, linestyle=dashes, linewidth=3.0, zorder=2)
     for movement, (x, y) in places.items():

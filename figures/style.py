@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ class Look(NamedTuple):
     label: str
     colour: str
     marker: str
-    dashes: str
+    dashes: Literal["-", "--", "-.", ":"]
 
 
 BROWN, GREY = "#7A4A1E", "#5C6470"

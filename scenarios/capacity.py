@@ -121,5 +121,3 @@ def capacities(
 def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Experiment:
     density = sum(bracket) // 2 * search.step
     return case._replace(density=density).experiment(seed, search.horizon)
-
-

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
 from scenarios.paper import reference
@@ -49,7 +50,8 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     keys = ["series", "arms", "split", "density"]
-    cells = dict(list(rows[rows["error"].isna()].groupby(keys)))
+    groups = rows[rows["error"].isna()].groupby(keys)
+    cells: dict[Any, pd.DataFrame] = {key: cell for key, cell in groups}  # noqa: C416
     found = []
     order = ["arms", "split", "series", "metric", "lane", "density"]
     for row in published().sort_values(order).to_dict("records"):
@@ -124,7 +126,7 @@ class Discrepancy(NamedTuple):
     metric: str
     cause: str
 
-    def holds(self, study: str, row: Mapping[str, object]) -> bool:
+    def holds(self, study: str, row: Mapping[Any, Any]) -> bool:
         """Whether it holds for a study's row of `compare`."""
         wanted = {
             "series": self.series, "arms": self.arms, "split": self.split,
@@ -138,16 +140,13 @@ class Discrepancy(NamedTuple):
 @lru_cache
 def discrepancies() -> tuple[Discrepancy, ...]:
     """All known causes, from the data file beside the reference numbers."""
-    import csv
-
     file = resources.files("scenarios") / "data" / "discrepancies.csv"
-    with file.open(encoding="utf-8", newline="") as text:
-        return tuple(
-            Discrepancy(**{**row, "number": int(row["number"])}) for row in csv.DictReader(text)
-        )
+    with file.open(encoding="utf-8") as text:
+        rows = list(csv.DictReader(text))
+    return tuple(Discrepancy(int(row.pop("number")), **row) for row in rows)
 
 
-def causes(study: str, row: Mapping[str, object]) -> tuple[Discrepancy, ...]:
+def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:
     """The known causes of a difference in one row of `compare`.
 
     Raises:

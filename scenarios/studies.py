@@ -54,7 +54,7 @@ class Case(NamedTuple):
             self.scenario(horizon),
             controller_named(self.controller, self.profile),
             seed,
-            label=self.controller,
+            label=self.series,
             on_collision="record",
         )
 
@@ -93,9 +93,7 @@ def _paper_grid(profile_of: dict[str, tuple[str, str]]) -> tuple[Case, ...]:
     return (*four, *others)
 
 
-def _named(
-    profile_of: dict[str, tuple[str, str]], series: str, split: str
-) -> tuple[str, str, str]:
+def _named(profile_of: dict[str, tuple[str, str]], series: str, split: str) -> tuple[str, str, str]:
     profile, controller = profile_of[series]
     if split != "balanced":
         controller = _UNBALANCED.get((profile, controller), controller)

@@ -11,10 +11,10 @@ from scenarios.experiment import Experiment
 
 #: Label -> waiting at low demand [s] and capacity on four arms [veh/h/lane].
 CURVES = {
-    "dim": (0.6, 380.0), "dim-inflow": (0.6, 380.0), "dim-harmonious": (0.4, 520.0),
+    "dim": (0.6, 380.0), "dim-harmonious": (0.4, 520.0),
     "dim-rotating": (0.6, 380.0), "dim-waiting": (0.6, 380.0),
-    "fixed-time": (8.0, 400.0), "fixed-time-equal": (9.0, 400.0), "adaptive": (5.0, 450.0),
-    "v2ic": (0.1, 480.0), "v2ic-as-run": (0.2, 500.0), "all-way-stop": (1.5, 550.0),
+    "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
+    "all-way-stop": (1.5, 550.0),
     "reservation": (0.3, 600.0), "longest-queue": (4.0, 460.0),
 }  # fmt: skip
 
@@ -44,8 +44,12 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
             "complete_waiting_time_s": waiting * (i + 1) / arms,
         }.items()
     }
-    times = {"waiting_time_s": waiting, "travel_time_s": 70.0 + 1.5 * waiting,
-             "time_loss_s": 3.0 + 1.5 * waiting, "depart_delay_s": 10.0 * max(load - 1.0, 0.0)}  # fmt: skip
+    times = {
+        "waiting_time_s": waiting,
+        "travel_time_s": 70.0 + 1.5 * waiting,
+        "time_loss_s": 3.0 + 1.5 * waiting,
+        "depart_delay_s": 10.0 * max(load - 1.0, 0.0),
+    }
     return {
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},

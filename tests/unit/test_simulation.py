@@ -15,10 +15,20 @@ import pytest
 import minisim
 from baselines import FixedTime
 from dim import Dim
-from minisim.control import Advise, Close, Go, Hold, Marking, Open, Plan, Unregulated, Wake
+from minisim.control import (
+    LATERAL_ACCELERATION,
+    Advise,
+    Close,
+    Go,
+    Hold,
+    Marking,
+    Open,
+    Plan,
+    Unregulated,
+    Wake,
+)
 from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.simulation import Simulation
-from minisim.control import LATERAL_ACCELERATION
 from minisim.trips import METRICS, TRIP_COLUMNS
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
