@@ -17,10 +17,10 @@ help:  ## show this list
 demo: $(VENV)/.installed  ## the tour: DIM beside a fixed-time signal, table, plot and animation
 	$(BIN)/minisim demo --out out
 
-test: $(VENV)/.installed-sumo  ## the tests, without the slow ones
+test: $(VENV)/.installed-all  ## the tests, without the slow ones
 	$(TEST) -m "not slow"
 
-test-all: $(VENV)/.installed-sumo  ## all tests, properties on more examples
+test-all: $(VENV)/.installed-all  ## all tests, properties on more examples
 	$(TEST) --hypothesis-profile thorough
 
 lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts
@@ -29,7 +29,7 @@ lint: $(VENV)/.installed-dev  ## style, format, types, layer contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.installed-sumo  ## speed, as ratios to SUMO in the same run
+bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 	$(BIN)/python tests/bench/bench.py
 
 figures: $(VENV)/.installed  ## junction and harmony graph of a decision, as in the paper
@@ -56,6 +56,6 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP) -e '.[dev]'
 	@touch $@
 
-$(VENV)/.installed-sumo: $(VENV)/.installed-dev
-	$(PIP) -e '.[dev,sumo]'
+$(VENV)/.installed-all: $(VENV)/.installed-dev
+	$(PIP) -e '.[dev,sumo,dask]'
 	@touch $@

@@ -134,10 +134,7 @@ def gate_figure(archive: Archive) -> Figure:
         lines.log_time(axes, 0.05, 200.0)
         axes.set_xticks(DENSITIES)
     panels[0].set_ylabel("mean waiting of all vehicles [s], log.", fontsize=9.5, color=style.INK)
-    _title(
-        figure,
-        "Waiting until the junction is clear, or entering beside whom one is in harmony with",
-    )
+    _title(figure, "Two gates: nobody crossing, or in harmony with everybody who crosses")
     lines.series_legend(figure, GATES, 0.012, 0.925)
     lines.marks_legend(figure, 0.012, 0.865, paper=False)
     lines.footnote(figure, missing_note([results], lambda _: True))

@@ -69,9 +69,17 @@ def _schematic() -> Iterable[Item]:
             f"decision-{arms}way", f"junction with zones and harmony graph, {arms} arms",
             partial(_without_runs, partial(schematic.decision, arms)),
         )  # fmt: skip
-    yield Item("worst-case", "the most tied cliques on four arms", partial(_without_runs, schematic.worst_case))
+    yield Item(
+        "worst-case",
+        "the most tied cliques on four arms",
+        partial(_without_runs, schematic.worst_case),
+    )
     yield Item("maps", "the three junctions from above", partial(_without_runs, schematic.maps))
-    yield Item("webster", "greens of the fixed-time signal", partial(_without_runs, paper_tables.webster_table))
+    yield Item(
+        "webster",
+        "greens of the fixed-time signal",
+        partial(_without_runs, paper_tables.webster_table),
+    )
     for arms in (3, 4, 5):
         yield Item(
             f"harmony-{arms}way", f"harmony matrix, {arms} arms",

@@ -116,7 +116,7 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
 
 
 def series_legend(
-    figure: Figure, series: Iterable[str], left: float, top: float, **more: object
+    figure: Figure, series: Iterable[str], left: float, top: float, ncols: int | None = None
 ) -> None:
     """A legend of lines and markers by series."""
     looks = [style.look(name) for name in series]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -12,8 +12,11 @@ from rich.text import Text
 from minisim.geometry import ARM_NAMES
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from dim import Explanation, HarmonyMatrix
     from figures.gallery import Item
+    from scenarios.experiment import Experiment
 
 #: Metric of a summary -> heading.
 HEADINGS = {
@@ -108,6 +111,88 @@ def gallery_table(items: Iterable[Item]) -> Table:
     for item in items:
         table.add_row(item.name, item.title, ", ".join(item.needs) or "none")
     return table
+
+
+#: Column of `scenarios.cells.cells` -> heading.
+CELL_HEADINGS = {
+    "waiting_time_s": "waiting [s]",
+    "complete_waiting_time_s": "with unfinished",
+    "travel_time_s": "travel [s]",
+    "complete_depart_delay_s": "departure delay [s]",
+}
+
+
+def sweep_table(cells: pd.DataFrame) -> Table:
+    """One line a cell: means over seeds with 95 % confidence intervals."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for heading in ("scenario", "profile", "split", "veh/h/lane", "controller"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("runs", *CELL_HEADINGS.values(), "unfinished", "collisions", ""):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for cell in cells.to_dict("records"):
+        named = (cell["scenario"], cell["profile"], cell["split"], f"{cell['density']:g}")
+        failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
+        if cell["runs"]:
+            collisions = int(cell["collisions"])
+            table.add_row(
+                *named,
+                cell["controller"],
+                f"{cell['runs']}{failed}",
+                *(_interval(cell, metric) for metric in CELL_HEADINGS),
+                f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
+                Text(str(collisions), style="bold red" if collisions else ""),
+                Text("growing" if cell["growing"] else "", style="yellow"),
+            )
+        else:
+            table.add_row(*named, cell["controller"], f"0{failed}", style="red")
+    return table
+
+
+def sweep_notes(rows: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
+    """What to know of the table: growing queues, capped signals, the first failure."""
+    text = Text()
+    if "growing" in rows and rows["growing"].eq(True).any():
+        text.append(
+            "  growing: queues had not settled by the horizon; a mean delay there says how long "
+            "was simulated.\n"
+        )
+    for note in _capped(experiments):
+        text.append(f"  {note}\n")
+    failures = rows[rows["error"].notna()]
+    if len(failures):
+        first = failures.iloc[0]
+        text.append(
+            f"  {len(failures)} of {len(rows)} runs failed; the first ({first['controller']}, "
+            f"{first['scenario']}, {first['density']:g} veh/h/lane, seed {first['seed']}): "
+            f"{first['error']}\n",
+            "red",
+        )
+    text.rstrip()
+    return text
+
+
+def _capped(experiments: Sequence[Experiment]) -> list[str]:
+    """A line for each signal whose demand is beyond Webster's formula."""
+    from baselines import FixedTime
+
+    notes: dict[str, None] = {}
+    for experiment in experiments:
+        signal, scenario = experiment.controller, experiment.scenario
+        if isinstance(signal, FixedTime) and signal.timing(scenario.site()).capped:
+            notes[
+                f"{experiment.name}, {scenario.name}, {scenario.density:g} veh/h/lane: the demand "
+                f"is over Webster's capacity; the cycle is capped at {signal.max_cycle:g} s."
+            ] = None
+    return list(notes)
+
+
+def _interval(cell: Mapping[Hashable, Any], metric: str) -> str:
+    from scenarios.statistics import Interval
+
+    mean = cell.get(metric)
+    if mean is None or mean != mean:
+        return "–"
+    return str(Interval(mean, cell[f"{metric}_ci95"], cell["runs"]))
 
 
 def _counts(means: Mapping[str, Any]) -> tuple[str, str]:

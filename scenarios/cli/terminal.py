@@ -33,6 +33,10 @@ class Bar:
         """Move the bar."""
         self._progress.update(self._task, completed=done, total=total)
 
+    def label(self, text: str) -> None:
+        """Say something else in front of it."""
+        self._progress.update(self._task, description=text)
+
 
 @contextmanager
 def bar(label: str) -> Iterator[Bar]:

@@ -1,0 +1,116 @@
+"""Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
+
+A cell is all that was run alike but for the seed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from minisim.errors import InputError, choice
+from minisim.geometry import ARM_NAMES
+from minisim.trips import METRICS
+from scenarios.statistics import growing, mean_interval, paired_difference, prediction_interval
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns that name a cell.
+CELL: Final = (
+    "scenario",
+    "arms",
+    "side",
+    "profile",
+    "split",
+    "turns",
+    "density",
+    "horizon_s",
+    "controller",
+)
+
+#: Both forms of every mean: over the trips that ended, and over all (`minisim.trips`).
+AVERAGED: Final = (*METRICS, *(f"complete_{metric}" for metric in METRICS))
+
+
+def cells(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a cell, in the order in which the cells come.
+
+    Returns:
+        `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
+        (sums); each of `AVERAGED` with the half widths of its 95 % confidence interval (`…_ci95`)
+        and of the 95 % prediction interval of one more run (`…_pi95`), NaN where unknown;
+        `growing`, whether its queues kept growing, asked of all its runs together; `cpu_s`, mean
+        processor time of a run.
+    """
+    import pandas as pd
+
+    found = []
+    for names, group in rows.groupby(list(CELL), sort=False):
+        good = group[group["error"].isna()]
+        cell: dict[str, object] = dict(zip(CELL, names, strict=True))
+        cell |= {"runs": len(good), "failed": len(group) - len(good)}
+        if len(good):
+            cell |= _averaged(good)
+        found.append(cell)
+    return pd.DataFrame(found)
+
+
+def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.DataFrame:
+    """Mean of `metric` under one controller less that under another, run by run.
+
+    Runs are paired by seed, and only where both controllers met the same arrivals, so that what
+    varies between seeds alike for both cancels.
+
+    Returns:
+        One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` and
+        `difference_ci95`.
+
+    Raises:
+        InputError: an unknown metric or controller, or two runs of one seed with other arrivals.
+    """
+    import pandas as pd
+
+    choice("metric", metric, AVERAGED)
+    for name in (first, second):
+        choice("controller of these rows", name, sorted(set(rows["controller"])))
+    good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
+    by = [column for column in CELL if column != "controller"]
+    both = good[good["controller"] == first].merge(
+        good[good["controller"] == second], on=[*by, "seed"], suffixes=("", "_other")
+    )
+    if (both["arrivals"] != both["arrivals_other"]).any():
+        raise InputError(f"{first} and {second} did not meet the same arrivals")
+    found = []
+    for names, group in both.groupby(by, sort=False):
+        interval = paired_difference(group[metric].tolist(), group[f"{metric}_other"].tolist())
+        found.append({
+            **dict(zip(by, names, strict=True)),
+            "pairs": interval.size,
+            "difference": interval.mean,
+            "difference_ci95": interval.half_width,
+        })  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def _averaged(good: pd.DataFrame) -> dict[str, object]:
+    cell: dict[str, object] = {
+        name: int(good[name].sum()) for name in ("trips", "unfinished", "collisions")
+    }
+    for metric in AVERAGED:
+        values = good[metric].dropna().astype(float).tolist()
+        if values:
+            interval = mean_interval(values)
+            cell[metric] = interval.mean
+            cell[f"{metric}_ci95"] = interval.half_width
+            cell[f"{metric}_pi95"] = prediction_interval(values).half_width
+    cell["growing"] = _growing(good)
+    cell["cpu_s"] = float(good["cpu_s"].mean())
+    return cell
+
+
+def _growing(good: pd.DataFrame) -> bool:
+    arms = int(good["arms"].iloc[0])
+    return any(
+        growing(float(good[f"{of}queue_growth"].sum()), int(good[f"{of}trips"].sum()))
+        for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
+    )

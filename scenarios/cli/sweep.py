@@ -1,0 +1,177 @@
+"""`minisim sweep`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from minisim.errors import InputError, integer, number
+from scenarios.cli.app import app
+from scenarios.cli.terminal import bar, show
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import pandas as pd
+
+    from scenarios.experiment import Experiment
+    from scenarios.store import Store
+
+PAPER_GRID = "paper"
+
+
+@app.command(
+    epilog="FILE.toml lists what to combine:\n\n"
+    '  scenario = \\["four-way", "five-way"]\n\n'
+    '  controller = \\["dim", "fixed-time"]\n\n'
+    "  density = \\[150, 250, 350]\n\n"
+    "and also profile, side, split, turns, model, arrivals, seeds, horizon, on_collision; "
+    "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
+    "one that is stored is not made again.\n\n"
+    "[bold]Examples[/bold]\n\n"
+    "minisim sweep paper --seeds 10 --out paper.db\n\n"
+    "minisim sweep mine.toml --jobs 2 --out mine.db --export mine.csv\n\n"
+    "minisim sweep mine.toml --scheduler tcp://10.0.0.1:8786 --out mine.db\n\n"
+    "[bold]Exit codes[/bold]\n\n"
+    "0 done; 1 some runs failed (their rows say why); 2 bad input; 130 interrupted."
+)
+def sweep(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE.toml|paper", show_default=False,
+            help="The experiments, or the paper's grid: its four controllers, five densities and "
+            "three splits on 4 arms, DIM alone on 3 and 5.",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="STORE", help="Where results are kept; made if new."),
+    ] = Path("sweep.db"),
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", show_default=False,
+            help="Runs a cell, seeds 1 … N; as the file says, or 10.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Processes to use; one a core by default.", show_default=False
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", show_default=False,
+            help="Run on the Dask cluster of this scheduler (pip install 'minisim\\[dask]').",
+        ),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write one row a run (.csv or .parquet)."),
+    ] = None,
+    horizon: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", show_default=False, help="Simulated time; as the file says, or 3600."
+        ),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--profile", "-p", metavar="NAME", show_default=False,
+            help="Of the paper's grid: paper (the default), fair or as_run.",
+        ),
+    ] = None,
+) -> None:  # fmt: skip
+    """Run many experiments over seeds; results are kept, and what is there is not run again."""
+    from minisim.recording import write_table
+    from scenarios.cells import cells
+    from scenarios.cli.files import check_apart, check_table
+    from scenarios.cli.report import sweep_notes, sweep_table
+    from scenarios.store import Store
+
+    if seeds is not None:
+        integer("--seeds", seeds, low=1, high=100_000)
+    if jobs is not None:
+        if scheduler is not None:
+            raise InputError("--jobs is for this machine, --scheduler for a cluster; give one")
+        integer("--jobs", jobs, low=1, high=1024)
+    if horizon is not None:
+        number("--horizon [s]", horizon, above=0)
+    check_apart({"FILE.toml": Path(what), "--out": out, "--export": export})
+    if export is not None:
+        check_table(export)
+    experiments = _experiments(what, seeds, horizon, profile)
+    with _executor(scheduler) as executor, Store(out) as store:
+        rows = _run(experiments, executor, jobs or os.cpu_count() or 1, store, out)
+    show(sweep_table(cells(rows)), sweep_notes(rows, experiments))
+    typer.echo(f"  {len(rows)} runs in {out}")
+    if export is not None:
+        write_table(rows, export)
+        typer.echo(f"  wrote {export}")
+    if rows["error"].notna().any():
+        raise typer.Exit(1)
+
+
+def _experiments(
+    what: str, seeds: int | None, horizon: float | None, profile: str | None
+) -> list[Experiment]:
+    from scenarios import paper
+    from scenarios.experiment_file import check_can_run, read_experiments
+
+    if what == PAPER_GRID:
+        found = paper.experiments(
+            profile or "paper",
+            range(1, 11 if seeds is None else seeds + 1),
+            3600.0 if horizon is None else horizon,
+        )
+    elif profile is not None:
+        raise InputError("--profile is for the paper's grid; a file has its own")
+    else:
+        found = read_experiments(what, seeds=seeds, horizon=horizon)
+    with bar("checking"):
+        check_can_run(found)
+    return found
+
+
+@contextmanager
+def _executor(scheduler: str | None) -> Iterator[Executor | None]:
+    from scenarios.cluster import cluster
+
+    with nullcontext() if scheduler is None else cluster(scheduler) as executor:
+        yield executor
+
+
+def _run(
+    experiments: list[Experiment], executor: Executor | None, jobs: int, store: Store, out: Path
+) -> pd.DataFrame:
+    """The rows in the order of the experiments, with a bar that tells of failures."""
+    import pandas as pd
+
+    from scenarios.sweep import finished
+
+    rows: dict[int, dict[str, object]] = {}
+    lost = 0
+    try:
+        with bar("starting") as progress:
+            for k, row in finished(experiments, executor, jobs=jobs, store=store):
+                rows[k] = row
+                lost += row["error"] is not None
+                progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
+                progress(len(rows), len(experiments))
+    except KeyboardInterrupt:
+        typer.echo(
+            f"minisim: {len(rows)} of {len(experiments)} runs are in {out}; the same command "
+            "goes on from there",
+            err=True,
+        )
+        raise
+    return pd.DataFrame([rows[k] for k in range(len(experiments))])

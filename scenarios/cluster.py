@@ -1,0 +1,65 @@
+"""A Dask cluster as an executor of sweeps (extra `dask`)."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from typing import Any
+
+from minisim.errors import InputError, MissingExtraError, instance
+from scenarios.experiment import results_version
+
+#: How long a scheduler, and then its first worker, is waited for [s].
+PATIENCE = 5.0
+
+
+@contextmanager
+def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
+    """An executor on the cluster of the scheduler at `address`, such as tcp://10.0.0.1:8786.
+
+    Dask itself runs again, on other workers, what a lost worker had; a run that has lost three of
+    them is given up. The workers need the same version of minisim.
+
+    Raises:
+        MissingExtraError: without the extra `dask`.
+        InputError: no scheduler there, no workers, or workers with another version.
+    """
+    instance("scheduler", address, str)
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise MissingExtraError(
+            "--scheduler needs the package distributed: pip install 'minisim[dask]'"
+        ) from None
+    # What it reports of lost connections is told by the sweep, in one line.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = distributed.Client(address, timeout=patience, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"no Dask scheduler at {address!r}: {_first_line(error)}") from error
+    with client:
+        _check_workers(client, address, patience)
+        executor: Executor = client.get_executor()
+        yield executor
+
+
+def _check_workers(client: Any, address: str, patience: float) -> None:
+    try:
+        client.wait_for_workers(1, timeout=patience)
+    except TimeoutError as error:
+        raise InputError(f"the Dask scheduler at {address} has no workers") from error
+    try:
+        versions = client.run(results_version)
+    except ImportError as error:
+        raise InputError(f"the workers of {address} lack minisim: {error}") from error
+    ours = results_version()
+    other = {worker: version for worker, version in versions.items() if version != ours}
+    for worker, version in other.items():
+        raise InputError(f"worker {worker} has version {version} of the results, here it is {ours}")
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

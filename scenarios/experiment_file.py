@@ -1,0 +1,289 @@
+"""Experiments from a TOML file: every combination of what is listed, block by block.
+
+    seeds = 10                          # 1 … 10, or a list
+    profile = "fair"
+    density = [150, 250, 350]
+    split = ["balanced", "4:3:2:1"]
+    controller = ["dim", "fixed-time"]
+
+    [[experiment]]                      # what is above holds here too
+    scenario = "four-way"
+
+    [[experiment]]
+    scenario = { name = "custom", label = "skewed", bearings = [0, 80, 190, 260] }
+    controller = { name = "dim", label = "west first", priorities = [1, 2, 3, 0] }
+
+Without `[[experiment]]` the file is one block. In a controller's table, everything but `name` and
+`label` is a parameter of its recipe.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass, replace
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from minisim.arrivals import Arrivals, read_arrivals
+from minisim.control import Controller
+from minisim.errors import (
+    FileError,
+    InputError,
+    MinisimError,
+    choice,
+    instance,
+    integer,
+    number,
+    show,
+)
+from scenarios.controllers import controller_named
+from scenarios.experiment import Experiment
+from scenarios.library import scenario_named
+from scenarios.scenario import Scenario, parse_split, profile_named
+
+#: More is surely a typing error.
+MAX_EXPERIMENTS = 1_000_000
+
+#: What may be listed, and its value where it is not; every combination is run.
+AXES: dict[str, Any] = {
+    "scenario": "four-way",
+    "side": "left",
+    "profile": "paper",
+    "model": "poisson",
+    "split": "balanced",
+    "turns": "uniform",
+    "density": 350.0,
+    "arrivals": None,
+    "controller": "dim",
+    "seeds": 10,
+}
+#: What holds for a whole block.
+SINGLE: dict[str, Any] = {"horizon": 3600.0, "min_headway": 1.5, "on_collision": "stop"}
+
+#: What recorded arrivals replace.
+DRAWN = ("density", "split", "turns", "model", "min_headway")
+
+#: Keys of a scenario's table.
+JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_length")
+
+
+def read_experiments(
+    path: str | os.PathLike[str], *, seeds: int | None = None, horizon: float | None = None
+) -> list[Experiment]:
+    """The experiments of a file, each once; `seeds` and `horizon` replace what it says of them.
+
+    Raises:
+        FileError: unreadable, or no TOML.
+        InputError: an unknown key (with the nearest one), a value that is not allowed, or a
+            combination that cannot be run; the message names file, block and key.
+    """
+    instance("experiment file", path, (str, os.PathLike))
+    place = os.fspath(path)
+    table = _load(path)
+    blocks = table.pop("experiment", [{}])
+    given = {"seeds": seeds, "horizon": horizon}
+    overrides = {key: value for key, value in given.items() if value is not None}
+    with _at(place):
+        _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
+        if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
+            raise InputError("experiments are written [[experiment]], with two brackets")
+    found: dict[str, Experiment] = {}
+    for number_, block in enumerate(blocks, start=1):
+        with _at(f"{place}: [[experiment]] {number_}" if len(blocks) > 1 else place):
+            _check_keys("key", block, [*AXES, *SINGLE])
+            merged = {**table, **block, **overrides}
+            for experiment in _block(merged, Path(path).parent):
+                found.setdefault(experiment.key, experiment)
+    with _at(place):
+        _check_names(found.values())
+    return list(found.values())
+
+
+def check_can_run(experiments: Iterable[Experiment]) -> None:
+    """Start every controller at every site once, since most that cannot work says so there.
+
+    Raises:
+        InputError: a controller that cannot serve a scenario.
+    """
+    tried: set[tuple[str, ...]] = set()
+    for experiment in experiments:
+        what = experiment.identity()
+        del what["seed"]
+        cell = tuple(map(str, what.values()))
+        if cell in tried:
+            continue
+        tried.add(cell)
+        try:
+            experiment.controller.start(experiment.scenario.site(experiment.seed))
+        except MinisimError as error:
+            raise InputError(
+                f"{experiment.name} cannot serve {what['scenario']} at {what['density']:g} "
+                f"veh/h/lane, profile {what['profile']}: {error}"
+            ) from error
+
+
+def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    try:
+        with open(path, "rb") as file:
+            return tomllib.load(file)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise FileError(f"cannot read experiments from {os.fspath(path)}: {error}") from error
+
+
+def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
+    """Every combination of a block."""
+    if "arrivals" in block:
+        clash = [key for key in DRAWN if key in block]
+        if clash:
+            raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
+    axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
+    with _at("seeds"):
+        axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
+    count = prod(map(len, axes.values()))
+    if count > MAX_EXPERIMENTS:
+        raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
+    single = {key: block.get(key, default) for key, default in SINGLE.items()}
+    seeds, controllers = axes.pop("seeds"), axes.pop("controller")
+    for values in product(*axes.values()):
+        chosen = dict(zip(axes, values, strict=True))
+        scenario = _scenario(chosen, single, folder)
+        for given in controllers:
+            with _at("controller"):
+                controller, label = _controller(given, scenario.profile.name)
+            for seed in seeds:
+                yield Experiment(scenario, controller, seed, label, single["on_collision"])
+
+
+def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path) -> Scenario:
+    with _at("scenario"):
+        junction = _table(chosen["scenario"])
+        _check_keys("key of a scenario", junction, JUNCTION)
+        name, label = junction.pop("name"), junction.pop("label", "")
+        instance("label", label, str)
+    made = scenario_named(
+        name,
+        junction.pop("bearings", None),
+        **junction,
+        side=_text("side", chosen["side"]),
+        profile=profile_named(_text("profile", chosen["profile"])),
+        model=_text("model", chosen["model"]),
+        min_headway=single["min_headway"],
+        density=chosen["density"],
+        split=_shares("split", chosen["split"], "balanced"),
+        turns=_shares("turns", chosen["turns"], "uniform"),
+        horizon=number("horizon [s]", single["horizon"], above=0),
+    )
+    return replace(
+        made, name=label or made.name, recorded=_recorded(chosen["arrivals"], folder, made)
+    )
+
+
+def _recorded(file: object, folder: Path, scenario: Scenario) -> Arrivals | None:
+    if file is None:
+        return None
+    return read_arrivals(folder / _text("arrivals", file), scenario.intersection.n)
+
+
+def _controller(given: object, profile: str) -> tuple[Controller, str]:
+    """The controller that an entry describes, and its label."""
+    parameters = _table(given)
+    name, label = parameters.pop("name"), parameters.pop("label", "")
+    instance("label", label, str)
+    recipe = controller_named(name, profile)
+    return _replaced(recipe, parameters, str(name)), label
+
+
+def _replaced(recipe: Any, parameters: Mapping[str, Any], name: str) -> Any:
+    """The recipe with other parameters; a table replaces some of a nested recipe's."""
+    if not parameters:
+        return recipe
+    known = [f.name for f in fields(recipe) if f.init] if is_dataclass(recipe) else []
+    _check_keys(f"parameter of {name}", parameters, known)
+    values = {}
+    for key, value in parameters.items():
+        now = getattr(recipe, key)
+        if isinstance(value, dict) and is_dataclass(now):
+            values[key] = _replaced(now, value, f"{name}.{key}")
+        else:
+            values[key] = _frozen(value)
+    try:
+        return replace(recipe, **values)
+    except TypeError as error:
+        raise InputError(f"{name} does not take {show(dict(parameters))}: {error}") from error
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+
+
+def _table(given: object) -> dict[str, Any]:
+    """A name or a table with one, as a table."""
+    if isinstance(given, str):
+        return {"name": given}
+    if not isinstance(given, dict):
+        raise InputError(f"must be a name or a table with one, got {show(given)}")
+    if "name" not in given:
+        raise InputError(f"the table {show(given)} has no name")
+    return dict(given)
+
+
+def _listed(key: str, value: object) -> list[Any]:
+    values = value if isinstance(value, list) else [value]
+    if not values:
+        raise InputError(f"{key} is an empty list; leave it out, or list something")
+    return values
+
+
+def _seeds(value: object) -> list[int]:
+    if isinstance(value, list):
+        return [integer("a seed", seed, low=0) for seed in _listed("seeds", value)]
+    return list(range(1, integer("seeds", value, low=1, high=MAX_EXPERIMENTS) + 1))
+
+
+def _shares(key: str, value: object, equal: str) -> Any:
+    """Shares are written "4:3:2:1"; equal ones have a name."""
+    with _at(key):
+        return None if value == equal else parse_split(_text(key, value))
+
+
+def _text(key: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{key} must be a text, got {show(value)}")
+    return value
+
+
+def _check_keys(what: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    allowed = list(known)
+    for key in table:
+        choice(what, key, allowed)
+
+
+def _check_names(experiments: Iterable[Experiment]) -> None:
+    """Rows of different experiments must be told apart by what they say of themselves."""
+    seen: set[tuple[str, ...]] = set()
+    for experiment in experiments:
+        what = experiment.identity()
+        row = tuple(map(str, what.values()))
+        if row in seen:
+            raise InputError(
+                f"two different experiments would both be called {what['controller']} on "
+                f"{what['scenario']}; give a controller or a scenario a label"
+            )
+        seen.add(row)
+
+
+@contextmanager
+def _at(place: str) -> Iterator[None]:
+    """Put the place before the message of whatever is wrong inside."""
+    try:
+        yield
+    except (InputError, FileError) as error:
+        kind: Callable[[str], MinisimError] = type(error)
+        raise kind(f"{place}: {error}") from error

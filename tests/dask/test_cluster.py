@@ -1,0 +1,141 @@
+"""Sweeps on a real Dask cluster: a scheduler and workers, each a process, over TCP."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dim import Dim
+from minisim.errors import InputError
+from scenarios import four_way
+from scenarios.cli import main
+from scenarios.cluster import cluster
+from scenarios.experiment import MEASURED
+from scenarios.store import Store
+from scenarios.sweep import Experiment, sweep
+
+pytest.importorskip("distributed", reason="needs the extra `dask`")
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.dask
+
+Processes = list[subprocess.Popen[bytes]]
+
+
+def start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", f"distributed.cli.{module}", *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def worker(address: str) -> subprocess.Popen[bytes]:
+    """A worker of one thread; without a nanny, so that who is killed stays dead."""
+    return start(
+        "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
+        "--memory-limit", "0",
+    )  # fmt: skip
+
+
+def stop(processes: Processes) -> None:
+    for process in processes:
+        process.kill()
+        process.wait(timeout=20)
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[str]:
+    file = tmp_path / "scheduler.json"
+    process = start(
+        "dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+        "--scheduler-file", str(file),
+    )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 60
+        while not file.exists() or not file.read_text():
+            assert process.poll() is None, "the scheduler died"
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"]
+    finally:
+        stop([process])
+
+
+def experiments(count: int, horizon: float = 120.0) -> list[Experiment]:
+    return [Experiment(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
+
+
+def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.drop(columns=list(MEASURED))
+
+
+def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:
+    todo = experiments(40, horizon=1200.0)
+    here = sweep(todo, jobs=1)
+    processes = [worker(scheduler), worker(scheduler)]
+    killed = False
+
+    def kill(done: int, total: int) -> None:
+        nonlocal killed
+        if done == 5:
+            processes[0].send_signal(signal.SIGKILL)
+            killed = True
+
+    try:
+        with cluster(scheduler, patience=60) as executor, Store(tmp_path / "s.db") as store:
+            there = sweep(todo, executor, kill, store=store)
+            assert len(store) == len(todo)
+    finally:
+        stop(processes)
+    assert killed
+    pd.testing.assert_frame_equal(repeatable(here), repeatable(there))
+
+
+def test_the_command_runs_there(
+    scheduler: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "two.toml"
+    file.write_text("horizon = 60\nseeds = 2\n")
+    processes = [worker(scheduler)]
+    arguments = ["sweep", str(file), "--scheduler", scheduler, "--out", str(tmp_path / "s.db")]
+    try:
+        with cluster(scheduler, patience=60):  # there is a worker now
+            assert main(arguments) == 0
+    finally:
+        stop(processes)
+    assert "2 runs in" in capsys.readouterr().out
+
+
+def test_a_scheduler_without_workers_is_told(scheduler: str) -> None:
+    with (
+        pytest.raises(InputError, match="has no workers"),
+        cluster(scheduler, patience=0.5),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "tcp://127.0.0.1:port", ""])
+def test_no_scheduler_is_told_within_seconds(
+    address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, store = tmp_path / "two.toml", tmp_path / "s.db"
+    file.write_text("horizon = 60\nseeds = 2\n")
+    began = time.monotonic()
+    code = main(["sweep", str(file), "--scheduler", address, "--out", str(store)])
+    assert time.monotonic() - began < 20
+    error = capsys.readouterr().err
+    assert code == 2
+    assert error.startswith("minisim: no Dask scheduler at ")
+    assert error.count("\n") == 1
+    assert not store.exists()
