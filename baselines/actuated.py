@@ -31,7 +31,7 @@ class Rule(Protocol):
     """When a phase ends, and which is next; it may remember what it has seen."""
 
     def see(self, view: View) -> None:
-        """Take note of a view; called at every wake-up, so whenever a detector is passed."""
+        """Take note of a view; called at every wake-up."""
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Say how it goes on with the phase of `lane`, green for `elapsed` seconds."""
@@ -40,22 +40,30 @@ class Rule(Protocol):
 class ActuatedSession:
     """Shows green to one lane at a time, as a rule tells.
 
-    It is called when its rule asked for it, when somebody comes onto a detector, and when somebody
-    clears the junction.
+    It is called when its rule asked for it, when somebody clears the junction, and, where the rule
+    wants it, when somebody comes onto a detector.
 
     Args:
         site: of the run.
         rule: when a phase ends, and which is next; the first is lane a.
-        detector_range: how far before the junction a detector reaches [m].
+        detector_range: how far before the junction the rule sees [m].
+        wake_on_detector: whether the rule must see everybody at the moment when he comes there.
         min_green: the rule is asked that long after a phase has begun [s].
         amber: [s].
     """
 
     def __init__(
-        self, site: Site, rule: Rule, *, detector_range: float, min_green: float, amber: float
+        self,
+        site: Site,
+        rule: Rule,
+        *,
+        detector_range: float,
+        wake_on_detector: bool,
+        min_green: float,
+        amber: float,
     ) -> None:
         self.plan = Plan(
-            marks=(detector_range,),
+            marks=(detector_range,) if wake_on_detector else (),
             wake_on_clear=True,
             sight=max(detector_range, stopping_sight(site)),
         )
@@ -64,7 +72,7 @@ class ActuatedSession:
         self._dt = site.dt
         self._lanes = site.intersection.n
         self._min_green, self._amber = min_green, amber
-        self._lane = 0
+        self._lane = self._next = 0
         self._colour = Colour.GREEN
         self._began: float | None = None  # when the lane's head turned green
         self._due = math.inf

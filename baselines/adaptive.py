@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from baselines.actuated import ActuatedSession, Verdict, on_detector
-from minisim.control import Site, View
+from minisim.control import Observed, Site, View
 from minisim.errors import InputError, instance, number
 
 #: An idle signal looks again after so long [s]; fixed in SUMO's code.
@@ -67,6 +67,7 @@ class Adaptive:
             site,
             DelayRule(self, site),
             detector_range=self.detector_range,
+            wake_on_detector=True,
             min_green=self.min_green,
             amber=self.amber,
         )
@@ -82,15 +83,22 @@ class DelayRule:
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
-        """Note when and where everybody comes onto a detector."""
-        present = on_detector(view, self._signal.detector_range)
-        self._entered = {v.id: self._entered.get(v.id, (view.time, v.distance)) for v in present}
+        """Note when and where somebody comes onto a detector."""
+        for v in view.vehicles:
+            if v.id not in self._entered and 0.0 < v.distance <= self._signal.detector_range:
+                self._entered[v.id] = view.time, v.distance
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
         signal = self._signal
         present = on_detector(view, signal.detector_range)
-        prolongation = max(self._passing_time(view, lane, elapsed), signal.min_green - elapsed)
+        approaching = [v for v in present if v.distance > 0.0]
+        self._entered = {v.id: self._entered[v.id] for v in approaching}
+        delayed = [v for v in approaching if v.lane == lane and self._is_delayed(v, view.time)]
+        times = [v.distance / self._speed_limit for v in delayed]
+        in_time = [time for time in times if elapsed + time <= signal.max_green]
+        prolongation = max(in_time, default=0.0)
+        prolongation = max(prolongation, signal.min_green - elapsed)
         idle = all(v.lane == lane for v in present)
         if idle and (elapsed < signal.max_green or signal.extend_max_green):
             prolongation = max(prolongation, IDLE)
@@ -100,20 +108,22 @@ class DelayRule:
             return Verdict(lane, prolongation)
         return Verdict((lane + 1) % self._lanes, 0.0)
 
-    def _passing_time(self, view: View, lane: int, elapsed: float) -> float:
-        """How long until the last delayed vehicle passes that can before `max_green` [s]."""
-        times = [
-            v.distance / self._speed_limit
-            for v in on_detector(view, self._signal.detector_range)
-            if v.lane == lane and v.distance > 0.0 and self.time_loss(view, v.id, v.distance)
-            > self._signal.min_time_loss
-        ]
-        return max((t for t in times if elapsed + t <= self._signal.max_green), default=0.0)
+    def _is_delayed(self, vehicle: Observed, now: float) -> bool:
+        lost = time_loss(*self._entered[vehicle.id], now, vehicle.distance, self._speed_limit)
+        return lost > self._signal.min_time_loss
 
-    def time_loss(self, view: View, vehicle: int, distance: float) -> float:
-        """∫ (1 − v/limit) dt since it came onto the detector [s].
 
-        That is the time since then, less what the same way takes at the limit.
-        """
-        time, start = self._entered[vehicle]
-        return view.time - time - (start - distance) / self._speed_limit
+def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
+    """∫ (1 − v/limit) dt of a vehicle that came onto a detector [s].
+
+    That is the time since then, less what the way since then takes at the limit; so nobody has to
+    look in between.
+
+    Args:
+        entered: when it came [s].
+        start: its distance to the junction then [m].
+        now: [s].
+        distance: to the junction now [m].
+        limit: of speed [m/s].
+    """
+    return now - entered - (start - distance) / limit

@@ -1,16 +1,18 @@
 """The all-way stop: everybody stops at the line, and goes in the order of stopping.
 
 The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), but for
-one thing: SUMO's vehicles set off as soon as a conflicting one has entered the junction and follow
-it there; ours wait until it has left, so that nobody can collide.
+one thing: SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
+for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it has left their way, so
+that nobody can collide whatever it does there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from baselines.clearing import clearing_distances
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.errors import instance, number
 
@@ -27,14 +29,15 @@ class AllWayStop:
     """A junction where every vehicle stops, and who stopped first goes first.
 
     The first vehicle of each lane queues from the moment when it stands at the line; equal times
-    go by arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle is on
-    its way through the junction, and nobody conflicting has stood for longer. So those who do not
-    conflict go together, and may overtake in the queue; but nobody is passed over for ever, as
+    go by arm. A vehicle goes as soon as it has stood for `reaction`, nobody conflicting has stood
+    for longer, and every conflicting vehicle that was let go has left its way. So those who do not
+    conflict go together, and may overtake in the queue; but nobody is passed over for ever, since
     whoever waits keeps every later conflicting vehicle back.
 
     Attributes:
-        reaction: how long a driver stands before it goes [s]. SUMO's default
-            (`jmAllwayStopWait`) is a single step; 1–2 s are usual (SUMO issues 15163, 15428).
+        reaction: how long a driver stands before it goes [s]: SUMO's `jmAllwayStopWait`, whose
+            default is a single step. 1 s is the reaction time in SUMO's safety measures
+            (device SSM, MDRAC).
         name: short name.
     """
 
@@ -54,64 +57,83 @@ class AllWayStopSession:
     """Who stands since when, and who was let go.
 
     It is called when somebody comes to the line, when the junction gets clear, and when it asked
-    for it: at the earliest time at which somebody at the line can stand, or has stood long enough.
+    for it: at the earliest time at which somebody at the line can stand, has stood long enough, or
+    can have his way free.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
         self.plan = Plan(marks=(LINE,), wake_on_clear=True, sight=LINE + SIGHT_MARGIN)
         self._reaction = reaction
         self._dt = site.dt
-        self._deceleration = site.vehicle.deceleration
-        self._index = site.intersection.index
-        self._conflicts = site.conflicts.tolist()  # a plain lookup is faster than an array's
+        self._vehicle = site.vehicle
+        self._manoeuvres = site.intersection.n - 1
+        self._clearing = clearing_distances(site).tolist()  # quicker to look up than an array
         self._standing: dict[int, float] = {}  # vehicle: since [s]
         self._gone: set[int] = set()
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let go whose turn it is; timers ring on whole steps, half a step early at most."""
-        self._gone.intersection_update(v.id for v in view.vehicles)
-        heads = list(self._heads(view))
-        self._standing = {
-            v.id: self._standing.get(v.id, view.time) for v in heads if v.speed <= STANDING
-        }
-        queue = sorted(
-            (v for v in heads if v.id in self._standing),
-            key=lambda v: (self._standing[v.id], v.lane),
-        )
-        # Everybody who is on his way, and everybody who stands before: none may conflict.
-        before = [v for v in view.vehicles if v.id in self._gone or v.distance < 0.0]
-        going = []
+        self._gone.intersection_update([v.id for v in view.vehicles])
+        crossing = [v for v in view.vehicles if v.id in self._gone or v.distance < 0.0]
+        heads = self._heads(view)
+        since = self._standing
+        self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= STANDING}
+        looks = [self._stop_time(v, view.time) for v in heads if v.id not in self._standing]
+        queue = [v for v in heads if v.id in self._standing]
+        queue.sort(key=lambda v: (self._standing[v.id], v.lane))
+        waiting: list[Observed] = []
+        commands: list[Command] = []
         for vehicle in queue:
-            if self._has_waited(vehicle, view.time) and not self._meets(vehicle, before):
-                going.append(vehicle)
-            before.append(vehicle)
-        self._gone.update(v.id for v in going)
-        wakes = [self._next_look(v, view.time) for v in heads if v.id not in self._gone]
-        wake = min(wakes, default=math.inf)
-        return [*(Go(v.id) for v in going), *([] if math.isinf(wake) else [Wake(wake)])]
+            ready = self._standing[vehicle.id] + self._reaction
+            if view.time + self._dt / 2.0 >= ready:
+                ready = self._free_time(vehicle, waiting, crossing, view.time)
+            if ready <= view.time:
+                commands.append(Go(vehicle.id))
+                self._gone.add(vehicle.id)
+                crossing.append(vehicle)
+            else:
+                waiting.append(vehicle)
+                looks.append(ready)
+        look = max(min(looks, default=math.inf), view.time + self._dt)
+        return commands if math.isinf(look) else [*commands, Wake(look)]
 
-    def _heads(self, view: View) -> Iterator[Observed]:
+    def _heads(self, view: View) -> list[Observed]:
         """The first vehicle of each lane that has not been let go, if it is at the line."""
-        lanes = set()
+        heads: dict[int, Observed] = {}
         for vehicle in view.vehicles:  # front to back
-            if vehicle.lane in lanes or vehicle.id in self._gone or vehicle.distance < 0.0:
-                continue
-            lanes.add(vehicle.lane)
-            if vehicle.distance <= LINE:
-                yield vehicle
+            if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
+                heads.setdefault(vehicle.lane, vehicle)
+        return [vehicle for vehicle in heads.values() if vehicle.distance <= LINE]
 
-    def _has_waited(self, vehicle: Observed, now: float) -> bool:
-        return now + self._dt / 2.0 >= self._standing[vehicle.id] + self._reaction
+    def _stop_time(self, vehicle: Observed, now: float) -> float:
+        """When a held vehicle can stand at the earliest: it brakes comfortably [s]."""
+        return now + (vehicle.speed - STANDING) / self._vehicle.deceleration
 
-    def _meets(self, vehicle: Observed, others: Iterable[Observed]) -> bool:
-        row = self._conflicts[self._index(vehicle.movement)]
-        return any(row[self._index(other.movement)] for other in others)
+    def _free_time(
+        self,
+        vehicle: Observed,
+        waiting: Iterable[Observed],
+        crossing: Iterable[Observed],
+        now: float,
+    ) -> float:
+        """When the vehicle may go at the earliest; infinite if that hangs on another wake-up [s].
 
-    def _next_look(self, vehicle: Observed, now: float) -> float:
-        """When something may change for a vehicle at the line without a wake-up of its own [s]."""
-        if vehicle.id not in self._standing:
-            # A held vehicle brakes comfortably, so it cannot stand before that.
-            return now + max((vehicle.speed - STANDING) / self._deceleration, self._dt)
-        if self._has_waited(vehicle, now):
-            return math.inf  # until somebody is clear
-        return max(self._standing[vehicle.id] + self._reaction, now + self._dt)
+        Now, if no conflicting vehicle has stood for longer or is in the way. One that is in the
+        way leaves it no sooner than by accelerating all it can.
+        """
+        clearing = self._clearing[self._index(vehicle)]
+        if any(clearing[self._index(other)] > 0.0 for other in waiting):
+            return math.inf
+        free = now
+        for other in crossing:
+            room = clearing[self._index(other)] + other.distance
+            if room > 0.0:
+                free = max(free, now + self._driving_time(other.speed, room))
+        return free
+
+    def _driving_time(self, speed: float, distance: float) -> float:
+        a = self._vehicle.acceleration
+        return (math.sqrt(speed * speed + 2.0 * a * distance) - speed) / a
+
+    def _index(self, vehicle: Observed) -> int:
+        return vehicle.lane * self._manoeuvres + vehicle.manoeuvre - 1

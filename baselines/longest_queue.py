@@ -25,15 +25,15 @@ class LongestQueue:
     keeps its green. A lane may wait for long while others always have more.
 
     Attributes:
-        interval: of green between two looks [s]; counted from the green that is really shown.
-            5 s is `g_min` of docwza/sumolights, the max-pressure of the comparison by Genders &
-            Razavi (arXiv 1909.00395).
+        interval: of green between two looks [s], counted from the green that is really shown.
+            5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
+            several lanes. A change costs some 3 s, so that single lanes need the upper end.
         detector_range: a queue is who is on the last so many metres [m]; as for `Adaptive`.
-        amber: [s]; as for `Adaptive`, and `y` of docwza/sumolights.
+        amber: [s]; as for `Adaptive`, and in the code of Genders & Razavi.
         name: short name.
     """
 
-    interval: float = 5.0
+    interval: float = 10.0
     detector_range: float = 100.0
     amber: float = 2.0
     name: str = "longest-queue"
@@ -50,6 +50,7 @@ class LongestQueue:
             site,
             QueueRule(self, site),
             detector_range=self.detector_range,
+            wake_on_detector=False,
             min_green=self.interval,
             amber=self.amber,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import FixedTime
+from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -27,6 +27,9 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
+    "adaptive": lambda _: Adaptive(),
+    "all-way-stop": lambda _: AllWayStop(),
+    "longest-queue": lambda _: LongestQueue(),
     "unregulated": lambda _: Unregulated(),
 }
 

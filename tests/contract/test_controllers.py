@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import FixedTime
+from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
 from dim import Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -51,6 +51,12 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),
     FixedTime(equal_greens=True, max_cycle=90.0),
+    Adaptive(),
+    Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
+    LongestQueue(),
+    LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
+    AllWayStop(),
+    AllWayStop(reaction=0.0),
 )
 
 

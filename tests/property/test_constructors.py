@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import scenarios
-from baselines import FixedTime, webster, webster_delay
+from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue, webster, webster_delay
 from baselines.signals import Phase, Program
 from dim import Dim, ExactPerception, HarmonyMatrix, Zones, decide, explain
 from minisim import simulate
@@ -119,6 +119,15 @@ CASES = {
         {"greens": (5.0, 6.0), "amber": 2.0, "saturation_flow": 1500.0, "lost_time": 2.0,
          "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0, "name": "x"},
     ),
+    "Adaptive": Case(
+        Adaptive,
+        {"detector_range": 100.0, "min_time_loss": 1.0, "min_green": 3.0, "max_green": 50.0,
+         "extend_max_green": True, "amber": 2.0, "name": "x"},
+    ),
+    "LongestQueue": Case(
+        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0, "name": "x"}
+    ),
+    "AllWayStop": Case(AllWayStop, {"reaction": 1.0, "name": "x"}),
     "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
     "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
     "webster": Case(

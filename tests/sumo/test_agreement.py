@@ -16,7 +16,7 @@ from minisim.sumo import simulate
 from scenarios import four_way
 from scenarios.controllers import controller_named
 
-CONTROLLERS = ("dim", "dim-harmonious", "fixed-time")
+CONTROLLERS = ("dim", "dim-harmonious", "fixed-time", "adaptive", "all-way-stop", "longest-queue")
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
 MEASURES = ("waiting_time_s", "travel_time_s")
 

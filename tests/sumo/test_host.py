@@ -20,7 +20,7 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import FixedTime
+from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
 from dim import Dim
 from minisim.control import (
     Advise,
@@ -87,18 +87,18 @@ def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Ru
 
 # --- the contract -----------------------------------------------------------------------------
 
+CONTROLLERS: tuple[Controller, ...] = (
+    Dim(), Dim(gate="harmonious"), FixedTime(), Adaptive(), AllWayStop(), LongestQueue(),
+)  # fmt: skip
 
-@pytest.mark.parametrize(
-    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
-)
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None:
     check_controller(controller, arms=(4,), horizon=60.0, host="sumo")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "controller", [Dim(), Dim(gate="harmonious"), FixedTime()], ids=lambda c: c.name
-)
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_controllers_keep_their_contract_on_other_junctions(controller: Controller) -> None:
     check_controller(controller, arms=(3, 5), horizon=120.0, host=simulate)
 
