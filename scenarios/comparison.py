@@ -50,13 +50,14 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     keys = ["series", "arms", "split", "density"]
-    groups = rows[rows["error"].isna()].groupby(keys)
-    cells: dict[Any, pd.DataFrame] = {key: cell for key, cell in groups}  # noqa: C416
+    cells = {key: cell for key, cell in rows[rows["error"].isna()].groupby(keys)}  # noqa: C416
     found = []
     order = ["arms", "split", "series", "metric", "lane", "density"]
     for row in published().sort_values(order).to_dict("records"):
-        cell = cells.get((row["series"], row["arms"], row["split"], float(row["density"])))
-        found.append({**row, **_ours(cell, column_of(row["metric"], row["lane"]), row["paper"])})
+        key = (row["series"], row["arms"], row["split"], float(row["density"]))
+        ours = cells.get(key)
+        row.update(**_ours(ours, column_of(row["metric"], row["lane"]), row["paper"]))
+        found.append(row)
     return pd.DataFrame(found)[list(COMPARED)]
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from minisim.errors import choice
 from scenarios.archive import Archive
 from scenarios.capacity import CASES, Search, capacities
 from scenarios.experiment import Experiment, Row
@@ -14,6 +15,11 @@ from scenarios.results import Effort, Find
 from scenarios.store import Store
 from scenarios.studies import STUDIES
 from scenarios.sweep import finished, workers
+
+#: The search for capacities, which is no study: what it runs depends on what it finds.
+CAPACITY = "capacity"
+#: Everything that can be reproduced.
+PARTS = (*STUDIES, CAPACITY)
 
 #: Called with the runs of a study that are done, and their number.
 Report = Callable[[int, int], None]
@@ -26,17 +32,30 @@ class Plan:
     Attributes:
         effort: of every study.
         search: for capacities.
+        parts: which of `PARTS`.
+
+    Raises:
+        InputError: an unknown part.
     """
 
     effort: Effort = field(default_factory=Effort)
     search: Search = field(default_factory=Search)
+    parts: tuple[str, ...] = PARTS
+
+    def __post_init__(self) -> None:
+        for part in self.parts:
+            choice("study", part, PARTS)
 
     @classmethod
-    def of(cls, *, quick: bool = False, seeds: int | None = None) -> Plan:
-        """The full plan or the smoke test, with another number of seeds where given."""
+    def of(
+        cls, *, quick: bool = False, seeds: int | None = None, parts: Iterable[str] | None = None
+    ) -> Plan:
+        """The full plan or the smoke test; another number of seeds, or fewer parts, where given."""
+        chosen = tuple(parts or PARTS)
         if quick:
-            return cls(effort=Effort.quick(2 if seeds is None else seeds), search=Search.quick())
-        return cls(effort=Effort() if seeds is None else Effort(seeds=seeds))
+            effort = Effort.quick(2 if seeds is None else seeds)
+            return cls(effort=effort, search=Search.quick(), parts=chosen)
+        return cls(effort=Effort() if seeds is None else Effort(seeds=seeds), parts=chosen)
 
     def archive(self, find: Find) -> Archive:
         """What figures are made from, wherever the runs are."""
@@ -77,8 +96,10 @@ def reproduce(plan: Plan, store: Store, jobs: int, report: Report) -> list[Made]
         FileError: the store cannot be written.
     """
     return [
-        *(_study(name, plan, store, jobs, report) for name in STUDIES),
-        _capacity(plan, store, jobs, report),
+        _capacity(plan, store, jobs, report)
+        if part == CAPACITY
+        else _study(part, plan, store, jobs, report)
+        for part in plan.parts
     ]
 
 
@@ -94,7 +115,7 @@ def find_in(store: Store) -> Find:
 
 
 def _study(name: str, plan: Plan, store: Store, jobs: int, report: Report) -> Made:
-    experiments = plan.effort.experiments(STUDIES[name])
+    experiments = [experiment for _, experiment in plan.effort.runs(STUDIES[name])]
     known = sum(row is not None for row in find_in(store)(experiments))
     began = time.monotonic()
     failed = []
@@ -131,6 +152,6 @@ def _capacity(plan: Plan, store: Store, jobs: int, report: Report) -> Made:
 
         capacities(CASES, search, run)
     return Made(
-        "capacity", asked, asked * search.horizon / 3600.0, asked - known,
+        CAPACITY, asked, asked * search.horizon / 3600.0, asked - known,
         time.monotonic() - began, tuple(failed),
     )  # fmt: skip

@@ -48,12 +48,12 @@ class Effort:
         chosen = self.densities
         return tuple(case for case in study.cases if chosen is None or case.density in chosen)
 
-    def experiments(self, study: Study) -> list[Experiment]:
+    def runs(self, study: Study) -> list[tuple[Case, Experiment]]:
         """The runs of a study, seed by seed within each case."""
         return [
-            case.experiment(seed, self.horizon)
+            (case, case.experiment(seed, self.horizon))
             for case in self.cases(study)
-            for seed in range(1, self.seeds + 1)
+            for seed in range(1, min(self.seeds, study.few.get(case.series, self.seeds)) + 1)
         ]
 
 
@@ -94,19 +94,18 @@ def collect(study: Study, effort: Effort, find: Find) -> Results:
     """
     import pandas as pd
 
-    cases = effort.cases(study)
-    found = find(effort.experiments(study))
+    runs = effort.runs(study)
+    found = find([experiment for _, experiment in runs])
     rows = [
         {**row, **case._asdict()}
-        for k, case in enumerate(cases)
-        for row in found[k * effort.seeds : (k + 1) * effort.seeds]
+        for (case, _), row in zip(runs, found, strict=True)
         if row is not None
     ]
     done = {tuple(row[key] for key in Case._fields) for row in rows if not row["error"]}
     columns = None if rows else [*Case._fields, "seed", "error"]
     return Results(
         study, effort, pd.DataFrame(rows, columns=columns),
-        tuple(case for case in cases if case not in done),
+        tuple(case for case in effort.cases(study) if case not in done),
     )  # fmt: skip
 
 

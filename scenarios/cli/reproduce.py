@@ -37,6 +37,14 @@ def reproduce(
         int | None,
         typer.Option(help="Processes to use; one a core by default.", show_default=False),
     ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="STUDY", show_default=False,
+            help="Only this one, and only what it needs is drawn: text, as-run, fair, gate, "
+            "fairness or capacity; may be repeated.",
+        ),
+    ] = None,
     quick: Annotated[
         bool,
         typer.Option("--quick", help="Fewer demands, five minutes each: a smoke test."),
@@ -49,7 +57,7 @@ def reproduce(
     from scenarios.reproduction import reproduce as run_all
     from scenarios.store import Store
 
-    plan = Plan.of(quick=quick, seeds=seeds)
+    plan = Plan.of(quick=quick, seeds=seeds, parts=only)
     processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     folder = make_folder(out)
     pictures = make_folder(folder / "figures")
