@@ -35,7 +35,18 @@ import numpy as np
 
 from baselines.prediction import NOBODY, Floats, Leader, Motion, predict, ways
 from baselines.zones import conflict_zones
-from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake, can_stop
+from minisim.control import (
+    Command,
+    Go,
+    Hold,
+    Observed,
+    Plan,
+    Site,
+    View,
+    Wake,
+    can_stop,
+    stopping_distance,
+)
 from minisim.errors import InputError, instance, number
 from minisim.vehicle import EngineVehicle
 
@@ -51,7 +62,10 @@ class Reservation:
     """Space-time reservation, first come first served, for vehicles that follow the IDM.
 
     Attributes:
-        reach: how far before the junction vehicles ask [m].
+        reach: how far before the junction vehicles ask [m]; None is as late as they can without
+            slowing down for a refusal: stopping distance at the limit, and a period's way. Asking
+            earlier keeps room for those who are far from those who are near: at 350 veh/h/lane
+            (fair) mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
         buffer: between one vehicle's leaving a conflict zone and the other's entering its own [s]:
             0.25 s on either side, as at the edge tiles of the AIM4 simulator.
         period: time between two looks at holders and requests [s].
@@ -61,13 +75,14 @@ class Reservation:
         InputError: a value out of range.
     """
 
-    reach: float = 100.0
+    reach: float | None = None
     buffer: float = 0.5
     period: float = 0.5
     name: str = "reservation"
 
     def __post_init__(self) -> None:
-        number("reach [m]", self.reach, low=1, high=1000)
+        if self.reach is not None:
+            number("reach [m]", self.reach, low=1, high=1000)
         number("buffer [s]", self.buffer, low=0, high=10)
         number("period [s]", self.period, low=0.01, high=10)
         instance("name", self.name, str)
@@ -230,7 +245,11 @@ class ReservationSession:
 
     def __init__(self, controller: Reservation, site: Site) -> None:
         self.manager = Manager(site, controller.buffer)
-        self.plan = Plan(marks=(controller.reach,), sight=controller.reach)
+        reach = controller.reach
+        if reach is None:
+            braking = stopping_distance(site.speed_limit, site.vehicle.deceleration)
+            reach = braking + controller.period * site.speed_limit
+        self.plan = Plan(marks=(reach,), sight=reach)
         self._period = controller.period
         self._dt = site.dt
         self._brakes = site.vehicle.deceleration
@@ -275,7 +294,9 @@ class ReservationSession:
             leader = ahead[vehicle]
             slot = None
             if leader is None or leader in slots:
-                slot = self.manager.predict(me, now, slots.get(leader) if leader is not None else None)
+                slot = self.manager.predict(
+                    me, now, slots.get(leader) if leader is not None else None
+                )
             if slot is not None and self.manager.fits(slot, last=False):
                 slots[vehicle] = slot
             elif can_stop(me, self._brakes):

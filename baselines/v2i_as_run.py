@@ -208,7 +208,9 @@ class V2ICAsRunSession:
         """One round of the rules; another one in the next step while anybody waits."""
         rules = self.rules
         platoons = {vehicle.id: self._platoon(vehicle) for vehicle in view.vehicles}
-        speeds = dict.fromkeys((v for v in platoons if v not in self._desired), self._approach_speed)
+        speeds = dict.fromkeys(
+            (v for v in platoons if v not in self._desired), self._approach_speed
+        )
         speeds.update(rules.step(platoons))
         desired = {v: speeds.get(v, self._desired.get(v, 0.0)) for v in platoons}
         commands: list[Command] = [

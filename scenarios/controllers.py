@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
+from baselines import (
+    V2IC,
+    Adaptive,
+    AllWayStop,
+    FixedTime,
+    LongestQueue,
+    Reservation,
+    V2ICAsRun,
+)
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -14,6 +22,11 @@ from scenarios.scenario import AS_RUN, Profile, profile_named
 def _dim(profile: Profile) -> Controller:
     """DIM as the profile has it: the authors' own rules go with the vehicle of their runs."""
     return AsRunDim() if profile.name == AS_RUN.name else Dim()
+
+
+def _v2ic(profile: Profile) -> Controller:
+    """V2I-C as the profile has it: what the paper compared with goes with the vehicle of its runs."""
+    return V2ICAsRun() if profile.name == AS_RUN.name else V2IC()
 
 
 #: Name -> what makes the controller for a profile. A new controller needs one line here.
@@ -30,6 +43,10 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "adaptive": lambda _: Adaptive(),
     "all-way-stop": lambda _: AllWayStop(),
     "longest-queue": lambda _: LongestQueue(),
+    "v2ic": _v2ic,
+    "v2ic-as-run": lambda _: V2ICAsRun(),
+    "v2ic-as-run-14": lambda _: V2ICAsRun(approach_speed=14.0),
+    "reservation": lambda _: Reservation(),
     "unregulated": lambda _: Unregulated(),
 }
 

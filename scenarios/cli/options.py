@@ -30,6 +30,8 @@ ControllerName = Annotated[
         help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
         "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
         "dim-paper-commit, dim-as-run, dim-as-run-size, fixed-time, fixed-time-equal, "
+        "v2ic (serving list and speed advice; the published run's under the profile as_run), "
+        "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
         "unregulated.",
     ),
 ]  # fmt: skip

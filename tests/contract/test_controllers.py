@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
+from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -57,6 +57,10 @@ CONTROLLERS: tuple[Controller, ...] = (
     LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
     AllWayStop(),
     AllWayStop(reaction=0.0),
+    V2IC(),
+    V2IC(reach=100.0, period=0.2),
+    Reservation(),
+    Reservation(reach=120.0, buffer=0.0, period=0.2),
 )
 
 
