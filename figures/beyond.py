@@ -41,7 +41,7 @@ def fair_figure(archive: Archive) -> Figure:
     rows = with_total_delay(results.good)
     figure = style.new_figure(11.5, 5.4)
     panels = figure.subplots(1, len(METRICS), sharey=True)
-    figure.subplots_adjust(left=0.058, right=0.99, top=0.745, bottom=0.135, wspace=0.06)
+    figure.subplots_adjust(left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06)
     for axes, (name, metric) in zip(panels, METRICS.items(), strict=True):
         lines.draw_means(axes, rows, metric, RIVALS)
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
@@ -51,7 +51,7 @@ def fair_figure(archive: Archive) -> Figure:
     panels[0].set_ylabel("mean of all vehicles [s], logarithmic", fontsize=9.5, color=style.INK)
     _title(figure, "Every controller on four arms, profile fair")
     lines.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
-    lines.marks_legend(figure, 0.6, 0.93, paper=False)
+    lines.marks_legend(figure, 0.012, 0.842, paper=False)
     lines.footnote(figure, missing_note([results], lambda _: True))
     return figure
 
@@ -213,7 +213,8 @@ def capacity_figure(archive: Archive) -> Figure:
     axes.set_ylim(len(RIVALS) - 0.5, -0.5)
     for edge in range(1, len(RIVALS)):
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
-    axes.set_xlim(left=0.0)
+    highest = max(value for capacity in found for value in capacity.values)
+    axes.set_xlim(0.0, 100.0 * math.ceil(highest / 100.0))
     _title(figure, "Capacity: the largest demand served without a growing queue")
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", markersize=6.5)

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
-from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import minisim
-from baselines import V2IC, Reservation
-from minisim.control import CLEARANCE, Controller
 from scenarios.scenario import FAIR, Profile, Scenario
-from tests.strategies import demands, floats, intersections, share, vehicles
+from tests.strategies import demands, floats, intersections, vehicles
 
 #: Demand for a minute, then time for any rule to serve it [s].
 DEMAND_TIME, HORIZON = 60.0, 3600.0

@@ -20,7 +20,7 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue
 from dim import Dim
 from minisim.control import (
     Advise,

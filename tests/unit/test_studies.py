@@ -245,7 +245,7 @@ def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
             for e in experiments
         ]
 
-    (found,), _ = capacities([CASE], Search(step=20.0, steps=32, seeds=2), find)
+    (found,), _ = capacities([CASE], Search(step=20.0, steps=32, seeds=1), find)
     flood = run_experiment(
         Experiment(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)
     ).row
