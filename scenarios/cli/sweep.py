@@ -168,9 +168,10 @@ def _run(
                 progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
                 progress(len(rows), len(experiments))
     except KeyboardInterrupt:
+        kept = len(store.valid(experiment.key for experiment in experiments))
         typer.echo(
-            f"minisim: {len(rows)} of {len(experiments)} runs are in {out}; the same command "
-            "goes on from there",
+            f"minisim: {kept} of {len(experiments)} runs are in {out}; the same command goes on "
+            "from there",
             err=True,
         )
         raise

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -54,8 +55,8 @@ def stop(processes: Processes) -> None:
         process.wait(timeout=20)
 
 
-@pytest.fixture
-def scheduler(tmp_path: Path) -> Iterator[str]:
+@contextmanager
+def running_scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     file = tmp_path / "scheduler.json"
     process = start(
         "dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
@@ -67,9 +68,15 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
             assert process.poll() is None, "the scheduler died"
             assert time.monotonic() < deadline
             time.sleep(0.05)
-        yield json.loads(file.read_text())["address"]
+        yield json.loads(file.read_text())["address"], process
     finally:
         stop([process])
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[str]:
+    with running_scheduler(tmp_path) as (address, _):
+        yield address
 
 
 def experiments(count: int, horizon: float = 120.0) -> list[Experiment]:
@@ -81,7 +88,7 @@ def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:
-    todo = experiments(40, horizon=1200.0)
+    todo = experiments(24, horizon=600.0)
     here = sweep(todo, jobs=1)
     processes = [worker(scheduler), worker(scheduler)]
     killed = False
@@ -139,3 +146,23 @@ def test_no_scheduler_is_told_within_seconds(
     assert error.startswith("minisim: no Dask scheduler at ")
     assert error.count("\n") == 1
     assert not store.exists()
+
+
+def test_a_lost_scheduler_leaves_rows_that_say_so(tmp_path: Path) -> None:
+    todo = experiments(12, horizon=1200.0)
+    with running_scheduler(tmp_path) as (address, process):
+        processes = [worker(address)]
+
+        def kill(done: int, total: int) -> None:
+            if done == 2:
+                process.kill()
+
+        try:
+            with Store(tmp_path / "s.db") as store, cluster(address, patience=60) as executor:
+                rows = sweep(todo, executor, kill, store=store)
+                assert len(store) == len(todo)
+        finally:
+            stop(processes)
+    lost = rows["error"].dropna()
+    assert 0 < len(lost) <= 10
+    assert set(lost) == {"CancelledError: the executor gave the run up"}

@@ -1,0 +1,180 @@
+"""Experiment files: what they can say, and what they are told when it is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from baselines import FixedTime
+from dim import Dim
+from minisim.arrivals import write_arrivals
+from minisim.errors import FileError, InputError, MinisimError
+from scenarios import five_way, four_way, from_bearings, three_way
+from scenarios.cli import main
+from scenarios.experiment import Experiment
+from scenarios.experiment_file import check_can_run, read_experiments
+
+
+def read(tmp_path: Path, text: str) -> list[Experiment]:
+    file = tmp_path / "e.toml"
+    file.write_text(text)
+    return read_experiments(file)
+
+
+def test_an_empty_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
+    found = read(tmp_path, "")
+    assert found == [Experiment(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
+
+
+def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
+    found = read(
+        tmp_path,
+        'scenario = ["three-way", "five-way"]\ndensity = [150, 350]\nseeds = [7, 3]\n'
+        'controller = ["dim", "fixed-time"]\nprofile = "fair"\nhorizon = 600\n',
+    )
+    assert found == [
+        Experiment(make(density, profile="fair", horizon=600.0), controller, seed)
+        for make in (three_way, five_way)
+        for density in (150.0, 350.0)
+        for controller in (Dim(), FixedTime())
+        for seed in (7, 3)
+    ]
+
+
+def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
+    (found,) = read(
+        tmp_path,
+        'split = "4:3:2:1"\nturns = "1:2:1"\nmodel = "shifted"\nmin_headway = 2\nside = "right"\n'
+        "density = 200\nseeds = [5]\n"
+        'scenario = {name = "custom", label = "skewed", bearings = [0, 80, 190, 260],\n'
+        "    arm_length = 300}\n"
+        'controller = {name = "dim", label = "inflow", priorities = "inflow", zones = {red = 20}}\n'
+        'on_collision = "record"\n'.replace(",\n    ", ", "),
+    )
+    scenario = from_bearings(
+        [0, 80, 190, 260], 200, name="skewed", side="right", arm_length=300, split=(4, 3, 2, 1),
+        turns=(1, 2, 1), model="shifted", min_headway=2,
+    )  # fmt: skip
+    assert found.scenario == scenario
+    assert isinstance(found.controller, Dim)
+    assert found.controller.priorities == "inflow"
+    assert (found.controller.zones.red, found.controller.zones.yellow) == (20, 6)
+    assert (found.name, found.seed, found.on_collision) == ("inflow", 5, "record")
+    assert found.identity()["split"] == "4:3:2:1"
+    assert found.identity()["turns"] == "1:2:1"
+
+
+def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
+    found = read(
+        tmp_path,
+        'seeds = 1\ndensity = 150\n[[experiment]]\ncontroller = "fixed-time"\n'
+        '[[experiment]]\nscenario = "three-way"\ndensity = 300\n[[experiment]]\nseeds = 2\n'
+        '[[experiment]]\ncontroller = [{name = "fixed-time", greens = [9, 8, 7, 6], label="x"}]\n'
+        "[[experiment]]\n",
+    )
+    assert found == [
+        Experiment(four_way(150.0), FixedTime(), 1),
+        Experiment(three_way(300.0), Dim(), 1),
+        Experiment(four_way(150.0), Dim(), 1),  # and not a second time by the last block
+        Experiment(four_way(150.0), Dim(), 2),
+        Experiment(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, "x"),
+    ]
+
+
+def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
+    arrivals = four_way(300, horizon=100).arrivals(1)
+    write_arrivals(arrivals, tmp_path / "a.csv")
+    (found,) = read(tmp_path, 'arrivals = "a.csv"\nseeds = [0]\nhorizon = 100\n')
+    assert found.scenario.recorded is not None
+    assert found.scenario.recorded.time.tolist() == arrivals.time.tolist()
+    assert found.scenario.density == pytest.approx(len(arrivals) * 36 / 4)
+    assert found.identity()["split"] == "recorded"
+
+
+def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
+    file = tmp_path / "e.toml"
+    file.write_text("seeds = 5\nhorizon = 100\n")
+    found = read_experiments(file, seeds=2, horizon=50.0)
+    assert [experiment.seed for experiment in found] == [1, 2]
+    assert found[0].scenario.horizon == 50.0
+
+
+WRONG = [
+    ("densty = 3", r"unknown key 'densty'.*did you mean 'density'"),
+    ("[[experiment]]\nsed = 1\n[[experiment]]", r"\[\[experiment\]\] 1: .*did you mean 'seeds'"),
+    ("[experiment]\nseeds = 1", r"two brackets"),
+    ("experiment = [1]", r"two brackets"),
+    ('scenario = "for-way"', r"did you mean 'four-way'"),
+    ('scenario = {name = "custom", bearing = [0]}', r"key of a scenario 'bearing'.*'bearings'"),
+    ('scenario = {bearings = [0]}', r"has no name"),
+    ('scenario = "custom"', r"needs bearings"),
+    ('scenario = {name = "four-way", label = 3}', r"label must be a str"),
+    ("scenario = 4", r"scenario: must be a name"),
+    ('controller = "dmi"', r"controller: unknown controller 'dmi'.*'dim'"),
+    ('controller = {name = "dim", ordr = "size"}', r"parameter of dim 'ordr'.*'order'"),
+    ('controller = {name = "dim", zones = {rd = 3}}', r"parameter of dim.zones 'rd'.*'red'"),
+    ('controller = {name = "dim", order = "sise"}', r"unknown order 'sise'.*'size'"),
+    ('controller = {name = "dim", zones = 3}', r"zones must be a Zones"),
+    ('controller = {name = "unregulated", x = 3}', r"parameter of unregulated 'x'"),
+    ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
+    ("profile = 3", r"profile must be a text"),
+    ('split = "4-3"', r"split: a split is written like"),
+    ('split = "4:3"', r"split has 2 shares for 4 lanes"),
+    ('turns = "1:2"', r"turns has 2 shares for 3 manoeuvres"),
+    ('side = "middle"', r"'middle'"),
+    ('model = "poison"', r"'poisson'"),
+    ("density = -1", r"density"),
+    ("density = []", r"density is an empty list"),
+    ('density = "many"', r"density"),
+    ("density = inf", r"density"),
+    ("seeds = 0", r"seeds: seeds must be an integer 1"),
+    ("seeds = [-1]", r"seeds: a seed must be"),
+    ("seeds = true", r"seeds: seeds must be an integer"),
+    ("seeds = 1000000000", r"seeds"),
+    ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 experiments are more than"),
+    ("horizon = 0", r"horizon"),
+    ("horizon = [1]", r"horizon"),
+    ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
+    ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
+    ('arrivals = "a.csv"', r"a\.csv"),
+    ("arrivals = 3", r"arrivals must be a text"),
+    ('controller = ["dim", {name = "dim", zones = {red = 3}}]', r"both be called dim.*label"),
+    ("density = [1, 2", r"not valid TOML"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_what_is_wrong_is_named_with_its_place(
+    text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(MinisimError, match=message) as caught:
+        read(tmp_path, text)
+    file = tmp_path / "e.toml"
+    assert str(file) in str(caught.value)
+    assert isinstance(caught.value, InputError | FileError)
+    assert main(["sweep", str(file), "--out", str(tmp_path / "s.db")]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert not (tmp_path / "s.db").exists()
+
+
+def test_a_file_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    for name in ("missing.toml", ".", "binary.toml"):
+        with pytest.raises(FileError):
+            read_experiments(tmp_path / name)
+
+
+def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = read(
+        tmp_path, 'scenario = "three-way"\ncontroller = {name = "fixed-time", greens = [1, 2]}\n'
+    )
+    with pytest.raises(InputError, match=r"fixed-time cannot serve three-way at 350 .*2 values"):
+        check_can_run(found)
+    store = tmp_path / "s.db"
+    assert main(["sweep", str(tmp_path / "e.toml"), "--out", str(store)]) == 2
+    assert "fixed-time cannot serve three-way" in capsys.readouterr().err
+    assert not store.exists()
