@@ -21,8 +21,8 @@ longer fits, with a new prediction, among all others, loses its reservation if i
 so does whoever follows it. So when a vehicle becomes unable to stop, its passage fits those of all
 others that can not, and whoever still can yields to it. What remains is the error of a prediction
 over a vehicle's last few seconds before its zones, from a state that is at most a period old, and
-`buffer` is there for it. In minisim, where drivers differ in nothing, predictions are those of the
-simulator itself and the error is 0.
+`buffer` is there for it. In minisim it is small: up to 0.15 m beyond the point of no return (4
+arms, 350 veh/h/lane), from leaders further ahead than the two that a prediction looks at.
 """
 
 from __future__ import annotations
@@ -128,10 +128,8 @@ class Slot:
     def expects(self, seen: Observed, now: int) -> bool:
         """Whether the vehicle is where it was predicted to be."""
         k = now - self.start
-        return (
-            abs(self.s[k] + seen.distance) <= POSITION_TOLERANCE
-            and abs(self.v[k] - seen.speed) <= SPEED_TOLERANCE
-        )
+        off, faster = float(self.s[k]) + seen.distance, float(self.v[k]) - seen.speed
+        return abs(off) <= POSITION_TOLERANCE and abs(faster) <= SPEED_TOLERANCE
 
 
 class Manager:

@@ -1,4 +1,4 @@
-"""V2I-C as it was run for the published numbers: an adaptation of Li and Liu's code, with its slips.
+"""V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
 `baselines.v2i` is the controller as it is meant. This module holds what the comparison in the
 paper ran instead, quirk by quirk, and nothing else knows of them:

@@ -220,9 +220,14 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def follow(v: float, v0: float, z: float, law: Law) -> float:
-    """Acceleration of the car-following law."""
+    """Acceleration of the car-following law.
+
+    A desired speed of 0 is its limit from above: comfortable braking, and the leader's share on it.
+    """
     if v0 <= 0.0:
-        return -law.b
+        if law.improved:
+            return -law.b + min(law.a * (1.0 - z * z), 0.0)
+        return -law.b - law.a * z * z
     if law.improved:
         return iidm(v, v0, z, law.a, law.b, law.delta)
     return idm(v, v0, z, law.a, law.b, law.delta)

@@ -25,7 +25,7 @@ def _dim(profile: Profile) -> Controller:
 
 
 def _v2ic(profile: Profile) -> Controller:
-    """V2I-C as the profile has it: what the paper compared with goes with the vehicle of its runs."""
+    """V2I-C as the profile has it: the published one goes with the vehicle of the paper's runs."""
     return V2ICAsRun() if profile.name == AS_RUN.name else V2IC()
 
 

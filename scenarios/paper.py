@@ -111,8 +111,15 @@ def scenario(split: str, density: int, arms: int, profile: str | Profile = AS_RU
     return MAKERS[cell.arms](cell.density, split=shares, profile=profile)
 
 
-def replay(split: str, density: int, arms: int, profile: str | Profile = AS_RUN) -> Scenario:
-    """A cell of the grid with the arrivals of its published run.
+def replay(
+    split: str,
+    density: int,
+    arms: int,
+    profile: str | Profile = AS_RUN,
+    *,
+    controller: str = "dim",
+) -> Scenario:
+    """A cell of the grid with the arrivals of its published run under "dim" or "v2ic" (4 arms).
 
     Under the profile `as_run`, with `dim.AsRunDim` and collisions recorded, the trips are those
     of SUMO on the same arrivals, vehicle by vehicle. Vehicles of one second and lane are inserted
@@ -122,7 +129,7 @@ def replay(split: str, density: int, arms: int, profile: str | Profile = AS_RUN)
         InputError: no such cell, or an unknown profile.
     """
     cell = _cell(split, density, arms)
-    arrivals = published_arrivals(*cell)
+    arrivals = published_arrivals(*cell, controller)
     return MAKERS[cell.arms](
         cell.density,
         split=None if cell.split == "balanced" else parse_split(cell.split),

@@ -16,6 +16,9 @@ from minisim.geometry import Way
 #: Arm counts of the published junctions.
 PUBLISHED_ARMS = (3, 4, 5)
 
+#: Controllers whose published arrivals are here.
+REPLAYED = ("dim", "v2ic")
+
 
 @lru_cache
 def published_ways(arms: int) -> tuple[Way, ...]:
@@ -36,20 +39,22 @@ def _way(row: dict[str, str]) -> Way:
     return Way(points, float(row["length_m"]), float(row["wait_m"]))
 
 
-def published_arrivals(split: str, density: int, arms: int) -> Arrivals:
-    """The arrivals of a published DIM run.
+def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
+    """The arrivals of a published run of DIM or, on 4 arms, V2I-C.
 
     Args:
         split: "balanced", "4:3:2:1" or "4:1:4:1".
         density: mean inflow a lane [veh/h].
         arms: of the junction.
+        controller: "dim" or "v2ic".
 
     Raises:
         InputError: no such run was published.
     """
     folder = resources.files("scenarios") / "data" / "arrivals"
     names = sorted(f.name for f in folder.iterdir() if f.name.endswith(".csv"))
-    wanted = f"{split.replace(':', '')}_{density}_dim_{arms}way.csv"
-    choice("published DIM run", wanted, names)
+    wanted = f"{split.replace(':', '')}_{density}_{controller}_{arms}way.csv"
+    kind = {"dim": "DIM", "v2ic": "V2I-C"}[choice("replayed controller", controller, REPLAYED)]
+    choice(f"published {kind} run", wanted, [name for name in names if f"_{controller}_" in name])
     with resources.as_file(folder / wanted) as path:
         return read_arrivals(path, arms)
