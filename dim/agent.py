@@ -50,7 +50,7 @@ class Agent:
         self.rules = rules
         self.right_of_way = False
 
-    def decide(self, percept: Percept) -> bool:
+    def decide(self, percept: Percept, table: DecisionTable | None = None) -> bool:
         """Whether it goes, from what it perceives now (lines 4–12 of Algorithm 1).
 
         Crossing, it keeps going; by the paper's commit rule it also goes when it rolled past
@@ -58,8 +58,13 @@ class Agent:
         others"). By the stoppable rule such a vehicle is stopping, and waits. Not yet its lane's
         front vehicle, or held out by the gate, it does what it did before. Otherwise it goes
         exactly if it belongs to the clique.
+
+        Args:
+            percept: what it sees.
+            table: of the lane priorities in force now, where these change; by default the rules'.
         """
         rules = self.rules
+        table = rules.table if table is None else table
         if percept.crossing:
             if self.vehicle in percept.crossing:
                 self.right_of_way |= rules.commit == "paper"
@@ -69,6 +74,6 @@ class Agent:
         if self.vehicle in percept.participants:
             case = percept.case
             if percept.crossing:
-                case = rules.table.admitted(case, percept.occupied)
-            self.right_of_way = bool(rules.table.lanes(case) >> self.lane & 1)
+                case = table.admitted(case, percept.occupied)
+            self.right_of_way = bool(table.lanes(case) >> self.lane & 1)
         return self.right_of_way

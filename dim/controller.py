@@ -13,25 +13,39 @@ wake-ups suffice, because between them no agent would change its mind:
   that only one of them has, and a lane that both have does not count.
 - Somebody stops crossing when its rear bumper leaves the junction (wake-up).
 
-Two exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
+Three exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
 past half of the green zone, where it is granted it: another mark. And on a host whose brakes
 differ, a vehicle that loses its right of way may look committed until it stands: then the session
-looks again every step.
+looks again every step. And where lane priorities change with time (`dim.priorities`), it looks
+again when they do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
 from dim.agent import GATES, Agent, Rules
-from dim.decision import ORDERS, decision_table, lane_ranks
+from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
 from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
+from dim.priorities import (
+    SENSOR_RANGE,
+    TURN_TIME,
+    Ranking,
+    Watch,
+    longest_waiting,
+    memory_of,
+    rotating,
+)
 from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, number, show
+
+#: Lane priorities that change with time.
+CHANGING = ("rotating", "waiting")
 
 #: Views reach this far beyond the start of the yellow zone [m].
 SIGHT_MARGIN = 0.5
@@ -49,10 +63,14 @@ class Dim:
             whoever is in harmony with all of them, where vehicles of one lane just follow each
             other.
         priorities: rank of each lane, 0 first; "inflow" ranks by descending demand, ties by
-            lane; None is the lanes' own order.
+            lane; "rotating" and "waiting" change with time, see `dim.priorities`; None is the
+            lanes' own order.
         zones: the road markings.
         matrix: harmony of the movements; None derives it from geometry and vehicle.
         perception: what vehicles see of each other.
+        turn_time: how long a lane comes first in "rotating" and among equals in "waiting" [s].
+        sensor_range: how far vehicles see the others' approach lanes and yellow zones [m]; what
+            "waiting" may remember depends on it.
         period: look around every so many seconds too, or None: not needed, for tests.
 
     Raises:
@@ -62,10 +80,12 @@ class Dim:
     order: str = "size"
     commit: str = "stoppable"
     gate: str = "clear"
-    priorities: tuple[int, ...] | Literal["inflow"] | None = None
+    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = None
     zones: Zones = field(default_factory=Zones)
     matrix: HarmonyMatrix | None = None
     perception: Perception = field(default_factory=ExactPerception)
+    turn_time: float = TURN_TIME
+    sensor_range: float = SENSOR_RANGE
     period: float | None = None
 
     def __post_init__(self) -> None:
@@ -73,12 +93,14 @@ class Dim:
         choice("commit rule", self.commit, COMMITS)
         choice("gate", self.gate, GATES)
         if isinstance(self.priorities, str):
-            choice("priorities", self.priorities, ("inflow",))
+            choice("priorities", self.priorities, ("inflow", *CHANGING))
         elif self.priorities is not None:
             object.__setattr__(self, "priorities", _own_ranks(self.priorities))
         instance("zones", self.zones, Zones)
         instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
         instance("perception", self.perception, Perception)
+        number("turn_time [s]", self.turn_time, low=1, high=3600)
+        number("sensor_range [m]", self.sensor_range, low=1, high=1000)
         if self.period is not None:
             number("period [s]", self.period, above=0)
 
@@ -89,7 +111,7 @@ class Dim:
             self.gate: self.gate != "clear",
             "lanes": self.order == "lanes",
             "paper-commit": self.commit == "paper",
-            "inflow": self.priorities == "inflow",
+            str(self.priorities): isinstance(self.priorities, str),
             "priorities": isinstance(self.priorities, tuple),
         }
         return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
@@ -104,11 +126,13 @@ class Dim:
         return DimSession(self, site)
 
     def ranks(self, site: Site) -> tuple[int, ...]:
-        """Rank of each lane at this site, 0 first; raises `InputError` for another n."""
+        """Rank of each lane at this site and time 0, 0 first; raises `InputError` for another n."""
         n = site.intersection.n
         if self.priorities == "inflow":
             by_inflow = sorted(range(n), key=lambda lane: (-site.demand[lane], lane))
             return tuple(by_inflow.index(lane) for lane in range(n))
+        if isinstance(self.priorities, str):
+            return rotating(0.0, n).ranks
         return lane_ranks(self.priorities, n)
 
     def harmony(self, site: Site) -> HarmonyMatrix:
@@ -151,6 +175,7 @@ class DimSession:
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
+        self._ranks = _ranking(dim, site)
         self._see = dim.perception.start(site)
         self._dt = site.dt
         self._agents: dict[int, Agent] = {}
@@ -160,7 +185,8 @@ class DimSession:
         commands: list[Command] = []
         agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
         start = self.plan.marks[0] + ROUNDING
-        look_again = False
+        look_again = waiting = False
+        table, until = self._table(view)
         seen = percept = None
         for ego in view.vehicles:
             if ego.distance > start:
@@ -172,15 +198,43 @@ class DimSession:
             if sight is not seen or percept is None:  # all who see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
-            goes = agent.decide(percept)
+            goes = agent.decide(percept, table)
             if goes != had:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
-            if not goes and vehicle in percept.crossing:
-                look_again = True
+            if not goes:
+                look_again |= vehicle in percept.crossing
+                waiting |= vehicle in percept.participants
         self._agents = agents
         if look_again:
             commands.append(Wake(view.time + self._dt))
+        elif waiting and until < math.inf:
+            commands.append(Wake(max(until, view.time + self._dt)))
         return commands
+
+    def _table(self, view: View) -> tuple[DecisionTable, float]:
+        """The table of the ranks in force now, and until when they are [s]."""
+        if self._ranks is None:
+            return self.rules.table, math.inf
+        ranks, until = self._ranks(view)
+        base = self.rules.table
+        return decision_table(base.matrix, base.order, ranks), until
+
+
+def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
+    """How the ranks of this run follow from what is seen, or None where they never change.
+
+    All who take part know the same ranks, so a session works them out once for everybody.
+    """
+    n = site.intersection.n
+    if dim.priorities == "rotating":
+        return lambda view: rotating(view.time, n, dim.turn_time)
+    if dim.priorities == "waiting":
+        memory = memory_of(site, dim.zones, dim.sensor_range)
+        watch = Watch(dim.zones.yellow_start + ROUNDING)
+        return lambda view: longest_waiting(
+            view.time, n, watch.look(view.time, view.vehicles), memory, dim.turn_time
+        )
+    return None
 
 
 def _own_ranks(priorities: object) -> tuple[int, ...]:

@@ -70,7 +70,7 @@ def decide(
     participants = _participants(movements, matrix)
     choice("order", order, ORDERS)
     ranks = lane_ranks(priorities, matrix.n)
-    return _choose(_maximal_cliques(participants, matrix), order, ranks)
+    return choose(maximal_cliques(participants, matrix), order, ranks)
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def explain(
     choice("order", order, ORDERS)
     ranks = lane_ranks(priorities, matrix.n)
     cliques = sorted(
-        _maximal_cliques(participants, matrix), key=lambda clique: _key(clique, order, ranks)
+        maximal_cliques(participants, matrix), key=lambda clique: _key(clique, order, ranks)
     )
     largest = max(map(len, cliques))
     tied = tuple(clique for clique in cliques if len(clique) == largest)
@@ -211,7 +211,7 @@ class DecisionTable:
         return self.case(m for m in self.participants(case) if free(m))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def decision_table(
     matrix: HarmonyMatrix, order: str = "size", priorities: tuple[int, ...] | None = None
 ) -> DecisionTable:
@@ -236,7 +236,7 @@ def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Moveme
     return tuple(pair for pair in combinations(participants, 2) if matrix.harmony(*pair))
 
 
-def _maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
+def maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
     """All maximal cliques, in no order that anyone may rely on; each sorted by lane."""
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(m.origin for m in participants)
@@ -251,7 +251,8 @@ def _key(clique: Movements, order: str, ranks: tuple[int, ...]) -> tuple[int, li
     return size, sorted(ranks[m.origin] for m in clique)
 
 
-def _choose(cliques: list[Movements], order: str, ranks: tuple[int, ...]) -> Movements:
+def choose(cliques: list[Movements], order: str, ranks: tuple[int, ...]) -> Movements:
+    """The clique of `maximal_cliques` that is preferred, whatever order they come in."""
     return min(cliques, key=lambda clique: _key(clique, order, ranks), default=())
 
 

@@ -19,7 +19,10 @@ from scenarios.cli.terminal import drop_output, prepare_streams
 __all__ = ["COMMANDS", "app", "main"]
 
 #: In the order of the help; the module of that name beside this one adds the command to the app.
-COMMANDS = ("demo", "run", "sweep", "figures", "reproduce", "harmony", "decide", "animate")
+COMMANDS = (
+    "demo", "run", "sweep", "figures", "reproduce", "harmony", "decide", "animate", "verify",
+    "protocol",
+)  # fmt: skip
 
 for _command in COMMANDS:
     importlib.import_module(f"scenarios.cli.{_command}")

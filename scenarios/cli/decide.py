@@ -11,6 +11,7 @@ from scenarios.cli.app import app
 from scenarios.cli.options import (
     AsJson,
     Bearings,
+    Order,
     ProfileName,
     ScenarioName,
     Side,
@@ -34,14 +35,7 @@ def decide(
             "1st exit clockwise, and so on; at most one a lane.",
         ),
     ],
-    order: Annotated[
-        str,
-        typer.Option(
-            metavar="size|lanes",
-            help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
-            "(its published runs).",
-        ),
-    ] = "size",
+    order: Order = "size",
     bearings: Bearings = None,
     side: Side = "left",
     profile: ProfileName = "paper",

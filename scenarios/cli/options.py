@@ -29,6 +29,7 @@ ControllerName = Annotated[
         "--controller", "-c", metavar="NAME",
         help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
         "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
+        "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
         "dim-paper-commit, dim-as-run, dim-as-run-size, fixed-time, fixed-time-equal, "
         "v2ic (serving list and speed advice; the published run's under the profile as_run), "
         "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
@@ -108,6 +109,14 @@ Gui = Annotated[bool, typer.Option("--gui", help="Show the run in sumo-gui.")]
 KeepFiles = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Keep SUMO's network, routes, log and trips there."),
+]
+Order = Annotated[
+    str,
+    typer.Option(
+        metavar="size|lanes",
+        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
+        "(its published runs).",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 

@@ -1,0 +1,322 @@
+"""Every case that a junction can decide, checked one by one against brute force.
+
+The paper argues that each of the 255 cases of 4 arms has one solution, the same for everybody
+("Deadlock Analysis"). Here all of them are tried, for any matrix. What a decision should be is
+worked out without a graph library, from the subsets of the participants, so that it and
+`dim.decision` can only agree if both are right.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import NamedTuple
+
+from dim.agent import Agent, Rules
+from dim.decision import MAX_CASES, DecisionTable, Movements, choose, maximal_cliques
+from dim.harmony import HarmonyMatrix
+from dim.perception import Percept
+from minisim.errors import InputError
+
+#: Up to so many arms the participants are put into every order; beyond, into each one's own
+#: (itself first, then the others around the junction, either way round): 5 arms have 120 orders a
+#: case, 6 arms 720.
+ALL_ORDERS = 5
+
+#: A set of lanes, bit i for lane i.
+Lanes = int
+
+#: Called with the number of cases done, and of all.
+Progress = Callable[[int, int], object]
+
+
+class Cliques(NamedTuple):
+    """All that a case leaves to choose from, found by trying every subset.
+
+    Attributes:
+        maximal: cliques that nobody can join.
+        largest: those of them with the most lanes.
+    """
+
+    maximal: tuple[Lanes, ...]
+    largest: tuple[Lanes, ...]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement about every case.
+
+    Attributes:
+        name: in a word.
+        statement: in a sentence.
+        cases: in how many it was tried.
+        failures: in how many it is false.
+        example: the first of these with the fewest participants, or None.
+    """
+
+    name: str
+    statement: str
+    cases: int
+    failures: int
+    example: Movements | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is true in every case."""
+        return self.failures == 0
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What all cases of a matrix showed.
+
+    Attributes:
+        matrix, order, priorities: the rules, as in `dim.decide`.
+        cases: their number, n^n − 1.
+        claims: what was checked.
+        sizes: cases by the number of vehicles that may go.
+        ties: cases by the number of cliques of the largest size.
+        worst: the cases with the most cliques of the largest size, by that size: the first of
+            each, and how many there are.
+    """
+
+    matrix: HarmonyMatrix
+    order: str
+    priorities: tuple[int, ...]
+    cases: int
+    claims: tuple[Claim, ...]
+    sizes: Mapping[int, int]
+    ties: Mapping[int, int]
+    worst: Mapping[int, tuple[Movements, int]]
+
+    @property
+    def n(self) -> int:
+        """Number of arms."""
+        return self.matrix.n
+
+    @property
+    def holds(self) -> bool:
+        """Whether every claim is true."""
+        return all(claim.holds for claim in self.claims)
+
+    @property
+    def tied(self) -> int:
+        """Number of cases in which cliques tie."""
+        return sum(cases for cliques, cases in self.ties.items() if cliques > 1)
+
+    @property
+    def most_tied(self) -> int:
+        """The largest number of cliques that tie."""
+        return max(self.ties)
+
+
+def analyse(
+    matrix: HarmonyMatrix,
+    order: str = "size",
+    priorities: Sequence[int] | None = None,
+    progress: Progress | None = None,
+) -> Analysis:
+    """Try all cases of a matrix; 6 arms (46,655 cases) take about 20 s.
+
+    Raises:
+        InputError: unknown order, priorities that are no permutation, or too many cases (8 arms).
+    """
+    table = DecisionTable(matrix, order, priorities)
+    if len(table) > MAX_CASES:
+        raise InputError(
+            f"{matrix.n} arms have {len(table)} cases, too many to try them all "
+            f"(at most {MAX_CASES})"
+        )
+    tally = _Tally(Case(table))
+    for case, movements in enumerate(table, start=1):
+        tally.add(case, movements)
+        if progress is not None and (case % 256 == 0 or case == len(table)):
+            progress(case, len(table))
+    return tally.result()
+
+
+def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
+    """The cliques among participants (at most one a lane), from all 2^k subsets of them."""
+    k = len(movements)
+    rows = [matrix.index(m) for m in movements]
+    friends = [sum(1 << j for j in range(k) if matrix.values[i, rows[j]]) for i in rows]
+    clique = [True] * (1 << k)
+    for subset in range(1, 1 << k):
+        rest = subset & (subset - 1)
+        lowest = (subset ^ rest).bit_length() - 1
+        clique[subset] = clique[rest] and rest & ~friends[lowest] == 0
+    found = [
+        subset
+        for subset in range(1, 1 << k)
+        if clique[subset]
+        and not any(clique[subset | 1 << j] for j in range(k) if not subset >> j & 1)
+    ]
+    most = max((subset.bit_count() for subset in found), default=0)
+
+    def lanes(subset: int) -> Lanes:
+        return sum(1 << m.origin for j, m in enumerate(movements) if subset >> j & 1)
+
+    return Cliques(
+        tuple(map(lanes, found)),
+        tuple(lanes(subset) for subset in found if subset.bit_count() == most),
+    )
+
+
+def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
+    """What is left of `cliques` when the paper's words break the tie.
+
+    "The clique with the highest priority lanes": those that hold the first lane, if any does; of
+    these those that hold the second; and so on.
+
+    Args:
+        cliques: sets of lanes.
+        by_priority: the lanes, first one first.
+    """
+    left = tuple(cliques)
+    for lane in by_priority:
+        left = tuple(clique for clique in left if clique >> lane & 1) or left
+    return left
+
+
+def node_orders(movements: Movements, n: int) -> Iterator[Movements]:
+    """Orders in which participants may list each other; see `ALL_ORDERS`."""
+    if n <= ALL_ORDERS:
+        yield from permutations(movements)
+        return
+    for k in range(len(movements)):
+        own = movements[k:] + movements[:k]
+        yield own
+        yield own[:1] + own[:0:-1]
+
+
+class Case:
+    """The checks of one case after the other, under one set of rules.
+
+    Attributes:
+        table: the decisions that are checked.
+        by_priority: the lanes, first one first.
+    """
+
+    #: Name -> statement; `check` answers in this order.
+    CLAIMS: Mapping[str, str] = {
+        "exists": "somebody may go",
+        "harmony": "all who may go are in harmony, and take part",
+        "largest": "no larger set of participants is in harmony",
+        "maximal": "nobody else could go with them",
+        "unique": "the tie-break leaves one clique, and it is the decision",
+        "priority": "it holds the highest-priority lane of all cliques that tie",
+        "unanimous": "every participant answers for itself as the decision says",
+        "order": "it is the same in whatever order the participants are listed",
+    }
+
+    def __init__(self, table: DecisionTable) -> None:
+        n = table.matrix.n
+        self.table = table
+        self.by_priority = tuple(sorted(range(n), key=table.priorities.__getitem__))
+        self._agents = tuple(Agent(lane, lane, Rules(table)) for lane in range(n))
+        self._same_order: dict[tuple[Lanes, tuple[int, ...]], bool] = {}
+
+    def check(self, case: int, movements: Movements, cliques: Cliques) -> tuple[bool, ...]:
+        """Whether each claim is true of a case."""
+        decision = self.table.lanes(case)
+        present = sum(1 << m.origin for m in movements)
+        candidates = cliques.largest if self.table.order == "size" else cliques.maximal
+        offered = 0
+        for clique in candidates:
+            offered |= clique
+        first = next((lane for lane in self.by_priority if offered >> lane & 1), 0)
+        return (
+            decision != 0,
+            decision & ~present == 0 and any(decision & ~c == 0 for c in cliques.maximal),
+            decision.bit_count() == cliques.largest[0].bit_count(),
+            decision in cliques.maximal,
+            preferred(candidates, self.by_priority) == (decision,),
+            bool(decision >> first & 1),
+            self._agents_say(case, movements) == decision,
+            self._same_in_any_order(movements, decision),
+        )
+
+    def _agents_say(self, case: int, movements: Movements) -> Lanes:
+        """The lanes whose agents go, each asked alone, with nobody crossing."""
+        lanes = tuple(m.origin for m in movements)
+        percept = Percept(participants=lanes, crossing=(), case=case, occupied=0)
+        return sum(1 << lane for lane in lanes if self._agents[lane].decide(percept))
+
+    def _same_in_any_order(self, movements: Movements, decision: Lanes) -> bool:
+        """Solve the case with the graph built in every order; once for each graph of lanes."""
+        matrix, table = self.table.matrix, self.table
+        rows = [matrix.index(m) for m in movements]
+        edges = tuple(int(matrix.values[i, j]) for i in rows for j in rows)
+        graph = sum(1 << m.origin for m in movements), edges
+        if graph not in self._same_order:
+            self._same_order[graph] = all(
+                sum(1 << m.origin for m in choose(cliques, table.order, table.priorities))
+                == decision
+                for cliques in (
+                    maximal_cliques(order, matrix) for order in node_orders(movements, matrix.n)
+                )
+            )
+        return self._same_order[graph]
+
+
+class _Tally:
+    """Counts over the cases."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.tried = 0
+        self.failures = dict.fromkeys(case.CLAIMS, 0)
+        self.examples: dict[str, Movements] = {}
+        self.sizes: Counter[int] = Counter()
+        self.ties: Counter[int] = Counter()
+        self.worst: dict[int, tuple[Movements, int]] = {}
+
+    def add(self, case: int, movements: Movements) -> None:
+        cliques = brute_force(movements, self.case.table.matrix)
+        answers = self.case.check(case, movements, cliques)
+        for name, holds in zip(self.case.CLAIMS, answers, strict=True):
+            if not holds:
+                self.failures[name] += 1
+                best = self.examples.get(name, movements)
+                self.examples[name] = min(best, movements, key=len)
+        self.tried += 1
+        self.sizes[self.case.table.lanes(case).bit_count()] += 1
+        tied = len(cliques.largest)
+        if tied > max(self.ties, default=0):
+            self.worst = {}
+        self.ties[tied] += 1
+        if tied == max(self.ties):
+            size = cliques.largest[0].bit_count()
+            first, count = self.worst.get(size, (movements, 0))
+            self.worst[size] = first, count + 1
+
+    def result(self) -> Analysis:
+        table = self.case.table
+        return Analysis(
+            matrix=table.matrix,
+            order=table.order,
+            priorities=table.priorities,
+            cases=self.tried,
+            claims=tuple(
+                Claim(name, text, self.tried, self.failures[name], self.examples.get(name))
+                for name, text in self.case.CLAIMS.items()
+            ),
+            sizes=dict(sorted(self.sizes.items())),
+            ties=dict(sorted(self.ties.items())),
+            worst=dict(sorted(self.worst.items())),
+        )
+
+
+def most_cliques(k: int) -> int:
+    """The most maximal cliques that any graph of k ≥ 1 nodes can have.
+
+    Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as near to it as
+    groups of 2, 3 and 4 nodes come. The graph that reaches it has cliques of one size only, so
+    this bounds the cliques that tie as well.
+    """
+    if k < 2:
+        return 1
+    last = {0: 3, 1: 4, 2: 2}[k % 3]
+    return int(last * 3 ** ((k - last) // 3))

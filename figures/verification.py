@@ -1,0 +1,98 @@
+"""What trying all cases of a junction showed: how many may go, how often cliques tie, and where
+most of them do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from dim import explain
+from dim.decision import Movements
+from dim.verification import Analysis
+from figures import style
+from minisim.geometry import ARM_NAMES, Floats, Intersection
+
+#: One colour for each clique that ties; with more cliques they come again, dashed.
+CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
+
+
+def verification_figure(analysis: Analysis, intersection: Intersection) -> Figure:
+    """Draw an analysis.
+
+    Args:
+        analysis: of all cases (`dim.verification.analyse`).
+        intersection: whose arms give the nodes their places.
+    """
+    worst = list(analysis.worst.items())
+    figure = style.new_figure(4.2 * (2 + len(worst)), 4.4)
+    panels = figure.subplots(1, 2 + len(worst))
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.77, bottom=0.14, wspace=0.26)
+    false = [claim.name for claim in analysis.claims if not claim.holds]
+    verdict = f"false: {', '.join(false)}" if false else "every claim holds in each of them"
+    figure.text(
+        0.06, 0.93,
+        f"{analysis.n} arms, {analysis.cases} cases, order {analysis.order}: {verdict}",
+        fontsize=12.5, fontweight="bold", color=style.INK, va="center",
+    )  # fmt: skip
+    _draw_counts(panels[0], analysis.sizes, "Who goes", "vehicles with the right of way")
+    _draw_counts(panels[1], analysis.ties, "Ties", "cliques of the largest size")
+    for axes, (size, (movements, count)) in zip(panels[2:], worst, strict=True):
+        _draw_worst(axes, analysis, movements, intersection)
+        vehicles = "1 vehicle" if size == 1 else f"{size} vehicles"
+        axes.set_title(
+            f"Worst case: {analysis.most_tied} cliques of {vehicles}\n"
+            f"{' '.join(map(str, movements))}{'' if count == 1 else f' (one of {count})'}",
+            fontsize=10, color=style.INK, loc="center",
+        )  # fmt: skip
+    return figure
+
+
+def _draw_counts(axes: Axes, counts: Mapping[int, int], title: str, xlabel: str) -> None:
+    bars = axes.bar(list(counts), list(counts.values()), color=style.BLUE, width=0.7, zorder=3)
+    axes.bar_label(bars, fontsize=8.5, color=style.INK, padding=2)
+    axes.set_xticks(list(counts))
+    axes.margins(y=0.12)
+    style.plot_axes(axes, title, xlabel, "cases")
+
+
+def _draw_worst(
+    axes: Axes, analysis: Analysis, movements: Movements, intersection: Intersection
+) -> None:
+    """The harmony graph of a case with every largest clique in a colour of its own; the thick one
+    has the right of way."""
+    explanation = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
+    places = {m: np.array(intersection.arms[m.origin].outward) for m in movements}
+    axes.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
+    axes.set_axis_off()
+    for k, clique in enumerate(explanation.tied):
+        dashes = "-" if k < len(CLIQUES) else (0, (3, 1.5))
+        colour = CLIQUES[k % len(CLIQUES)]
+        goes = clique == explanation.right_of_way
+        for pair in combinations(clique, 2):
+            ends = np.array([places[m] for m in pair])
+            axes.plot(
+                *ends.T, color=colour, linestyle=dashes, linewidth=6.0 if goes else 2.4,
+                zorder=2 if goes else 1, solid_capstyle="round",
+            )  # fmt: skip
+    for movement in movements:
+        goes = movement in explanation.right_of_way
+        _draw_node(
+            axes, places[movement], f"{ARM_NAMES[movement.origin]}{movement.manoeuvre}", goes
+        )
+
+
+def _draw_node(axes: Axes, place: Floats, label: str, goes: bool) -> None:
+    x, y = place
+    axes.add_patch(Circle(
+        (x, y), 0.19, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
+        edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
+    ))  # fmt: skip
+    axes.text(
+        x, y - 0.01, label, ha="center", va="center", fontsize=12, zorder=4,
+        color=style.PAPER if goes else style.WAITING,
+    )  # fmt: skip
