@@ -9,14 +9,14 @@ from numbers import Real
 from baselines.signals import Heads, Phase, Program, stopping_sight
 from baselines.webster import SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, number, numbers
+from minisim.errors import InputError, instance, integer, items, number, numbers
 
 
 @dataclass(frozen=True)
 class FixedTime:
-    """A signal that gives each approach its green in the order a, b, c…, again and again.
+    """A signal that gives each approach its green in turn, again and again.
 
-    The cycle is the sum of all greens, ambers and all-reds and starts with the green of a.
+    The cycle is the sum of all greens, ambers and all-reds and starts with the first one's green.
 
     Attributes:
         greens: of each lane [s]; one number for all lanes; or None for Webster's, from the
@@ -27,6 +27,7 @@ class FixedTime:
         equal_greens: Webster's cycle with equal greens, as in the paper's unbalanced runs.
         max_cycle: at a demand beyond Webster's formula (Y > 0.95) [s].
         all_red: after every amber [s].
+        order: the lanes in the order of their greens; None is a, b, c…
         name: short name.
     """
 
@@ -37,6 +38,7 @@ class FixedTime:
     equal_greens: bool = False
     max_cycle: float = 180.0
     all_red: float = 0.0
+    order: tuple[int, ...] | None = None
     name: str = "fixed-time"
 
     def __post_init__(self) -> None:
@@ -51,13 +53,18 @@ class FixedTime:
         instance("equal_greens", self.equal_greens, bool)
         number("max_cycle [s]", self.max_cycle, above=0, high=3600)
         number("all_red [s]", self.all_red, low=0, high=60)
+        if self.order is not None:
+            lanes = items("order", self.order, "lanes")
+            order = tuple(integer("lane in order", lane, low=0) for lane in lanes)
+            object.__setattr__(self, "order", order)
         instance("name", self.name, str)
 
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
 
         Raises:
-            InputError: as many greens as lanes are needed, or `max_cycle` is too short.
+            InputError: as many greens as lanes are needed, `max_cycle` is too short, or `order`
+                is not all lanes, each once.
         """
         instance("site", site, Site)
         n = site.intersection.n
@@ -76,6 +83,8 @@ class FixedTime:
             greens, capped = (self.greens,) * n, False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
+        if self.order is not None and sorted(self.order) != list(range(n)):
+            raise InputError(f"order must be the lanes 0 … {n - 1}, each once, got {self.order}")
         cycle = self._program(greens).cycle
         return timing_of(greens, cycle, site.demand, self.saturation_flow, capped=capped)
 
@@ -84,10 +93,9 @@ class FixedTime:
         return FixedTimeSession(site, self._program(self.timing(site).greens))
 
     def _program(self, greens: Sequence[float]) -> Program:
+        order = range(len(greens)) if self.order is None else self.order
         return Program(
-            tuple(
-                Phase((lane,), green, self.amber, self.all_red) for lane, green in enumerate(greens)
-            )
+            tuple(Phase((lane,), greens[lane], self.amber, self.all_red) for lane in order)
         )
 
 

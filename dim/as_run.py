@@ -74,17 +74,23 @@ class AsRunDim:
     Attributes:
         order: "lanes" as in every published run, or "size" as the paper describes.
         matrix: harmony of the movements; None is the paper's table.
+        names: what the authors called the arms, clockwise from north. Names decide who is first;
+            in the runs at 4:1:4:1 they were "acbd" instead of in alphabetical order.
 
     Raises:
-        InputError: an unknown order.
+        InputError: an unknown order, or names that do not tell the arms apart.
     """
 
     order: str = "lanes"
     matrix: HarmonyMatrix | None = None
+    names: str = "abcde"
 
     def __post_init__(self) -> None:
         choice("order", self.order, ORDERS)
         instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
+        instance("names", self.names, str)
+        if len(set(self.names)) != len(self.names):
+            raise InputError(f"names must be different letters, got {self.names!r}")
 
     @property
     def name(self) -> str:
@@ -99,7 +105,9 @@ class AsRunDim:
         matrix = HarmonyMatrix.paper(n) if self.matrix is None else self.matrix
         if matrix.n != n:
             raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
-        return AsRunSession(site, matrix, self.order)
+        if len(self.names) < n:
+            raise InputError(f"names must be {n} letters, one an arm, got {self.names!r}")
+        return AsRunSession(site, matrix, self.order, self.names)
 
 
 @dataclass(frozen=True)
@@ -128,7 +136,7 @@ class AsRunRules:
         chosen: ids of those with the right of way.
     """
 
-    def __init__(self, arms: int, matrix: HarmonyMatrix, order: str) -> None:
+    def __init__(self, arms: int, matrix: HarmonyMatrix, order: str, names: str = "abcde") -> None:
         self.arms = arms
         self.bound = BOUND[arms]
         self.red_start = self.bound - YELLOW - RED[arms]
@@ -136,6 +144,7 @@ class AsRunRules:
         self.green_start = self.bound - GREEN
         self.matrix = matrix
         self.order = order
+        self.names = names
         self.serving: list[int] = []
         self.action: list[int] = []
         self.chosen: tuple[int, ...] = ()
@@ -198,24 +207,29 @@ class AsRunRules:
     def _decide(self, cars: Mapping[int, Car]) -> tuple[int, ...]:
         """The ids of the winning clique; of one movement only the last entry counts."""
         holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
-        clique = winner(self.matrix, frozenset(holder), self.order)
+        clique = winner(self.matrix, frozenset(holder), self.order, self.names)
         return tuple(holder[movement] for movement in clique)
 
 
 @lru_cache(maxsize=100_000)
 def winner(
-    matrix: HarmonyMatrix, movements: frozenset[Movement], order: str
+    matrix: HarmonyMatrix, movements: frozenset[Movement], order: str, names: str = "abcde"
 ) -> tuple[Movement, ...]:
-    """The maximal clique that wins, sorted; two movements of one lane are never in harmony."""
+    """The maximal clique that wins, sorted by name; no two movements of a lane are in harmony."""
     graph: nx.Graph[Movement] = nx.Graph()
     graph.add_nodes_from(movements)
     graph.add_edges_from(
         (a, b) for a in movements for b in movements if a < b and matrix.harmony(a, b)
     )
-    cliques = [tuple(sorted(clique)) for clique in nx.find_cliques(graph)]
-    if order == "size":
-        return min(cliques, key=lambda clique: (-len(clique), clique), default=())
-    return min(cliques, default=())
+
+    def named(movement: Movement) -> tuple[str, int]:
+        return names[movement.origin], movement.manoeuvre
+
+    def rank(clique: tuple[Movement, ...]) -> tuple[int, list[tuple[str, int]]]:
+        return -len(clique) if order == "size" else 0, [named(movement) for movement in clique]
+
+    cliques = [tuple(sorted(clique, key=named)) for clique in nx.find_cliques(graph)]
+    return min(cliques, key=rank, default=())
 
 
 class AsRunSession:
@@ -226,9 +240,9 @@ class AsRunSession:
         plan: what the host has to provide: a wake-up wherever a zone begins or ends.
     """
 
-    def __init__(self, site: Site, matrix: HarmonyMatrix, order: str) -> None:
+    def __init__(self, site: Site, matrix: HarmonyMatrix, order: str, names: str = "abcde") -> None:
         instance("site", site, Site)
-        self.rules = AsRunRules(site.intersection.n, matrix, order)
+        self.rules = AsRunRules(site.intersection.n, matrix, order, names)
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
         rules = self.rules
         edges = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound, FREED, CLEAR)
@@ -272,7 +286,7 @@ class AsRunSession:
 
     def _car(self, vehicle: Observed) -> Car:
         second = int(vehicle.demand_time + ROUNDING)
-        lane = "abcde"[vehicle.lane]
+        lane = self.rules.names[vehicle.lane]
         return Car(
             id=vehicle.id,
             name=f"v{second}.{lane}_{vehicle.manoeuvre}",

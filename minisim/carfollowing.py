@@ -1,7 +1,8 @@
 """Car-following laws as pure functions of plain floats, compiled where numba is installed.
 
-All in SI units. Positions and speeds advance by the ballistic rule (`ballistic`), so an
-acceleration here is what a vehicle keeps for one step.
+All in SI units. Under the IDM positions and speeds advance by the ballistic rule (`ballistic`), so
+an acceleration here is what a vehicle keeps for one step. Krauß's law speaks of the next speed
+instead, and a vehicle drives the whole step at it (`semi_implicit`), as in SUMO by default.
 """
 
 from __future__ import annotations
@@ -9,6 +10,10 @@ from __future__ import annotations
 import math
 
 from minisim.jit import njit, njit_inline
+
+#: Whoever has less than this to go has arrived [m]: an approach that slows down with the distance
+#: would never end (SUMO's `NUMERICAL_EPS`, in the same place).
+STILL = 1e-3
 
 
 @njit_inline
@@ -68,6 +73,66 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
     if acc_free <= 0.0:  # v = v0: the exponent 2a/a_free is infinite and its term vanishes
         return acc_free
     return acc_free * float(1.0 - z ** (2.0 * a / acc_free))
+
+
+@njit
+def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float) -> float:
+    """Krauß's safe speed: the highest that a leader which brakes at b cannot turn into a collision.
+
+    Driven for `headway`, then braked by b·dt a step, it uses up `gap` and the leader's braking
+    distance; so the gap of equilibrium is v·headway, whatever the step. Where dt → 0 this is
+    Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
+    Source: Krauß 1998, Microscopic Modeling of Traffic Flow, §3.1 (eq. 3.7, leader and follower
+    alike); in whole steps of braking as SUMO's `MSCFModel::maximumSafeFollowSpeed` without the
+    ballistic rule. `gap` is measured beyond the gap at standstill, as there.
+    """
+    room = gap - STILL
+    if room < 0.0:
+        return 0.0
+    room += braking_distance(v_leader, b, dt)
+    pace = headway / dt - 0.5
+    unit = b * dt * dt
+    steps = math.floor(math.sqrt(pace * pace + 2.0 * room / unit) - pace)
+    rest = room - unit * steps * (pace + 0.5 * steps)
+    return steps * b * dt + rest / (headway + steps * dt)
+
+
+@njit
+def braking_distance(v: float, b: float, dt: float) -> float:
+    """Distance to standstill when each step, this one included, is driven b·dt slower [m].
+
+    Source: SUMO's `MSCFModel::brakeGap` without the ballistic rule.
+    """
+    steps = math.floor(v / (b * dt))
+    return dt * steps * (v - 0.5 * b * dt * (steps + 1.0))
+
+
+@njit
+def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> float:
+    """`speed_towards` for `semi_implicit`: the highest next speed that still allows `v_target`.
+
+    It is driven for a step, then braked by b·dt a step, until at `v_target`: all of that takes
+    `distance`. Source: SUMO's `MSCFModel::freeSpeed`, and `stopSpeed` for v_target = 0.
+    """
+    if distance <= v_target * dt:
+        return v_target
+    pace = 0.5 + v_target / (b * dt)
+    unit = b * dt * dt
+    room = distance - v_target * dt
+    steps = math.floor(math.sqrt(pace * pace + 2.0 * room / unit) - pace)
+    rest = room - unit * steps * (pace + 0.5 * steps)
+    return v_target + steps * b * dt + rest / ((steps + 1.0) * dt)
+
+
+@njit
+def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) -> float:
+    """Next speed: as fast as wanted, as the engine can, and as safe [m/s].
+
+    Above the desired speed (a limit that begins late) it brakes at b at most.
+    Source: Krauß 1998, §3.1, without the random part (SUMO's sigma = 0).
+    """
+    wanted = max(v0, v - b * dt)
+    return min(v + a * dt, wanted, v_safe)
 
 
 @njit_inline

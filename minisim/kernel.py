@@ -10,17 +10,34 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import (
+    STILL,
     ballistic,
+    braking_distance,
     gap_ratio,
     idm,
     iidm,
     insertion_speed,
+    krauss,
+    safe_speed,
     semi_implicit,
     speed_towards,
+    stepwise_towards,
 )
 from minisim.engine import accelerate_engines
 from minisim.jit import njit, njit_inline
-from minisim.state import ARRIVED, DRIVING, STOP_MARGIN, Engine, Floats, Law, Records, Road
+from minisim.state import (
+    ARRIVED,
+    CC,
+    DRIVING,
+    IIDM,
+    KRAUSS,
+    STOP_MARGIN,
+    Engine,
+    Floats,
+    Law,
+    Records,
+    Road,
+)
 
 #: Reasons to return, as bits.
 MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
@@ -80,7 +97,7 @@ def step(
 ) -> int:
     """One step, from `tick` to the next; the reasons to return."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, engine, tick):
+    if insert(vehicles, lanes, road, law, tick):
         reasons |= MARK
     if engine is None:
         overlap = accelerate(vehicles, lanes, road, law)
@@ -96,9 +113,7 @@ def step(
 
 
 @njit
-def insert(
-    vehicles: Records, lanes: Records, road: Road, law: Law, engine: Engine | None, tick: int
-) -> bool:
+def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
     """Insert on each lane the next vehicle that is due, if the gap allows; FIFO, none dropped.
 
     No faster than the vehicle ahead allows, nor comfortable braking the lower limits ahead and,
@@ -124,13 +139,7 @@ def insert(
             v = min(v, math.sqrt(2.0 * law.b * max(law.hold - STOP_MARGIN - s, 0.0)))
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
-            rear = vehicles[j]["s"] - law.length
-            if engine is None:
-                safe = insertion_speed(
-                    rear - s, vehicles[j]["v"], law.a, law.b, law.headway, law.min_gap
-                )
-            else:  # SUMO's rule for its CC model: any speed will do
-                safe = math.inf if rear - s >= law.min_gap else -1.0
+            safe = insertable(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
             if safe < 0.0:
                 continue
             v = min(v, safe)
@@ -148,6 +157,21 @@ def insert(
             vehicles[i]["mark"] += 1
             passed = True
     return passed
+
+
+@njit
+def insertable(gap: float, v_leader: float, law: Law) -> float:
+    """Highest speed at which the law of this run inserts a vehicle; negative when there is none.
+
+    Source: SUMO's `insertionFollowSpeed` of each model. Its CC model takes any speed.
+    """
+    if law.model == KRAUSS or law.model == CC:
+        if gap < law.min_gap:
+            return -1.0
+        if law.model == CC:
+            return math.inf
+        return safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+    return insertion_speed(gap, v_leader, law.a, law.b, law.headway, law.min_gap)
 
 
 @njit
@@ -214,7 +238,14 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """Desired over actual gap of the law of this run."""
+    """How much a vehicle ahead counts for the law of this run: 0 not at all, infinite stops.
+
+    The desired over the actual gap of the IDM, the inverse of Krauß's safe speed. Of several
+    vehicles ahead the one that counts most decides.
+    """
+    if law.model == KRAUSS:
+        v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+        return 1.0 / v_safe if v_safe > 0.0 else math.inf
     return gap_ratio(v, gap, v_leader, law.a, law.b, law.headway, law.min_gap)
 
 
@@ -224,11 +255,14 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
 
     A desired speed of 0 is its limit from above: comfortable braking, and the leader's share on it.
     """
+    if law.model == KRAUSS:
+        v_safe = 1.0 / z if z > 0.0 else math.inf
+        return (krauss(v, v0, v_safe, law.a, law.b, law.dt) - v) / law.dt
     if v0 <= 0.0:
-        if law.improved:
+        if law.model == IIDM:
             return -law.b + min(law.a * (1.0 - z * z), 0.0)
         return -law.b - law.a * z * z
-    if law.improved:
+    if law.model == IIDM:
         return iidm(v, v0, z, law.a, law.b, law.delta)
     return idm(v, v0, z, law.a, law.b, law.delta)
 
@@ -244,7 +278,10 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
     """Bound on the acceleration that meets a lower limit ahead by comfortable braking."""
     if v + acc * law.dt <= target:
         return acc
-    v_new = max(speed_towards(v, target, distance, law.b, law.dt), target)
+    if law.semi_implicit:
+        v_new = stepwise_towards(target, distance, law.b, law.dt)
+    else:
+        v_new = max(speed_towards(v, target, distance, law.b, law.dt), target)
     return max((v_new - v) / law.dt, -law.b)
 
 
@@ -256,6 +293,8 @@ def hold(v: float, s: float, law: Law) -> float:
     that no longer reaches the line, stop before the junction, braking as hard as that needs.
     """
     to_line = law.hold - s
+    if law.semi_implicit:
+        return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
     distance = to_line - STOP_MARGIN
     if v * v <= 2.0 * law.b * distance:
         if v == 0.0 and distance < 1e-3:
@@ -266,6 +305,19 @@ def hold(v: float, s: float, law: Law) -> float:
         return -law.b
     to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
     return -max(law.b, v * v / (2.0 * to_junction))
+
+
+@njit
+def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float) -> float:
+    """`hold` for `semi_implicit`, apart from it to keep the inner loop of the others short."""
+    needed = braking_distance(v, b, dt)
+    distance = to_line - STOP_MARGIN
+    if needed <= distance:
+        v_new = stepwise_towards(0.0, distance, b, dt) if distance >= STILL else 0.0
+        return (v_new - v) / dt
+    if needed <= to_line:
+        return -b
+    return -max(b, v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6)))
 
 
 @njit
@@ -295,10 +347,10 @@ def move(
                 continue
             p = vehicles[i]["path"]
             before, acc = vehicles[i]["s"], vehicles[i]["a"]
-            if engine is None:
-                s, v = ballistic(before, vehicles[i]["v"], acc, law.dt)
-            else:
+            if law.semi_implicit:
                 s, v = semi_implicit(before, vehicles[i]["v"], acc, law.dt)
+            else:
+                s, v = ballistic(before, vehicles[i]["v"], acc, law.dt)
             vehicles[i]["s"] = s
             vehicles[i]["v"] = v
             if v <= WAITING_SPEED:

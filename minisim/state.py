@@ -19,7 +19,7 @@ from minisim.crossings import meetings, sagittas
 from minisim.errors import InputError
 from minisim.geometry import Path
 from minisim.streams import stream
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import MODELS, EngineVehicle, VehicleType
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -28,6 +28,9 @@ Records = npt.NDArray[np.void]
 #: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
 #: is allowed, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
 STOP_MARGIN = 0.25
+
+#: Values of `Law.model`.
+IDM, IIDM, KRAUSS, CC = range(len(MODELS))
 
 #: Values of the field `status`.
 WAITING, DRIVING, ARRIVED = 0, 1, 2
@@ -151,7 +154,8 @@ class Law(NamedTuple):
     headway: float
     min_gap: float
     delta: float
-    improved: bool
+    model: int  # car-following law, `IDM` and its siblings
+    semi_implicit: bool  # how positions follow from speeds: by `semi_implicit`, or ballistic
     length: float
     width: float
     entry: float  # s of the junction entry
@@ -235,13 +239,14 @@ def build_law(
         headway=vehicle.headway,
         min_gap=vehicle.min_gap,
         delta=vehicle.exponent,
-        improved=vehicle.model == "iidm",
+        model=MODELS.index(vehicle.model),
+        semi_implicit=vehicle.model in ("krauss", "cc"),
         length=vehicle.length,
         width=vehicle.width,
         entry=entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        slack=POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0,
+        slack=insertion_slack(vehicle),
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -277,6 +282,12 @@ def build_engine(site: Site) -> Engine | None:
 #: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
 #: and counts it as arrived this far before the end of the road.
 POSITION_EPS = 0.1
+
+
+def insertion_slack(vehicle: VehicleType) -> float:
+    """How far past its length a vehicle is inserted, and how far before the road's end it ends."""
+    return POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0
+
 
 #: Reach of a recording of the junction alone, before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from minisim.errors import InputError, choice, number
 
-MODELS = ("idm", "iidm", "cc")
+#: Car-following laws; their order is that of `minisim.state.IDM` and its siblings.
+MODELS = ("idm", "iidm", "krauss", "cc")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,19 +22,20 @@ class VehicleType:
     Attributes:
         length: bumper to bumper [m].
         width: [m].
-        acceleration: the IDM's a [m/s²].
-        deceleration: comfortable braking, the IDM's b [m/s²].
+        acceleration: the IDM's a, Krauß's acceleration [m/s²].
+        deceleration: comfortable braking, the IDM's b [m/s²]. Krauß's law brakes at b whenever
+            it brakes for something foreseen, and takes it that leaders do.
         headway: time headway T [s]; at least 0.5, the longest step there is: below it the law
             cannot react in time (Treiber, Kanagaraj 2015 on dt and T).
         min_gap: bumper gap at standstill s0 [m]; at least 0.5.
-        exponent: free-road exponent δ.
+        exponent: free-road exponent δ; Krauß's law has none.
         max_deceleration: what the brakes can do at most [m/s²]; at least `needed_braking`. Even
             so weak brakes at high speed can be too weak for a leader that stops: the law then
             collides, and the run reports it.
         speed_deviation: standard deviation of each driver's factor on the speed limit (mean 1,
             cut to 0.2 … 2 as SUMO's speedFactor); 0 makes all drivers alike.
-        model: "idm", or "iidm" (improved IDM: keeps the gap s0 + vT up to the desired speed);
-            "cc" is an `EngineVehicle`.
+        model: "idm", "iidm" (improved IDM: keeps the gap s0 + vT up to the desired speed) or
+            "krauss" (SUMO's default law, without its random part); "cc" is an `EngineVehicle`.
     """
 
     length: float = 5.0
@@ -51,7 +53,7 @@ class VehicleType:
         number("vehicle length [m]", self.length, low=0.5, high=30)
         number("vehicle width [m]", self.width, low=0.3, high=4)
         number("acceleration [m/s²]", self.acceleration, above=0, high=100)
-        number("deceleration [m/s²]", self.deceleration, above=0, high=100)
+        number("deceleration [m/s²]", self.deceleration, above=0, high=1000)
         number("headway [s]", self.headway, low=0.5, high=10)
         number("min_gap [m]", self.min_gap, low=0.5, high=20)
         number("exponent", self.exponent, low=1, high=50)
@@ -72,9 +74,12 @@ class VehicleType:
         """What the law asks of the brakes in front of a standing obstacle, and a quarter more.
 
         The IDM brakes at k²/b where k = v²/2s is just enough, and its free-road term takes up to
-        a away again: k²/b − a = k at k = (b + √(b² + 4ab))/2 [m/s²].
+        a away again: k²/b − a = k at k = (b + √(b² + 4ab))/2 [m/s²]. Krauß's law brakes at b and
+        not harder: its safe speed leaves room for that, so that is all it needs.
         """
         a, b = self.acceleration, self.deceleration
+        if self.model == "krauss":
+            return b
         return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
 
 

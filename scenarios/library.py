@@ -16,7 +16,7 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, instance, integer, numbers, show
 from minisim.geometry import Intersection, Way
 from scenarios.published import PUBLISHED_ARMS, published_ways
-from scenarios.scenario import AS_RUN, Profile, Scenario, profile_named
+from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_named
 
 Side = Literal["left", "right"]
 
@@ -127,7 +127,8 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
 
 def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scenario:
     bearings = [360.0 * i / n for i in range(n)]
-    if profile_named(options.get("profile", "paper")) == AS_RUN and _is_published(n, options):
+    profile = profile_named(options.get("profile", "paper"))
+    if profile in PUBLISHED_PROFILES and _is_published(n, options):
         options = {"ways": published_ways(n), **options}
     return from_bearings(bearings, density, **{"name": name, **options})
 

@@ -9,15 +9,19 @@ import csv
 from functools import lru_cache
 from importlib import resources
 
+import numpy as np
+
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
-from minisim.geometry import Way
+from minisim.geometry import ARM_NAMES, Way
+
+#: From 10 August 2023 on, when the runs at 4:1:4:1 were made, the authors' networks call the arms,
+#: clockwise from north, by these letters (`my_network.net.xml` of that time: b+ comes from the
+#: south, c+ from the east).
+RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
 #: Arm counts of the published junctions.
 PUBLISHED_ARMS = (3, 4, 5)
-
-#: Controllers whose published arrivals are here.
-REPLAYED = ("dim", "v2ic")
 
 
 @lru_cache
@@ -40,13 +44,13 @@ def _way(row: dict[str, str]) -> Way:
 
 
 def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
-    """The arrivals of a published run of DIM or, on 4 arms, V2I-C.
+    """The arrivals of a published run, by the arms of our junctions (clockwise from north).
 
     Args:
         split: "balanced", "4:3:2:1" or "4:1:4:1".
         density: mean inflow a lane [veh/h].
         arms: of the junction.
-        controller: "dim" or "v2ic".
+        controller: "dim", "fts", "ats" or "v2ic".
 
     Raises:
         InputError: no such run was published.
@@ -54,7 +58,11 @@ def published_arrivals(split: str, density: int, arms: int, controller: str = "d
     folder = resources.files("scenarios") / "data" / "arrivals"
     names = sorted(f.name for f in folder.iterdir() if f.name.endswith(".csv"))
     wanted = f"{split.replace(':', '')}_{density}_{controller}_{arms}way.csv"
-    kind = {"dim": "DIM", "v2ic": "V2I-C"}[choice("replayed controller", controller, REPLAYED)]
-    choice(f"published {kind} run", wanted, [name for name in names if f"_{controller}_" in name])
+    choice("published run", wanted, names)
     with resources.as_file(folder / wanted) as path:
-        return read_arrivals(path, arms)
+        arrivals = read_arrivals(path, arms)
+    if split != RENAMED:
+        return arrivals
+    lane = np.array([ARM_NAMES.index(letter) for letter in RENAMED_ARMS]).argsort()[arrivals.lane]
+    order = np.lexsort((arrivals.manoeuvre, lane, arrivals.time))
+    return Arrivals(arrivals.time[order], lane[order], arrivals.manoeuvre[order])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,14 +11,15 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.control import Site
 from minisim.errors import SumoError
-from minisim.geometry import ARM_NAMES, Floats
-from minisim.state import Records
+from minisim.geometry import ARM_NAMES
+from minisim.state import Records, insertion_slack
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
 from minisim.trips import Trips
+from minisim.vehicle import EngineVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
-TRIPS, LOG = "tripinfo.xml", "sumo.log"
+TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
 
 
 def write_routes(
@@ -29,24 +29,39 @@ def write_routes(
     write_xml(folder / ROUTES, "routes", _routes(site, vehicles, model, depart_speed))
 
 
-def write_configuration(folder: Path, dt: float, seed: int) -> None:
+def write_configuration(folder: Path, job: Job, seed: int, fcd: bool) -> None:
     """Write SUMO's options; `sumo -c` shows the scenario without its controller."""
-    write_xml(folder / CONFIGURATION, "configuration", _options(dt, seed))
+    write_xml(folder / CONFIGURATION, "configuration", _options(job, seed, fcd))
+
+
+def top_speed(site: Site) -> float:
+    """No vehicle is faster [m/s]: the fastest driver's, or the cruise speed."""
+    cruise = site.vehicle.cruise_speed if isinstance(site.vehicle, EngineVehicle) else 0.0
+    return max(2.0 * site.speed_limit, cruise)
+
+
+def _vehicle_type(site: Site, model: str) -> dict[str, object]:
+    kind = site.vehicle
+    common: dict[str, object] = {
+        "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
+        "minGap": kind.min_gap, "emergencyDecel": kind.max_deceleration,
+        "maxSpeed": top_speed(site), "speedFactor": 1, "speedDev": 0,
+    }  # fmt: skip
+    if isinstance(kind, EngineVehicle):
+        return common | {
+            "accel": kind.engine_acceleration, "decel": kind.max_deceleration,
+            "ccAccel": kind.cruise_acceleration, "ccDecel": kind.cruise_deceleration,
+            "kp": kind.cruise_gain, "lambda": kind.spacing_gain, "tauEngine": kind.lag,
+            "lanesCount": 1,
+        }  # fmt: skip
+    own = {"delta": kind.exponent} if model == "IDM" else {"sigma": 0}
+    return common | {
+        "accel": kind.acceleration, "decel": kind.deceleration, "tau": kind.headway, **own,
+    }  # fmt: skip
 
 
 def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | None) -> Iterator[str]:
-    kind = site.vehicle
-    yield tag(
-        "vType",
-        {
-            "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
-            "minGap": kind.min_gap, "accel": kind.acceleration, "decel": kind.deceleration,
-            "emergencyDecel": kind.max_deceleration, "tau": kind.headway,
-            "maxSpeed": 2.0 * site.speed_limit,  # the fastest driver's
-            "speedFactor": 1, "speedDev": 0,
-            **({"delta": kind.exponent} if model == "IDM" else {"sigma": 0}),
-        },
-    )  # fmt: skip
+    yield tag("vType", _vehicle_type(site, model))
     for path in site.intersection.paths:
         edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
         yield tag("route", {"id": path.movement, "edges": edges})
@@ -59,14 +74,14 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
                 "type": "car",
                 "route": movements[vehicles["path"][i]],
                 "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": kind.length,
+                "departPos": site.vehicle.length + insertion_slack(site.vehicle),
                 "departSpeed": "max" if depart_speed is None else depart_speed,
                 "speedFactor": f"{vehicles['factor'][i]:.9f}",
             },
         )
 
 
-def _options(dt: float, seed: int) -> Iterator[str]:
+def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
     options = {
         "net-file": NETWORK,
         "route-files": ROUTES,
@@ -76,24 +91,30 @@ def _options(dt: float, seed: int) -> Iterator[str]:
         "precision": 6,
         "log": LOG,
         "begin": 0,
-        "step-length": dt,
-        "step-method.ballistic": "true",
+        "route-steps": 0,  # all vehicles are known before the first step
+        "step-length": job.law.dt,
+        "step-method.ballistic": str(not job.law.semi_implicit).lower(),
         "seed": seed % 2**31,
-        # Nobody is taken off the road, for waiting or for a collision; "none" would look for none.
-        "time-to-teleport": -1,
-        "collision.action": "warn",
-        "collision.check-junctions": "true",
-        "collision.mingap-factor": 0,
         "no-step-log": "true",
         "duration-log.disable": "true",
     }
+    if not job.teleport:
+        # Nobody is taken off the road, for waiting or for a collision; "none" would look for none.
+        options |= {
+            "time-to-teleport": -1,
+            "collision.action": "warn",
+            "collision.check-junctions": "true",
+            "collision.mingap-factor": 0,
+        }
+    if fcd:
+        options |= {"fcd-output": FCD}
     return (tag(name, {"value": value}) for name, value in options.items())
 
 
 def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
     """SUMO's trips of a run that has reached `end` [s], in demand order.
 
-    Only the time loss is ours (`_time_loss`). Since version 1.28 SUMO's own leaves out what a
+    Only the time loss is ours (`Ended.time_loss`). Since version 1.28 SUMO's own leaves out what a
     vehicle loses while it accelerates for a higher limit, and it knows no markings.
 
     Raises:
@@ -123,7 +144,7 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
         exit_lane=(arrivals.lane + arrivals.manoeuvre) % job.lanes,
         waiting_time=np.where(departed, waiting, 0.0),
         travel_time=travel,
-        time_loss=np.where(departed, _time_loss(travel, job, ended), 0.0),
+        time_loss=np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float),
         depart_delay=np.maximum(np.where(departed, depart, end) - arrivals.time, 0.0),
         departed=departed,
         arrived=arrived,
@@ -131,19 +152,3 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
 
 
 _ATTRIBUTES = ("depart", "arrival", "waitingTime")
-
-
-def _time_loss(travel: Floats, job: Job, ended: Ended) -> Floats:
-    """Travel time less what the same way takes at its limits [s], in demand order.
-
-    The integral of 1 − v/v_allowed, as minisim sums it up step by step; an arrival is known to a
-    step.
-    """
-    loss = np.zeros(len(travel))
-    for row in job.vehicles:
-        i, p = int(row["id"]), int(row["path"])
-        start = np.maximum(job.road.section_start[p], job.law.length)
-        start = np.minimum(start, ended.positions.get(i, job.road.ends[p, 1]))
-        ideal = np.diff(start) / job.road.section_speed[p, :-1] / row["factor"]
-        loss[i] = max(travel[i] - math.fsum(ideal.tolist()), 0.0)
-    return loss

@@ -6,6 +6,7 @@ import importlib.util
 import math
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -36,20 +37,33 @@ from minisim.hosting import (
     checked_window,
     collision_error,
 )
+from minisim.recording import replacing
 from minisim.run import Run, ScenarioLike
-from minisim.state import build_law, build_road, build_vehicles, first_tick
+from minisim.state import build_engine, build_law, build_road, build_vehicles, first_tick
 from minisim.sumo.files import (
     CONFIGURATION,
+    FCD,
     TRIPS,
     read_trips,
+    top_speed,
     write_configuration,
     write_routes,
 )
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
+from minisim.vehicle import EngineVehicle, VehicleType
 
-#: SUMO's car-following models that a run may use.
-MODELS = ("IDM", "Krauss")
+#: SUMO's car-following models that a run may use, and the vehicles' models that go with each.
+MODELS = {"IDM": ("idm",), "Krauss": ("idm", "iidm", "krauss"), "CC": ("cc",)}
+
+#: The one that a run uses unless told otherwise, by the vehicles' model. There is none for "iidm".
+OWN_MODELS = {"idm": "IDM", "iidm": "IDM", "krauss": "Krauss", "cc": "CC"}
+
+#: What may happen at a collision.
+REACTIONS = (*ON_COLLISION, "teleport")
+
+#: Spacing and radar of SUMO's CC, numbers in its code (`MSCFModel_CC`) [m].
+CC_FIXED = (2.0, 250.0)
 
 #: What the child writes on stderr.
 STDERR = "stderr.txt"
@@ -68,11 +82,12 @@ def simulate(
     controller: Controller,
     seed: int = 0,
     *,
-    model: str = "IDM",
+    model: str | None = None,
     record: str | None = None,
     record_window: tuple[float, float] = (0.0, math.inf),
     on_collision: str = "stop",
     keep_files: str | os.PathLike[str] | None = None,
+    fcd: str | os.PathLike[str] | None = None,
     gui: bool = False,
     progress: Progress | None = None,
 ) -> Run:
@@ -85,13 +100,18 @@ def simulate(
         scenario: what to simulate.
         controller: who decides; its session runs here, in the caller's process.
         seed: of the arrivals and of SUMO.
-        model: SUMO's car-following model, "IDM" or "Krauss" (without its random part).
+        model: SUMO's car-following model: "IDM", "Krauss" (without its random part), or "CC" for
+            an `EngineVehicle`. By default the vehicle's own (`OWN_MODELS`).
         record: None, "junction" or "all": keep trajectories. Their x and y are positions on
             minisim's paths, which SUMO's network repeats.
         record_window: from and to [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
+            "teleport" is what SUMO does by default, and did in the published runs: whoever runs
+            into a vehicle ahead, or waits for 300 s, is put on the next road, or has arrived where
+            there is none; touching inside the junction does not count.
         keep_files: folder for the network, the routes, the configuration, SUMO's log and its
             trips; by default they are temporary.
+        fcd: file for the floating-car data of every step that SUMO itself writes.
         gui: show it in sumo-gui.
         progress: called at every wake-up, with the steps done and the steps up to the horizon.
 
@@ -106,7 +126,7 @@ def simulate(
         _Request(
             scenario=scenario, controller=controller, seed=seed, model=model, record=record,
             record_window=record_window, on_collision=on_collision, keep_files=keep_files,
-            gui=gui, progress=progress,
+            fcd=fcd, gui=gui, progress=progress,
         )
     )  # fmt: skip
 
@@ -118,11 +138,12 @@ class _Request:
     scenario: ScenarioLike
     controller: Controller
     seed: int
-    model: str
+    model: str | None
     record: str | None
     record_window: tuple[float, float]
     on_collision: str
     keep_files: str | os.PathLike[str] | None
+    fcd: str | os.PathLike[str] | None
     gui: bool
     progress: Progress | None
     until: float = math.inf
@@ -131,7 +152,7 @@ class _Request:
         """Run again up to a little after `time`; records the last `seconds` before it."""
         again = replace(
             self, record="all", record_window=(max(0.0, time - seconds), math.inf),
-            on_collision="record", keep_files=None, gui=False, progress=None,
+            on_collision="record", keep_files=None, fcd=None, gui=False, progress=None,
             until=time + AFTERMATH,
         )  # fmt: skip
         return _run(again)
@@ -139,10 +160,11 @@ class _Request:
 
 def _run(request: _Request) -> Run:
     home = sumo_home()
-    choice("SUMO model", request.model, MODELS)
+    if request.model is not None:
+        choice("SUMO model", request.model, MODELS)
     if request.record is not None:
         choice("record", request.record, RECORDS)
-    choice("on_collision", request.on_collision, ON_COLLISION)
+    choice("on_collision", request.on_collision, REACTIONS)
     if request.gui:
         _check_display()
     beginning = begin(request.scenario, request.controller, request.seed)
@@ -156,6 +178,9 @@ def _run(request: _Request) -> Run:
             )  # fmt: skip
         end = (job.horizon if ended.done else ended.tick) * job.law.dt
         columns = read_trips(folder, beginning.arrivals, job, ended, end)
+        if request.fcd is not None:
+            with replacing(request.fcd) as target:
+                shutil.copyfile(folder / FCD, target)
     return Run(
         scenario=request.scenario,
         controller=request.controller,
@@ -167,7 +192,7 @@ def _run(request: _Request) -> Run:
         record=request.record,
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
-        host={"host": "sumo", "sumo": version, "sumo_model": request.model},
+        host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 
 
@@ -215,11 +240,7 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
     site, arrivals, _, plan = beginning
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
-    if request.model == "IDM" and site.vehicle.model != "idm":
-        raise InputError(
-            f"SUMO has no car-following model {site.vehicle.model!r}: give the vehicles the "
-            "model 'idm', or choose SUMO's Krauss"
-        )
+    model = _model(request.model, site.vehicle)
     depart_speed = request.scenario.depart_speed
     law = build_law(
         site,
@@ -230,22 +251,44 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
     )
     vehicles = build_vehicles(site, arrivals)
     network = build_network(site.intersection, site.speed_limit, folder, home)
-    write_routes(folder, site, vehicles, request.model, depart_speed)
-    write_configuration(folder, site.dt, int(request.seed))
-    return Job(
+    write_routes(folder, site, vehicles, model, depart_speed)
+    job = Job(
         command=_command(request.gui),
         folder=str(folder),
-        model=request.model,
+        model=model,
         plan=plan,
         road=build_road(site, plan),
         law=law,
+        engine=build_engine(site),
+        top_speed=top_speed(site),
         network=network,
         vehicles=vehicles,
         lanes=site.intersection.n,
         movements=site.intersection.movements,
         horizon=first_tick(min(request.scenario.horizon, request.until), site.dt),
         stop_on_collision=request.on_collision == "stop",
+        teleport=request.on_collision == "teleport",
     )
+    write_configuration(folder, job, int(request.seed), request.fcd is not None)
+    return job
+
+
+def _model(asked: str | None, vehicle: VehicleType) -> str:
+    """SUMO's model for the vehicles; raises `InputError` where it does not fit them."""
+    model = asked or OWN_MODELS[vehicle.model]
+    if vehicle.model not in MODELS[model]:
+        fitting = [name for name, models in MODELS.items() if vehicle.model in models]
+        raise InputError(
+            f"SUMO's model {model} does not drive vehicles of the model {vehicle.model!r}; "
+            f"choose {' or '.join(fitting)}, or another vehicle"
+        )
+    if isinstance(vehicle, EngineVehicle) and (vehicle.spacing, vehicle.radar) != CC_FIXED:
+        spacing, radar = CC_FIXED
+        raise InputError(
+            f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
+            f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
+        )
+    return model
 
 
 def _command(gui: bool) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from minisim.collision import Collision
 from minisim.control import Observed, Plan
 from minisim.geometry import Movement
-from minisim.state import Law, Records, Road
+from minisim.state import Engine, Law, Records, Road
 from minisim.sumo.network import Network
 
 
@@ -17,15 +17,18 @@ class Job(NamedTuple):
     Attributes:
         command: that starts SUMO.
         folder: to start it in.
-        model: car-following model, "IDM" or "Krauss".
+        model: car-following model, one of `minisim.sumo.MODELS`.
         plan: of the session.
         road, law: of the run, with its limits, marks and lines.
+        engine: of the vehicles, where they have one (model "CC").
+        top_speed: no vehicle is faster [m/s].
         network: lengths in SUMO.
         vehicles: as `minisim.state.build_vehicles` has them.
         lanes: how many.
-        names: of the movements.
+        movements: of the intersection.
         horizon: tick at which to stop.
         stop_on_collision: whether the first collision ends the run.
+        teleport: whether SUMO takes vehicles off the road, as it does by default.
     """
 
     command: tuple[str, ...]
@@ -34,12 +37,15 @@ class Job(NamedTuple):
     plan: Plan
     road: Road
     law: Law
+    engine: Engine | None
+    top_speed: float
     network: Network
     vehicles: Records
     lanes: int
     movements: tuple[Movement, ...]
     horizon: int
     stop_on_collision: bool
+    teleport: bool
 
 
 class Started(NamedTuple):
@@ -62,14 +68,14 @@ class Ended(NamedTuple):
         tick: reached.
         done: whether everybody has arrived.
         collisions: each pair of vehicles once.
-        positions: `s` of the vehicles still on the road [m], by id.
+        time_loss: of every vehicle [s], by id.
         trace: what was recorded.
     """
 
     tick: int
     done: bool
     collisions: tuple[Collision, ...]
-    positions: dict[int, float]
+    time_loss: dict[int, float]
     trace: Records
 
 

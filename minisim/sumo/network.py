@@ -3,6 +3,10 @@
 netconvert would cut the roads and bend the turns by its own rules. Given the shape of the
 junction and of every turn, it takes ours: entries, exits and arcs lie where minisim has them. What
 is left is read back (`Network`), so a position in SUMO is exact in `s` whatever netconvert did.
+
+A junction whose ways are netconvert's own (`Intersection.ways`: those of the published runs) is
+left to netconvert, with its waiting positions and its right of way; the lengths must come out as
+the ways have them.
 """
 
 from __future__ import annotations
@@ -26,6 +30,9 @@ NETWORK = "minisim.net.xml"
 #: Decimals of what is written and read [m].
 DIGITS = 6
 
+#: What netconvert's own lengths are known to [m]: it writes two decimals.
+ROUNDED = 0.0151
+
 
 @dataclass(frozen=True)
 class Network:
@@ -45,9 +52,9 @@ def build_network(
 ) -> Network:
     """Write the network into `folder`.
 
-    Nobody has to give way on it: a hosted controller is the only rule (`pass`, and no place to
-    wait inside the junction). Turns have the road's speed limit, since the host slows vehicles
-    for them.
+    Nobody has to give way on one with our arcs: a hosted controller is the only rule (`pass`, and
+    no place to wait inside the junction). Turns have the road's speed limit, since the host slows
+    vehicles for them.
 
     Args:
         intersection: its geometry.
@@ -56,19 +63,42 @@ def build_network(
         home: SUMO's folder, with `bin/netconvert`.
 
     Raises:
-        SumoError: netconvert refuses, with its own words.
+        SumoError: netconvert refuses, with its own words, or draws other ways than the given.
     """
+    ours = intersection.ways is None
     write_xml(folder / NODES, "nodes", _nodes(intersection))
     write_xml(folder / EDGES, "edges", _edges(intersection, speed_limit))
-    write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
     command = [str(home / "bin" / "netconvert")]
-    command += ["--node-files", NODES, "--edge-files", EDGES, "--connection-files", CONNECTIONS]
+    command += ["--node-files", NODES, "--edge-files", EDGES]
     command += ["--output-file", NETWORK, "--no-turnarounds", "true"]
     command += ["--lefthand", str(intersection.side == "left").lower()]
-    command += ["--offset.disable-normalization", "true", "--precision", str(DIGITS)]
-    command += ["--junctions.limit-turn-speed", "-1"]
+    command += ["--offset.disable-normalization", "true"]
+    if ours:
+        write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
+        command += ["--connection-files", CONNECTIONS, "--precision", str(DIGITS)]
+        command += ["--junctions.limit-turn-speed", "-1"]
     run_tool(command, folder, home)
-    return read_network(intersection, folder / NETWORK)
+    network = read_network(intersection, folder / NETWORK)
+    if not ours:
+        _check_lengths(intersection, network)
+    return network
+
+
+def _check_lengths(intersection: Intersection, network: Network) -> None:
+    """Raise `SumoError` unless netconvert's lengths are those of the intersection."""
+    for path, approach, inside in zip(
+        intersection.paths, network.approach, network.inside, strict=True
+    ):
+        for name, drawn, wanted in (
+            ("approach", approach, path.entry),
+            ("way", inside, path.exit - path.entry),
+        ):
+            if abs(drawn - wanted) > ROUNDED:
+                raise SumoError(
+                    f"netconvert draws the {name} of {path.movement} {drawn:.2f} m long, the "
+                    f"intersection has {wanted:.2f} m: only ways that are netconvert's own can be "
+                    "driven in SUMO"
+                )
 
 
 def run_tool(command: list[str], folder: Path, home: Path) -> None:
@@ -126,9 +156,8 @@ def tag(name: str, attributes: Mapping[str, object]) -> str:
 
 
 def _nodes(intersection: Intersection) -> Iterable[str]:
-    yield tag(
-        "node", {"id": "C", "x": 0, "y": 0, "type": "priority", "shape": _outline(intersection)}
-    )
+    shape = {"shape": _outline(intersection)} if intersection.ways is None else {}
+    yield tag("node", {"id": "C", "x": 0, "y": 0, "type": "priority", **shape})
     for arm in intersection.arms:
         x, y = (intersection.arm_length * u for u in arm.outward)
         yield tag("node", {"id": arm.name, "x": f"{x:.9f}", "y": f"{y:.9f}", "type": "dead_end"})

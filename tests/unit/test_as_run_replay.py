@@ -76,7 +76,7 @@ def test_every_cell_has_arrivals_of_its_geometry() -> None:
 
 
 def test_drawn_scenarios_of_the_grid_have_the_split() -> None:
-    what = scenario("4:3:2:1", 300, 4, "fair")
+    what = scenario("4:3:2:1", 300, 4, profile="fair")
     assert what.rates == pytest.approx((480, 360, 240, 120))
     assert what.profile_name == "fair"
     assert scenario("balanced", 150, 5).rates == pytest.approx((150,) * 5)
@@ -111,5 +111,5 @@ def test_cells_that_were_not_published(cell: tuple[str, int, int], message: str)
 def test_ways_of_other_junctions_are_not_published() -> None:
     with pytest.raises(InputError, match="published junction"):
         published_ways(6)
-    with pytest.raises(InputError, match="published DIM run"):
+    with pytest.raises(InputError, match="published run"):
         published_arrivals("balanced", 100, 4)

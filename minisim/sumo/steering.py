@@ -1,0 +1,296 @@
+"""How vehicles in SUMO are told what the road ahead and the controller ask of them.
+
+`Follower` steers SUMO's IDM and Krauss. What a held vehicle, a marking or a turn asks for is
+computed by minisim's own kernel functions and told to SUMO as a speed: a desired one
+(`setMaxSpeed`) where a lower limit holds, a commanded one (`setSpeed`) while a vehicle has to
+brake for what is ahead. SUMO still drives slower than that behind a leader.
+
+`Cruiser` steers SUMO's `CC`, the model of `minisim.vehicle.EngineVehicle`. It obeys no limit and
+no marking: it is told the advised speed, and a hold line only while that asks for more braking.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Protocol
+
+from minisim import kernel
+from minisim.carfollowing import cruise_control
+from minisim.engine import follow, realise
+from minisim.geometry import Movement
+from minisim.state import STOP_MARGIN, Engine, Law, Records
+from minisim.sumo.messages import Job
+
+#: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
+#: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
+#: junction it follows whoever comes from the same lane or leaves by the same. That also makes it
+#: yield to whoever crosses, where the controller alone is to say who goes: so it ignores all in
+#: the junction (32) as long as somebody drives there who neither shares lane nor exit.
+FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
+
+#: The published runs' speed mode: nothing but the model. With a safe gap (1) SUMO would cut what
+#: the engine does by what its controller asks for, and with that the lag.
+CRUISING = 0
+
+#: SUMO's number of the controller that is a cruise control with ACC (`Plexe::ACC`).
+ACC = 1
+
+#: SUMO knows no desired speed of zero [m/s]; a vehicle told to stop is commanded to.
+LEAST_SPEED = 0.01
+
+
+class Car:
+    """A vehicle; `minisim.state.VEHICLE` explains the values.
+
+    Attributes:
+        present: whether it is on the road.
+        seen: tick at which it was looked at last.
+        lost_ticks: as there; between two looks that are more than a step apart it is the time
+            beyond what the distance takes at the limit.
+    """
+
+    __slots__ = (
+        "a", "advice", "cleared", "commanded", "demand_time", "desired", "factor", "go", "id",
+        "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "row", "s", "section",
+        "seen", "v",
+    )  # fmt: skip
+
+    def __init__(self, row: int, record: Records, law: Law) -> None:
+        self.row = row
+        self.id = int(record["id"])
+        self.name = str(self.id)
+        self.lane = int(record["lane"])
+        self.path = int(record["path"])
+        self.factor = float(record["factor"])
+        self.demand_time = int(record["demand_tick"]) * law.dt
+        self.s = self.v = self.a = self.lost_ticks = 0.0
+        self.section = self.mark = self.seen = 0
+        self.go = self.cleared = self.present = False
+        self.advice = math.inf
+        self.desired = math.inf  # as SUMO was told last
+        self.commanded = self.ignoring = False
+
+
+#: Whether a vehicle has the right of way, by itself or by its lane.
+Released = Callable[[Car], bool]
+
+
+class Steering(Protocol):
+    """What the worker asks of a car-following model of SUMO.
+
+    Attributes:
+        near: `s` from which vehicles have to be steered in every step [m].
+    """
+
+    near: float
+
+    def load(self, cars: Iterable[Car]) -> None:
+        """SUMO knows the vehicles; none is on the road yet."""
+
+    def depart(self, car: Car) -> None:
+        """A vehicle was inserted."""
+
+    def advise(self, car: Car) -> None:
+        """The advice for a vehicle on the road has changed."""
+
+    def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
+        """Before a step; the vehicles of each lane, front to back, up to the exit."""
+
+    def release(self, car: Car) -> None:
+        """The vehicle has left the junction: nobody but SUMO steers it any more."""
+
+
+class Follower:
+    """SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
+
+    def __init__(self, job: Job, libsumo: Any) -> None:
+        self.near = -math.inf
+        self._law, self._model = job.law, job.model
+        self._vehicle = libsumo.vehicle
+        self._limits = limits(job)
+        self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
+
+    def load(self, cars: Iterable[Car]) -> None:
+        """Nothing: the vehicle type says it all."""
+
+    def depart(self, car: Car) -> None:
+        """Let nobody but the controller give way."""
+        self._vehicle.setSpeedMode(car.name, FOLLOWING)
+
+    def advise(self, car: Car) -> None:
+        """Nothing: `steer` looks at it."""
+
+    def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
+        """Tell SUMO what the road ahead asks of everybody up to the exit in the next step."""
+        entry = self._law.entry
+        inside = {car.path for lane in lanes for car in lane if car.s >= entry}
+        for lane in lanes:
+            for car in lane:
+                held = car.s < entry and not released(car)
+                self._steer(car, held)
+                ignoring = held or not inside.isdisjoint(self._crossing[car.path])
+                if ignoring != car.ignoring:
+                    mode = IGNORING if ignoring else FOLLOWING
+                    self._vehicle.setSpeedMode(car.name, mode)
+                    car.ignoring = ignoring
+
+    def release(self, car: Car) -> None:
+        """Leave it to SUMO, at the limit of the exit."""
+        limit = self._limits[car.path][1][car.section]
+        self._desire(car, min(limit * car.factor, car.advice))
+        self._hand_back(car)
+
+    def _steer(self, car: Car, held: bool) -> None:
+        law = self._law
+        v, s, section = car.v, car.s, car.section
+        starts, speeds = self._limits[car.path]
+        v0 = min(speeds[section] * car.factor, car.advice)
+        k = section + 1
+        slower = kernel.braking_begins(v, starts[k] - s, law)
+        held = held and near(v, law.hold - s, law)
+        # SUMO would drop to a lower desired speed at once; the law brakes.
+        self._desire(car, max(v0, v))
+        if not (slower or held or v > v0 or v0 < LEAST_SPEED):
+            self._hand_back(car)
+            return
+        free = acc = self._free(v, v0)
+        while kernel.braking_begins(v, starts[k] - s, law):
+            acc = min(acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
+            k += 1
+        if held:
+            acc = min(acc, kernel.hold(v, s, law))
+        if acc < free or v > v0 or v0 < LEAST_SPEED:
+            speed = v + max(acc, -law.b_max) * law.dt
+            self._vehicle.setSpeed(car.name, max(speed, 0.0))
+            car.commanded = True
+        else:
+            self._hand_back(car)
+
+    def _free(self, v: float, v0: float) -> float:
+        """Acceleration of the model on an empty road."""
+        law = self._law
+        if self._model == "IDM":
+            return kernel.follow(v, v0, 0.0, law)
+        return min(law.a, max((v0 - v) / law.dt, -law.b))
+
+    def _desire(self, car: Car, speed: float) -> None:
+        speed = max(speed, LEAST_SPEED)
+        if speed != car.desired:
+            self._vehicle.setMaxSpeed(car.name, speed)
+            car.desired = speed
+
+    def _hand_back(self, car: Car) -> None:
+        if car.commanded:
+            self._vehicle.setSpeed(car.name, -1.0)
+            car.commanded = False
+
+
+class Cruiser:
+    """SUMO's `CC` as a cruise control with ACC: it is told its desired speed."""
+
+    def __init__(self, job: Job, libsumo: Any, engine: Engine) -> None:
+        law = job.law
+        self._law, self._engine = law, engine
+        self._vehicle = libsumo.vehicle
+        top = max(engine.cruise_speed, job.road.section_speed.max())
+        self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
+
+    def load(self, cars: Iterable[Car]) -> None:
+        """Switch the controller on: SUMO inserts by the rule of the active one."""
+        for car in cars:
+            self._vehicle.setSpeedMode(car.name, CRUISING)
+            self._set(car, "ccaht", self._engine.headway)
+            self._set(car, "ccac", ACC)
+            self.advise(car)
+
+    def depart(self, car: Car) -> None:
+        """Advice may have come before the vehicle."""
+        self.advise(car)
+
+    def advise(self, car: Car) -> None:
+        """Tell SUMO the desired speed."""
+        speed = self._desired(car)
+        if speed != car.desired:
+            self._set(car, "ccds", speed)
+            car.desired = speed
+
+    def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
+        """Brake for hold lines where the model itself brakes less."""
+        law = self._law
+        for lane in lanes:
+            ahead = None
+            for car in lane:
+                held = car.s < law.entry and not released(car)
+                if held and near(car.v, law.hold - car.s, law):
+                    self._hold(car, ahead)
+                else:
+                    self.release(car)
+                ahead = car
+
+    def release(self, car: Car) -> None:
+        """Leave it to the model."""
+        if car.commanded:
+            self._vehicle.setSpeed(car.name, -1.0)
+            car.commanded = False
+
+    def _hold(self, car: Car, ahead: Car | None) -> None:
+        law = self._law
+        acc = max(kernel.hold(car.v, car.s, law), -law.b_max)
+        if acc < self._own(car, ahead):
+            self._vehicle.setSpeed(car.name, max(car.v + acc * law.dt, 0.0))
+            car.commanded = True
+        else:
+            self.release(car)
+
+    def _own(self, car: Car, ahead: Car | None) -> float:
+        """Acceleration of the model on the approach, where a command would replace it [m/s²]."""
+        law, engine = self._law, self._engine
+        v0 = self._desired(car)
+        u = cruise_control(car.v, v0, engine.cruise_gain, engine.a, engine.b)
+        if ahead is not None:
+            gap = ahead.s - law.length - car.s
+            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, engine))
+        return realise(car.v, car.a, u, v0 == 0.0, law, engine)
+
+    def _desired(self, car: Car) -> float:
+        return self._engine.cruise_speed if car.advice == math.inf else car.advice
+
+    def _set(self, car: Car, key: str, value: float) -> None:
+        self._vehicle.setParameter(car.name, f"carFollowModel.{key}", repr(value))
+
+
+def steering_of(job: Job, libsumo: Any) -> Steering:
+    """What steers the vehicles of a job."""
+    if job.engine is None:
+        return Follower(job, libsumo)
+    return Cruiser(job, libsumo, job.engine)
+
+
+def limits(job: Job) -> list[tuple[list[float], list[float]]]:
+    """Each path's sections as lists: their starts [m] and limits [m/s]."""
+    road = job.road
+    return [
+        (start.tolist(), speed.tolist())
+        for start, speed in zip(road.section_start, road.section_speed, strict=True)
+    ]
+
+
+def near(v: float, distance: float, law: Law) -> bool:
+    """Whether a hold line `distance` ahead may matter in this step; a metre of room is enough."""
+    return kernel.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
+
+
+def _crossing(path: int, movements: tuple[Movement, ...]) -> frozenset[int]:
+    """The paths that share neither lane nor exit with this one."""
+    n = max(m.origin for m in movements) + 1
+
+    def exit_of(movement: Movement) -> int:
+        return (movement.origin + movement.manoeuvre) % n
+
+    mine = movements[path]
+    return frozenset(
+        q
+        for q, other in enumerate(movements)
+        if other.origin != mine.origin and exit_of(other) != exit_of(mine)
+    )
