@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from figures import style
-from scenarios.results import saturated
+from scenarios.cells import saturated
 from scenarios.statistics import mean_interval
 
 if TYPE_CHECKING:

@@ -15,9 +15,10 @@ from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.archive import Archive, MissingRunsError
+from scenarios.cells import saturated
 from scenarios.comparison import compare, discrepancies, score
 from scenarios.reproduction import Made
-from scenarios.results import Results, saturated
+from scenarios.results import Results
 from scenarios.studies import STUDIES, Case
 
 if TYPE_CHECKING:

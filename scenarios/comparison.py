@@ -7,21 +7,16 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
+from scenarios.cells import saturated
 from scenarios.paper import reference
-from scenarios.results import saturated
 from scenarios.statistics import prediction_interval
+from scenarios.studies import SERIES
 
 if TYPE_CHECKING:
     import pandas as pd
-
-#: The paper's abbreviations -> our series.
-SERIES: Mapping[str, str] = MappingProxyType(
-    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
-)
 
 COMPARED = (
     "series", "arms", "split", "density", "metric", "lane", "paper", "comparable", "seeds",

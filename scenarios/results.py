@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from minisim.errors import integer, number, numbers
 from scenarios.experiment import Experiment
-from scenarios.statistics import growing
 from scenarios.studies import Case, Study
 
 if TYPE_CHECKING:
@@ -107,21 +106,3 @@ def collect(study: Study, effort: Effort, find: Find) -> Results:
         study, effort, pd.DataFrame(rows, columns=columns),
         tuple(case for case in effort.cases(study) if case not in done),
     )  # fmt: skip
-
-
-def saturated(cell: pd.DataFrame) -> bool:
-    """Whether queues kept growing in the runs of one cell, taken together.
-
-    Of the whole junction or of one lane: `scenarios.statistics.growing` over the sums of the
-    runs, which sees slower growth than each run for itself.
-    """
-    tested = [("queue_growth", "trips")] + [
-        (column, column.replace("queue_growth", "trips"))
-        for column in cell.columns
-        if column.startswith("lanes_") and column.endswith("_queue_growth")
-    ]
-    return any(
-        growing(float(cell[growth].sum()), int(cell[trips].sum()))
-        for growth, trips in tested
-        if cell[growth].notna().all()
-    )

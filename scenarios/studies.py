@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
 
+from minisim.control import Controller
 from minisim.errors import choice
 from scenarios.controllers import controller_named
 from scenarios.experiment import Experiment
 from scenarios.library import five_way, four_way, regular, three_way
-from scenarios.paper import DENSITIES, SPLITS
+from scenarios.paper import DENSITIES, SPLITS, Cell, controller_of
+from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
+
+#: Stands for the profile and controller of a published run, see `scenarios.paper`.
+AS_RUN = "as-run"
+
+#: The paper's abbreviations -> our series.
+SERIES: Mapping[str, str] = MappingProxyType(
+    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
+)
+
+#: Published controller and split whose run had a controller that is not here, an actuated signal:
+#: the delay-based one of the text stands in for it.
+NOT_TO_BE_HAD = (("ats", "4:3:2:1"),)
 
 #: Arms of the paper's junctions other than the common four.
 OTHER_ARMS = (3, 5)
@@ -23,10 +37,10 @@ class Case(NamedTuple):
     """One point of a figure: everything of a run but its seed and horizon.
 
     Attributes:
-        profile: by name.
+        profile: by name; `AS_RUN` is whatever the published run of this cell had.
         series: the line of the figure that the point lies on: the controller that a reader
             thinks of, such as "dim", whatever variant of it the profile needs.
-        controller: by its command-line name.
+        controller: by its command-line name; `AS_RUN` is the published run's.
         arms: of the junction.
         split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
         density: mean inflow a lane [veh/h].
@@ -39,8 +53,16 @@ class Case(NamedTuple):
     split: str
     density: float
 
-    def scenario(self, horizon: float = 3600.0) -> Scenario:
-        """What is simulated for `horizon` seconds."""
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+        """The run of one seed; collisions are counted, for some published rules have them."""
+        if self.profile == AS_RUN:
+            scenario, controller = self._published(horizon)
+        else:
+            scenario = self._drawn(horizon)
+            controller = controller_named(self.controller, self.profile)
+        return Experiment(scenario, controller, seed, label=self.series, on_collision="record")
+
+    def _drawn(self, horizon: float) -> Scenario:
         makers = {3: three_way, 4: four_way, 5: five_way}
         shares = None if self.split == "balanced" else parse_split(self.split)
         options = {"split": shares, "profile": self.profile, "horizon": horizon}
@@ -48,15 +70,13 @@ class Case(NamedTuple):
             return makers[self.arms](self.density, **options)
         return regular(self.arms, self.density, **options)
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
-        """The run of one seed; collisions are counted, for some published rules have them."""
-        return Experiment(
-            self.scenario(horizon),
-            controller_named(self.controller, self.profile),
-            seed,
-            label=self.series,
-            on_collision="record",
-        )
+    def _published(self, horizon: float) -> tuple[Scenario, Controller]:
+        """What ran, also where that is not what the label says, but for `NOT_TO_BE_HAD`."""
+        name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
+        cell = Cell(self.split, int(self.density), self.arms, name)
+        labelled = (name, self.split) in NOT_TO_BE_HAD
+        scenario = published_scenario(*cell, as_labelled=labelled)
+        return replace(scenario, horizon=horizon), controller_of(*cell, as_labelled=labelled)
 
     def __str__(self) -> str:
         return f"{self.series}, {self.arms} arms, {self.split}, {self.density:g} veh/h/lane"
@@ -98,19 +118,13 @@ def _paper_grid(profile_of: dict[str, tuple[str, str]]) -> tuple[Case, ...]:
 def _named(profile_of: dict[str, tuple[str, str]], series: str, split: str) -> tuple[str, str, str]:
     profile, controller = profile_of[series]
     if split != "balanced":
-        controller = _UNBALANCED.get((profile, controller), controller)
+        controller = _UNBALANCED.get(controller, controller)
     return profile, series, controller
 
 
 #: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
 #: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
-#: The published signals had equal greens, and the published V2I-C a lower speed.
-_UNBALANCED = {
-    ("paper", "dim"): "dim-inflow",
-    ("paper", "fixed-time"): "fixed-time-equal",
-    ("as_run_signals", "fixed-time"): "fixed-time-equal",
-    ("as_run", "v2ic-as-run"): "v2ic-as-run-14",
-}
+_UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
 
 _TEXT = {
     "dim": ("paper", "dim"),
@@ -118,12 +132,7 @@ _TEXT = {
     "adaptive": ("paper", "adaptive"),
     "v2ic": ("paper", "v2ic"),
 }
-_AS_RUN = {
-    "dim": ("as_run", "dim"),
-    "fixed-time": ("as_run_signals", "fixed-time"),
-    "adaptive": ("as_run_signals", "adaptive"),
-    "v2ic": ("as_run", "v2ic-as-run"),
-}
+_AS_RUN = dict.fromkeys(_TEXT, (AS_RUN, AS_RUN))
 
 #: The published V2I-C decides every 0.01 s and costs some 20 s of CPU a simulated hour, a hundred
 #: times a signal; its runs differ little.
