@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from figures import lines, style
 from minisim.geometry import ARM_NAMES
-from scenarios.archive import Archive, missing_note
+from scenarios.archive import Archive, missing_note, smoke_test
 from scenarios.capacity import CASES
 from scenarios.crossing import METRICS, Crossing, crossing, paired_differences, with_total_delay
 from scenarios.fairness import LANE_WAIT, lane_waits
@@ -131,7 +131,7 @@ def gate_figure(archive: Archive) -> Figure:
         rows = results.good[results.good["arms"] == arms]
         lines.draw_means(axes, rows, METRICS["waiting time"], GATES)
         style.plot_axes(axes, f"{arms} arms", lines.DENSITY_LABEL, "")
-        lines.log_time(axes, 0.05, 200.0)
+        lines.log_time(axes, 0.0, 500.0, linear=0.1)
         axes.set_xticks(DENSITIES)
     panels[0].set_ylabel("mean waiting of all vehicles [s], log.", fontsize=9.5, color=style.INK)
     _title(figure, "Two gates: nobody crossing, or in harmony with everybody who crosses")
@@ -157,7 +157,7 @@ def fairness_figure(archive: Archive) -> Figure:
         lines.draw_means(axes, rows, metric, PRIORITIES)
         style.plot_axes(axes, title, lines.DENSITY_LABEL, label)
         axes.set_xticks(DENSITIES)
-    lines.log_time(worst, 0.2, 500.0)
+    lines.log_time(worst, 0.0, 500.0, linear=0.1)
     spread.set_ylim(0.0, 0.8)
     by_lane.set_ylim(bottom=0.0)
     _title(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
@@ -214,7 +214,7 @@ def capacity_figure(archive: Archive) -> Figure:
     for edge in range(1, len(RIVALS)):
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
     highest = max(value for capacity in found for value in capacity.values)
-    axes.set_xlim(0.0, 100.0 * math.ceil(highest / 100.0))
+    axes.set_xlim(0.0, 100.0 * math.ceil(1.04 * highest / 100.0))
     _title(figure, "Capacity: the largest demand served without a growing queue")
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", markersize=6.5)
@@ -226,7 +226,7 @@ def capacity_figure(archive: Archive) -> Figure:
         borderaxespad=0.0,
     )  # fmt: skip
     search = archive.search
-    note = (
+    note = f"{smoke_test(archive.effort)}" + (
         f"mean and 95 % interval over {search.seeds} seeds of {search.horizon:g} s; "
         f"bisected to {search.step:g} veh/h/lane; profile fair."
     )

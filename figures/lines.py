@@ -112,7 +112,8 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.set_yticks(([0.0] if low == 0.0 else []) + [t for t in shown if t >= (linear or 0.0)])
     axes.set_yticks([], minor=True)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_ylim(low, high)
+    # A marker on 0 is whole, and so is one on the lowest value.
+    axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
 
 
 def series_legend(

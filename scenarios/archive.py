@@ -69,8 +69,13 @@ class Archive:
 
 def make_command(effort: Effort) -> str:
     """The command that makes the runs of an effort."""
-    quick = effort.horizon == Effort.quick().horizon
+    quick = effort.densities is not None
     return f"minisim reproduce{' --quick' if quick else ''} --seeds {effort.seeds}"
+
+
+def smoke_test(effort: Effort) -> str:
+    """A warning where only some demands were run, and for minutes; empty otherwise."""
+    return "" if effort.densities is None else "Smoke test, which means nothing: "
 
 
 def missing_note(results: Iterable[Results], wanted: Callable[[Case], bool]) -> str:
@@ -82,7 +87,7 @@ def missing_note(results: Iterable[Results], wanted: Callable[[Case], bool]) -> 
     """
     found = tuple(results)
     effort = found[0].effort
-    text = f"{effort.seeds} seeds, {effort.horizon:g} s each."
+    text = f"{smoke_test(effort)}{effort.seeds} seeds, {effort.horizon:g} s each."
     lacking = [
         f"{case.series} ({results.study.name}, {case.arms} arms, {case.density:g})"
         for results in found

@@ -1,9 +1,10 @@
 """Capacity: the largest demand that is served without a growing queue, by bisection.
 
 A run serves its demand when the number of vehicles that are there (on the road or before it)
-grows by less than `TOLERANCE` of what arrives meanwhile. That is asked of each seed for itself, so
-that the capacities of the seeds have a mean and an interval. Near capacity a queue wanders: single hours of
-a signal tell its capacity with a standard deviation of 4 %, and the tolerance adds its 2 %.
+grows by less than `TOLERANCE` of what arrives meanwhile. That is asked of each seed for itself,
+so that the capacities of the seeds have a mean and an interval. Near capacity a queue wanders:
+single hours of a signal tell its capacity with a standard deviation of 4 %, and the tolerance adds
+its 2 %.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Search:
     @classmethod
     def quick(cls) -> Search:
         """A smoke test: rough, and of runs too short to mean anything."""
-        return cls(step=200.0, steps=4, seeds=2, horizon=300.0)
+        return cls(step=200.0, steps=4, seeds=2, horizon=150.0)
 
 
 class Capacity(NamedTuple):

@@ -65,9 +65,9 @@ def figures(
             f"{', '.join(wanting)}: drawn from results; give them with --store "
             "(minisim reproduce makes them)"
         )
-    folder = make_folder(out)
     source = None if store is None else Store(store, create=False)
     try:
+        folder = make_folder(out)
         archive = plan.archive(find_in(source) if source else lambda asked: [None] * len(asked))
         missing = []
         with bar("drawing") as progress:

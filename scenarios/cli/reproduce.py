@@ -47,7 +47,7 @@ def reproduce(
     ] = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Fewer demands, five minutes each: a smoke test."),
+        typer.Option("--quick", help="Two demands, 150 s each: a smoke test."),
     ] = False,
 ) -> None:  # fmt: skip
     """Run the paper's experiments and ours, draw every figure, and write a report."""
