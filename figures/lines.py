@@ -33,6 +33,8 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
         metric: a column.
         series: in the order of the legend; one without rows is left out.
     """
+    if rows.empty:
+        return
     for place, name in enumerate(series):
         found = rows[(rows["series"] == name) & rows[metric].notna()]
         if found.empty:

@@ -82,7 +82,7 @@ def test_reproduce_computes_what_is_missing(
         archive = TINY.archive(find_in(store))
         assert archive.study("fairness").missing == ()
         with pytest.raises(MissingRunsError):
-            archive.need("gate")
+            archive.need("text")
     assert [(part.name, part.runs, part.computed) for part in first] == [
         ("fairness", 6, 6), ("capacity", 2, 2),
     ]  # fmt: skip

@@ -96,6 +96,26 @@ def test_nothing_to_draw_says_how_to_make_it() -> None:
             assert item.build(empty), name
 
 
+@pytest.mark.parametrize("study", ["text", "as-run"])
+@pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
+def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
+    runs = {experiment.key for _, experiment in EFFORT.runs(STUDIES[study])}
+
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if e.key in runs else None for e in asked]
+
+    drawing = GALLERY[name].build(Archive(find, EFFORT, SEARCH))
+    if isinstance(drawing, Table):
+        columns = {"as-run": 3, "text": 5}
+        for other, column in columns.items():
+            assert {row[column] == "–" for row in drawing.rows} == {other != study}
+        return
+    assert [len(axes.get_legend_handles_labels()[0]) > 0 for axes in drawing.axes] == [
+        study == "as-run", study == "text",
+    ]  # fmt: skip
+    assert any("no run" in text.get_text() for text in drawing.texts)
+
+
 def test_what_is_missing_is_said_in_the_picture() -> None:
     figure = GALLERY["fair"].build(Archive(partial_find, EFFORT, SEARCH))
     assert isinstance(figure, Figure)
