@@ -45,7 +45,7 @@ def fair_figure(archive: Archive) -> Figure:
     for axes, (name, metric) in zip(panels, METRICS.items(), strict=True):
         lines.draw_means(axes, rows, metric, RIVALS)
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
-        lines.log_time(axes, 0.0, 2000.0, linear=0.1)
+        lines.log_time(axes, 0.0, 4000.0, linear=0.1)
         axes.set_xticks(FAIR_DENSITIES[1::2], minor=False)
         axes.set_xlim(20, 830)
     panels[0].set_ylabel("mean of all vehicles [s], logarithmic", fontsize=9.5, color=style.INK)
@@ -98,7 +98,7 @@ def crossing_figure(archive: Archive) -> Figure:
     lines.series_legend(figure, GATES, 0.012, 0.925)
     figure.text(
         0.012, 0.845, "bar: 95 % interval of the demand at which the paired difference is 0.   "
-        "◀ worse at every demand tried   ▶ at none", fontsize=8.5, color=style.INK, va="center",
+        "◀ worse from the lowest demand on   ▶ at none", fontsize=8.5, color=style.INK, va="center",
     )  # fmt: skip
     (results,) = archive.need("fair")
     lines.footnote(figure, missing_note([results], lambda _: True))
@@ -133,6 +133,7 @@ def gate_figure(archive: Archive) -> Figure:
         style.plot_axes(axes, f"{arms} arms", lines.DENSITY_LABEL, "")
         lines.log_time(axes, 0.0, 500.0, linear=0.1)
         axes.set_xticks(DENSITIES)
+        axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
     panels[0].set_ylabel("mean waiting of all vehicles [s], log.", fontsize=9.5, color=style.INK)
     _title(figure, "Two gates: nobody crossing, or in harmony with everybody who crosses")
     lines.series_legend(figure, GATES, 0.012, 0.925)
@@ -157,6 +158,7 @@ def fairness_figure(archive: Archive) -> Figure:
         lines.draw_means(axes, rows, metric, PRIORITIES)
         style.plot_axes(axes, title, lines.DENSITY_LABEL, label)
         axes.set_xticks(DENSITIES)
+        axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
     lines.log_time(worst, 0.0, 500.0, linear=0.1)
     spread.set_ylim(0.0, 0.8)
     by_lane.set_ylim(bottom=0.0)
