@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c co
 TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint bench figures clean
+.PHONY: help demo test test-all lint bench figures reproduce clean
 
 help:  ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -33,11 +33,12 @@ bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 	$(BIN)/python tests/bench/bench.py
 	$(BIN)/python tests/bench/workers.py
 
-figures: $(VENV)/.installed  ## junction and harmony graph of a decision, as in the paper
-	mkdir -p out
-	$(BIN)/minisim decide three-way a1 b1 c1 --plot out/decision_three_way.png
-	$(BIN)/minisim decide four-way a1 b2 c2 d2 --plot out/decision_four_way.png
-	$(BIN)/minisim decide five-way a1 b2 c2 d2 e2 --plot out/decision_five_way.png
+figures: $(VENV)/.installed  ## every figure and table, from out/runs.sqlite (make reproduce) or else a quick run
+	if [ -f out/runs.sqlite ]; then $(BIN)/minisim figures --store out/runs.sqlite --out out/figures; \
+	else $(BIN)/minisim reproduce --quick --out out/quick; fi
+
+reproduce: $(VENV)/.installed  ## the paper's experiments and ours: out/report.md and out/figures
+	$(BIN)/minisim reproduce --out out
 
 clean:  ## remove the environment, caches and results
 	rm -rf $(VENV) out build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache

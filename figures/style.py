@@ -11,6 +11,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Literal, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -31,6 +32,46 @@ ZONES: Mapping[str, str] = MappingProxyType(
 )
 #: Vehicles by what they are doing.
 RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
+
+
+class Look(NamedTuple):
+    """How a series is drawn, the same in every figure; told apart in grey print too.
+
+    Attributes:
+        label: in legends.
+        colour, marker, dashes: of its line.
+    """
+
+    label: str
+    colour: str
+    marker: str
+    dashes: Literal["-", "--", "-.", ":"]
+
+
+BROWN, GREY = "#7A4A1E", "#5C6470"
+
+#: Series (`scenarios.studies.Case`) -> look.
+LOOKS: Mapping[str, Look] = MappingProxyType({
+    "dim": Look("DIM", BLUE, "o", "-"),
+    "dim-harmonious": Look("DIM, harmonious gate", SKY, "p", "-"),
+    "fixed-time": Look("fixed-time signal", VERMILLION, "s", "--"),
+    "adaptive": Look("adaptive signal", ORANGE, "^", "-."),
+    "v2ic": Look("V2I-C", GREEN, "D", ":"),
+    "all-way-stop": Look("all-way stop", INK, "X", "--"),
+    "reservation": Look("reservation", PURPLE, "v", "-."),
+    "longest-queue": Look("longest queue first", BROWN, "<", ":"),
+    "dim-3": Look("3 arms", GREEN, "^", "--"),
+    "dim-4": Look("4 arms", BLUE, "o", "-"),
+    "dim-5": Look("5 arms", VERMILLION, "p", "-."),
+    "dim-rotating": Look("DIM, rotating priority", VERMILLION, "s", "--"),
+    "dim-waiting": Look("DIM, longest-waiting priority", GREEN, "D", ":"),
+})  # fmt: skip
+
+
+def look(series: str) -> Look:
+    """The look of a series; one without a look of its own is grey."""
+    return LOOKS.get(series, Look(series, GREY, "h", "-"))
+
 
 #: Formats that a figure can be written in.
 FORMATS = ("png", "pdf", "svg")

@@ -103,12 +103,13 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
             cell[metric] = interval.mean
             cell[f"{metric}_ci95"] = interval.half_width
             cell[f"{metric}_pi95"] = prediction_interval(values).half_width
-    cell["growing"] = _growing(good)
+    cell["growing"] = saturated(good)
     cell["cpu_s"] = float(good["cpu_s"].mean())
     return cell
 
 
-def _growing(good: pd.DataFrame) -> bool:
+def saturated(good: pd.DataFrame) -> bool:
+    """Whether the queues of a cell's runs, of the junction or of a lane, kept growing together."""
     arms = int(good["arms"].iloc[0])
     return any(
         growing(float(good[f"{of}queue_growth"].sum()), int(good[f"{of}trips"].sum()))

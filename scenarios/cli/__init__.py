@@ -20,7 +20,8 @@ __all__ = ["COMMANDS", "app", "main"]
 
 #: In the order of the help; the module of that name beside this one adds the command to the app.
 COMMANDS = (
-    "demo", "run", "harmony", "decide", "animate", "verify", "protocol", "sweep", "crossval",
+    "demo", "run", "sweep", "figures", "reproduce", "crossval", "harmony", "decide", "animate",
+    "verify", "protocol",
 )  # fmt: skip
 
 for _command in COMMANDS:

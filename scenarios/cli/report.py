@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from dim import Explanation, HarmonyMatrix
+    from figures.gallery import Item
     from scenarios.experiment import Experiment
 
 #: Metric of a summary -> heading.
@@ -100,6 +101,16 @@ def decision_text(explanation: Explanation) -> Text:
     text.append("right of way     ", "dim").append(_names(explanation.right_of_way), "bold green")
     text.append("\nwhy              ", "dim").append(explanation.reason)
     return text
+
+
+def gallery_table(items: Iterable[Item]) -> Table:
+    """Names and titles of figures and tables, and the studies that they need."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for heading in ("name", "what", "studies"):
+        table.add_column(heading)
+    for item in items:
+        table.add_row(item.name, item.title, ", ".join(item.needs) or "none")
+    return table
 
 
 #: Column of `scenarios.cells.cells` -> heading.

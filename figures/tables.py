@@ -1,0 +1,91 @@
+"""Tables for readers and for programs: Markdown, CSV and LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from minisim.errors import InputError
+from minisim.recording import replacing
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text cells.
+
+    Attributes:
+        title: one line.
+        headings: of the columns; those after the first `labels` are numbers.
+        rows: cells as they are printed.
+        labels: how many columns from the left are words.
+        notes: small print below.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    labels: int = 1
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if any(len(row) != len(self.headings) for row in self.rows):
+            raise InputError(f"table {self.title!r}: every row needs {len(self.headings)} cells")
+
+    def markdown(self) -> str:
+        """As a Markdown table."""
+        rule = ["---" if k < self.labels else "---:" for k in range(len(self.headings))]
+        lines = [self.headings, tuple(rule), *self.rows]
+        table = "\n".join(f"| {' | '.join(row)} |" for row in lines)
+        notes = "".join(f"\n{note}\n" for note in self.notes)
+        return f"**{self.title}**\n\n{table}\n{notes}"
+
+    def csv(self) -> str:
+        """As CSV; no notes."""
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([self.headings, *self.rows])
+        return text.getvalue()
+
+    def latex(self) -> str:
+        """As a LaTeX `table` with booktabs rules."""
+        columns = "l" * self.labels + "r" * (len(self.headings) - self.labels)
+        lines = [
+            r"\begin{table}", rf"\caption{{{_latex(self.title)}}}", r"\centering",
+            rf"\begin{{tabular}}{{{columns}}}", r"\toprule", _latex_row(self.headings), r"\midrule",
+            *map(_latex_row, self.rows), r"\bottomrule", r"\end{tabular}",
+            *(rf"\par\footnotesize {_latex(note)}" for note in self.notes), r"\end{table}", "",
+        ]  # fmt: skip
+        return "\n".join(lines)
+
+
+#: Suffix -> how a table is written in it.
+WRITERS: Mapping[str, Callable[[Table], str]] = MappingProxyType(
+    {"md": Table.markdown, "csv": Table.csv, "tex": Table.latex}
+)
+
+
+def save_table(table: Table, path: Path) -> None:
+    """Write a table in the format of its suffix (`WRITERS`), whole or not at all."""
+    suffix = path.suffix.removeprefix(".")
+    if suffix not in WRITERS:
+        raise InputError(f"a table file ends in {', '.join(f'.{k}' for k in WRITERS)}; got {path}")
+    with replacing(path) as part:
+        part.write_text(WRITERS[suffix](table), encoding="utf-8")
+
+
+_LATEX = str.maketrans({
+    "&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "±": r"$\pm$", "–": "--", "…": r"\dots{}",
+    "≥": r"$\geq$", "≤": r"$\leq$", "×": r"$\times$", "²": r"$^2$", "●": r"$\bullet$",
+    "·": r"$\cdot$", "↑": r"$\uparrow$", "†": r"$\dagger$", "−": r"$-$",
+})  # fmt: skip
+
+
+def _latex(text: str) -> str:
+    return text.translate(_LATEX)
+
+
+def _latex_row(cells: tuple[str, ...]) -> str:
+    return " & ".join(map(_latex, cells)) + r" \\"

@@ -1,0 +1,100 @@
+"""What figures and reports are made from: the results of studies, looked up when first needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING
+
+from minisim.errors import MinisimError
+from scenarios.capacity import CASES, Capacity, Search, capacities
+from scenarios.results import Effort, Find, Results, collect
+from scenarios.studies import Case, study_named
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class MissingRunsError(MinisimError):
+    """A figure needs runs that nobody has made."""
+
+
+class Archive:
+    """The results that a store holds.
+
+    Args:
+        find: where the runs are.
+        effort: how many runs a case.
+        search: how capacity was looked for.
+    """
+
+    def __init__(self, find: Find, effort: Effort, search: Search) -> None:
+        self.effort = effort
+        self.search = search
+        self.study: Callable[[str], Results] = cache(self._collect)
+        self._find = find
+
+    def _collect(self, name: str) -> Results:
+        return collect(study_named(name), self.effort, self._find)
+
+    def capacities(self) -> tuple[list[Capacity], list[Case]]:
+        """Every capacity that is known, and the cases of which it is not.
+
+        Raises:
+            MissingRunsError: none is known.
+        """
+        found, missing = capacities(CASES, self.search, self._find)
+        if not found:
+            raise MissingRunsError(
+                f"the store has no search for capacities with the seeds 1 … {self.search.seeds} "
+                f"over {self.search.horizon:g} s; make it with: {make_command(self.effort)}"
+            )
+        return found, missing
+
+    def need(self, *names: str) -> tuple[Results, ...]:
+        """The results of studies.
+
+        Raises:
+            MissingRunsError: none of them has a run; says how to make them.
+        """
+        found = tuple(self.study(name) for name in names)
+        if all(results.good.empty for results in found):
+            raise MissingRunsError(
+                f"the store has no run of {' or '.join(names)} with the seeds 1 … "
+                f"{self.effort.seeds} over {self.effort.horizon:g} s; make them with: "
+                f"{make_command(self.effort)}"
+            )
+        return found
+
+
+def make_command(effort: Effort) -> str:
+    """The command that makes the runs of an effort."""
+    quick = effort.densities is not None
+    return f"minisim reproduce{' --quick' if quick else ''} --seeds {effort.seeds}"
+
+
+def smoke_test(effort: Effort) -> str:
+    """A warning where only some demands were run, and for minutes; empty otherwise."""
+    return "" if effort.densities is None else "Smoke test, which means nothing: "
+
+
+def missing_note(results: Iterable[Results], wanted: Callable[[Case], bool]) -> str:
+    """What a figure shows and what it lacks, in small print.
+
+    Args:
+        results: drawn.
+        wanted: whether a case belongs to the figure.
+    """
+    found = tuple(results)
+    effort = found[0].effort
+    text = f"{smoke_test(effort)}{effort.seeds} seeds, {effort.horizon:g} s each."
+    lacking = [
+        f"{case.series} ({results.study.name}, {case.arms} arms, {case.density:g})"
+        for results in found
+        for case in results.missing
+        if wanted(case)
+    ]
+    if not lacking:
+        return text
+    more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
+    return f"{text}  Not drawn, for there is no run: {'; '.join(lacking[:3])}{more}."

@@ -1,0 +1,124 @@
+"""Capacity: the largest demand that is served without a growing queue, by bisection.
+
+A run serves its demand when the number of vehicles that are there (on the road or before it)
+grows by less than `TOLERANCE` of what arrives meanwhile. That is asked of each seed for itself,
+so that the capacities of the seeds have a mean and an interval. Near capacity a queue wanders:
+single hours of a signal tell its capacity with a standard deviation of 4 %, and the tolerance adds
+its 2 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from minisim.errors import InputError, integer, number
+from scenarios.experiment import Experiment
+from scenarios.results import Find
+from scenarios.statistics import Interval, mean_interval
+from scenarios.studies import RIVALS, Case
+
+#: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
+TOLERANCE = 0.02
+
+#: What is asked: every rival on three to six arms under the profile `fair`.
+CASES: tuple[Case, ...] = tuple(
+    Case("fair", name, name, arms, "balanced", 0.0) for arms in (3, 4, 5, 6) for name in RIVALS
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How capacity is looked for: `seeds` · log₂(`steps`) runs a case.
+
+    Attributes:
+        step: demands are multiples of it [veh/h/lane].
+        steps: the highest demand is `steps`·`step`; a power of two.
+        seeds: each with a bisection of its own, the seeds 1 … `seeds`.
+        horizon: of each run [s].
+    """
+
+    step: float = 10.0
+    steps: int = 128
+    seeds: int = 4
+    horizon: float = 3600.0
+
+    def __post_init__(self) -> None:
+        number("step [veh/h]", self.step, above=0)
+        integer("seeds", self.seeds, low=1)
+        number("horizon [s]", self.horizon, above=0)
+        if integer("steps", self.steps, low=2).bit_count() != 1:
+            raise InputError(f"steps must be a power of two, got {self.steps}")
+
+    @classmethod
+    def quick(cls) -> Search:
+        """A smoke test: rough, and of runs too short to mean anything."""
+        return cls(step=200.0, steps=4, seeds=2, horizon=150.0)
+
+
+class Capacity(NamedTuple):
+    """The capacity of a case.
+
+    Attributes:
+        case: whose; its density means nothing.
+        values: of each seed, middle of the last bracket [veh/h/lane].
+    """
+
+    case: Case
+    values: tuple[float, ...]
+
+    @property
+    def interval(self) -> Interval:
+        """Mean over seeds and its 95 % interval."""
+        return mean_interval(self.values)
+
+
+def grows(row: Mapping[str, Any], tolerance: float = TOLERANCE) -> bool:
+    """Whether a row of a sweep tells of a queue that grows.
+
+    `queue_growth` is between two windows that begin half the horizon apart; half of the demanded
+    trips arrive in that time.
+    """
+    return float(row["queue_growth"]) > tolerance * float(row["trips"]) / 2.0
+
+
+def capacities(
+    cases: Sequence[Case], search: Search, find: Find
+) -> tuple[list[Capacity], list[Case]]:
+    """Bisect for the capacity of every case, all at once: each round asks `find` one list.
+
+    Args:
+        cases: their density is replaced.
+        search: how.
+        find: gives the row of each experiment, by running it or from a store.
+
+    Returns:
+        The capacities, and the cases for which `find` had no row or a failed one.
+    """
+    brackets = {
+        (case, seed): (0, search.steps) for case in cases for seed in range(1, search.seeds + 1)
+    }
+    lost: set[Case] = set()
+    for _ in range(search.steps.bit_length() - 1):
+        asked = [key for key in brackets if key[0] not in lost]
+        rows = find([_probe(case, seed, brackets[case, seed], search) for case, seed in asked])
+        for key, row in zip(asked, rows, strict=True):
+            if row is None or row.get("error"):
+                lost.add(key[0])
+                continue
+            low, high = brackets[key]
+            middle = (low + high) // 2
+            brackets[key] = (low, middle) if grows(row) else (middle, high)
+    found = [
+        Capacity(case, tuple(
+            (sum(brackets[case, seed]) / 2.0) * search.step for seed in range(1, search.seeds + 1)
+        ))
+        for case in cases if case not in lost
+    ]  # fmt: skip
+    return found, [case for case in cases if case in lost]
+
+
+def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Experiment:
+    density = sum(bracket) // 2 * search.step
+    return case._replace(density=density).experiment(seed, search.horizon)

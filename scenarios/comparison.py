@@ -1,0 +1,156 @@
+"""The paper's numbers against ours, cell by cell, and the causes of what differs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from minisim.errors import choice
+from scenarios.cells import saturated
+from scenarios.paper import reference
+from scenarios.statistics import prediction_interval
+from scenarios.studies import SERIES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COMPARED = (
+    "series", "arms", "split", "density", "metric", "lane", "paper", "comparable", "seeds",
+    "mean", "sd", "low", "high", "inside", "saturated",
+)  # fmt: skip
+
+
+def published() -> pd.DataFrame:
+    """`scenarios.paper.reference`, with our names: `series` and `paper` (the value [s])."""
+    table = reference()
+    table["series"] = table["controller"].map(SERIES)
+    return table.rename(columns={"value": "paper"})
+
+
+def compare(rows: pd.DataFrame) -> pd.DataFrame:
+    """Every published value beside ours.
+
+    Args:
+        rows: of a study of the paper's grid (`scenarios.results.collect`).
+
+    Returns:
+        One row a published value, columns `COMPARED`: `low` and `high` are the bounds of the 95 %
+        prediction interval, within which one more run of ours would fall; `inside` whether the
+        paper's value does; `seeds` is 0 where there is no run, and what follows is missing.
+    """
+    import pandas as pd
+
+    keys = ["series", "arms", "split", "density"]
+    cells = {key: cell for key, cell in rows[rows["error"].isna()].groupby(keys)}  # noqa: C416
+    found = []
+    order = ["arms", "split", "series", "metric", "lane", "density"]
+    for row in published().sort_values(order).to_dict("records"):
+        key = (row["series"], row["arms"], row["split"], float(row["density"]))
+        ours = cells.get(key)
+        row.update(**_ours(ours, column_of(row["metric"], row["lane"]), row["paper"]))
+        found.append(row)
+    return pd.DataFrame(found)[list(COMPARED)]
+
+
+def column_of(metric: str, lane: str) -> str:
+    """Column of a sweep for a metric of a lane, or of "all"."""
+    return metric if lane == "all" else f"lanes_{lane}_{metric}"
+
+
+def _ours(cell: pd.DataFrame | None, column: str, paper: float) -> dict[str, object]:
+    values = [] if cell is None else cell[column].dropna().astype(float).tolist()
+    if cell is None or not values:
+        return {"seeds": 0, "mean": math.nan, "sd": math.nan, "low": math.nan, "high": math.nan,
+                "inside": None, "saturated": None}  # fmt: skip
+    mean = math.fsum(values) / len(values)
+    one = len(values) == 1
+    sd = math.nan if one else _deviation(values, mean)
+    half = prediction_interval(values).half_width
+    low, high = mean - half, mean + half
+    return {
+        "seeds": len(values), "mean": mean, "sd": sd, "low": low, "high": high,
+        "inside": None if one else bool(low <= paper <= high),
+        "saturated": saturated(cell),
+    }  # fmt: skip
+
+
+def _deviation(values: list[float], mean: float) -> float:
+    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (len(values) - 1))
+
+
+class Score(NamedTuple):
+    """How many of the paper's values our runs contain.
+
+    Attributes:
+        inside: values within the 95 % prediction interval of ours.
+        judged: values for which there is one.
+    """
+
+    inside: int
+    judged: int
+
+    def __str__(self) -> str:
+        return f"{self.inside} of {self.judged}"
+
+
+def score(compared: pd.DataFrame, *, comparable: bool = True) -> Score:
+    """Count the published values inside, among those that are comparable, or all the others."""
+    chosen = (compared["comparable"] == "yes") == comparable
+    judged = compared[chosen & compared["inside"].notna()]
+    return Score(int(judged["inside"].astype(bool).sum()), len(judged))
+
+
+class Discrepancy(NamedTuple):
+    """A known cause of a difference between the paper and us.
+
+    Attributes:
+        number: in the list of discrepancies (docs).
+        study, series, arms, split, density, metric: where it holds; empty is anywhere.
+        cause: in words.
+    """
+
+    number: int
+    study: str
+    series: str
+    arms: str
+    split: str
+    density: str
+    metric: str
+    cause: str
+
+    def holds(self, study: str, row: Mapping[Any, Any]) -> bool:
+        """Whether it holds for a study's row of `compare`."""
+        wanted = {
+            "series": self.series, "arms": self.arms, "split": self.split,
+            "density": self.density, "metric": self.metric,
+        }  # fmt: skip
+        return self.study in ("", study) and all(
+            not value or value == _text(row[key]) for key, value in wanted.items()
+        )
+
+
+@lru_cache
+def discrepancies() -> tuple[Discrepancy, ...]:
+    """All known causes, from the data file beside the reference numbers."""
+    file = resources.files("scenarios") / "data" / "discrepancies.csv"
+    with file.open(encoding="utf-8") as text:
+        rows = list(csv.DictReader(text))
+    return tuple(Discrepancy(int(row.pop("number")), **row) for row in rows)
+
+
+def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:
+    """The known causes of a difference in one row of `compare`.
+
+    Raises:
+        InputError: another study than the paper's.
+    """
+    choice("study of the paper's grid", study, ("text", "as-run"))
+    return tuple(sorted(known for known in discrepancies() if known.holds(study, row)))
+
+
+def _text(value: object) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)

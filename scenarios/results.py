@@ -1,0 +1,108 @@
+"""The runs of a study, found among all that was ever simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from minisim.errors import integer, number, numbers
+from scenarios.experiment import Experiment
+from scenarios.studies import Case, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Gives for each experiment its row of a sweep, or None where it was never run.
+Find = Callable[[Sequence[Experiment]], Sequence[Mapping[str, Any] | None]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How much is simulated for a study.
+
+    Attributes:
+        seeds: runs a case, the seeds 1 … `seeds`.
+        horizon: of each run [s].
+        densities: only cases with these demands [veh/h/lane]; None is all.
+    """
+
+    seeds: int = 10
+    horizon: float = 3600.0
+    densities: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        integer("seeds", self.seeds, low=2, high=10_000)
+        number("horizon [s]", self.horizon, above=0)
+        if self.densities is not None:
+            object.__setattr__(self, "densities", numbers("densities", self.densities))
+
+    @classmethod
+    def quick(cls, seeds: int = 2) -> Effort:
+        """A smoke test: the same cases at two demands, some minutes each."""
+        return cls(seeds=seeds, horizon=150.0, densities=(150.0, 350.0))
+
+    def cases(self, study: Study) -> tuple[Case, ...]:
+        """The cases of a study that are run."""
+        chosen = self.densities
+        return tuple(case for case in study.cases if chosen is None or case.density in chosen)
+
+    def runs(self, study: Study) -> list[tuple[Case, Experiment]]:
+        """The runs of a study, seed by seed within each case."""
+        return [
+            (case, case.experiment(seed, self.horizon))
+            for case in self.cases(study)
+            for seed in range(1, min(self.seeds, study.few.get(case.series, self.seeds)) + 1)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What is known about a study.
+
+    Attributes:
+        study: what was asked.
+        effort: how much of it was.
+        rows: one a run found: the columns of a sweep, with those of its `Case`.
+        missing: cases without a successful run.
+    """
+
+    study: Study
+    effort: Effort
+    rows: pd.DataFrame
+    missing: tuple[Case, ...]
+
+    @property
+    def good(self) -> pd.DataFrame:
+        """The rows of runs that did not fail."""
+        return self.rows[self.rows["error"].isna()]
+
+    @property
+    def failed(self) -> pd.DataFrame:
+        """The rows of runs that failed."""
+        return self.rows[self.rows["error"].notna()]
+
+
+def collect(study: Study, effort: Effort, find: Find) -> Results:
+    """Look up every run of a study.
+
+    Args:
+        study: whose cases.
+        effort: which of them, with which seeds and horizon.
+        find: where to look.
+    """
+    import pandas as pd
+
+    runs = effort.runs(study)
+    found = find([experiment for _, experiment in runs])
+    rows = [
+        {**row, **case._asdict()}
+        for (case, _), row in zip(runs, found, strict=True)
+        if row is not None
+    ]
+    done = {tuple(row[key] for key in Case._fields) for row in rows if not row["error"]}
+    columns = None if rows else [*Case._fields, "seed", "error"]
+    return Results(
+        study, effort, pd.DataFrame(rows, columns=columns),
+        tuple(case for case in effort.cases(study) if case not in done),
+    )  # fmt: skip

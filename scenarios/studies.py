@@ -1,0 +1,182 @@
+"""What is simulated for which question: named sets of cases, each repeated over seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from types import MappingProxyType
+from typing import NamedTuple
+
+from minisim.control import Controller
+from minisim.errors import choice
+from scenarios.controllers import controller_named
+from scenarios.experiment import Experiment
+from scenarios.library import five_way, four_way, regular, three_way
+from scenarios.paper import DENSITIES, SPLITS, Cell, controller_of
+from scenarios.paper import scenario as published_scenario
+from scenarios.scenario import Scenario, parse_split
+
+#: Stands for the profile and controller of a published run, see `scenarios.paper`.
+AS_RUN = "as-run"
+
+#: The paper's abbreviations -> our series.
+SERIES: Mapping[str, str] = MappingProxyType(
+    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
+)
+
+#: Published controller and split whose run had a controller that is not here, an actuated signal:
+#: the delay-based one of the text stands in for it.
+NOT_TO_BE_HAD = (("ats", "4:3:2:1"),)
+
+#: Arms of the paper's junctions other than the common four.
+OTHER_ARMS = (3, 5)
+
+
+class Case(NamedTuple):
+    """One point of a figure: everything of a run but its seed and horizon.
+
+    Attributes:
+        profile: by name; `AS_RUN` is whatever the published run of this cell had.
+        series: the line of the figure that the point lies on: the controller that a reader
+            thinks of, such as "dim", whatever variant of it the profile needs.
+        controller: by its command-line name; `AS_RUN` is the published run's.
+        arms: of the junction.
+        split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
+        density: mean inflow a lane [veh/h].
+    """
+
+    profile: str
+    series: str
+    controller: str
+    arms: int
+    split: str
+    density: float
+
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+        """The run of one seed; collisions are counted, for some published rules have them."""
+        if self.profile == AS_RUN:
+            scenario, controller = self._published(horizon)
+        else:
+            scenario = self._drawn(horizon)
+            controller = controller_named(self.controller, self.profile)
+        return Experiment(scenario, controller, seed, label=self.series, on_collision="record")
+
+    def _drawn(self, horizon: float) -> Scenario:
+        makers = {3: three_way, 4: four_way, 5: five_way}
+        shares = None if self.split == "balanced" else parse_split(self.split)
+        options = {"split": shares, "profile": self.profile, "horizon": horizon}
+        if self.arms in makers:
+            return makers[self.arms](self.density, **options)
+        return regular(self.arms, self.density, **options)
+
+    def _published(self, horizon: float) -> tuple[Scenario, Controller]:
+        """What ran, also where that is not what the label says, but for `NOT_TO_BE_HAD`."""
+        name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
+        cell = Cell(self.split, int(self.density), self.arms, name)
+        labelled = (name, self.split) in NOT_TO_BE_HAD
+        scenario = published_scenario(*cell, as_labelled=labelled)
+        return replace(scenario, horizon=horizon), controller_of(*cell, as_labelled=labelled)
+
+    def __str__(self) -> str:
+        return f"{self.series}, {self.arms} arms, {self.split}, {self.density:g} veh/h/lane"
+
+
+@dataclass(frozen=True)
+class Study:
+    """Cases that answer one question.
+
+    Attributes:
+        name: on the command line.
+        question: in one line.
+        cases: without repetition.
+        few: series -> most seeds, where a run costs too much for more.
+    """
+
+    name: str
+    question: str
+    cases: tuple[Case, ...]
+    few: Mapping[str, int] = field(default_factory=dict)
+
+
+def _paper_grid(profile_of: dict[str, tuple[str, str]]) -> tuple[Case, ...]:
+    """The paper's grid: four controllers on four arms, and DIM on three and five.
+
+    `profile_of` gives each series its profile and controller.
+    """
+    four = [
+        Case(*_named(profile_of, series, split), 4, split, float(density))
+        for split, series, density in product(SPLITS, profile_of, DENSITIES)
+    ]
+    others = [
+        Case(*_named(profile_of, "dim", "balanced"), arms, "balanced", float(density))
+        for arms, density in product(OTHER_ARMS, DENSITIES)
+    ]
+    return (*four, *others)
+
+
+def _named(profile_of: dict[str, tuple[str, str]], series: str, split: str) -> tuple[str, str, str]:
+    profile, controller = profile_of[series]
+    if split != "balanced":
+        controller = _UNBALANCED.get(controller, controller)
+    return profile, series, controller
+
+
+#: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
+#: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
+_UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
+
+_TEXT = {
+    "dim": ("paper", "dim"),
+    "fixed-time": ("paper", "fixed-time"),
+    "adaptive": ("paper", "adaptive"),
+    "v2ic": ("paper", "v2ic"),
+}
+_AS_RUN = dict.fromkeys(_TEXT, (AS_RUN, AS_RUN))
+
+#: The published V2I-C decides every 0.01 s and costs some 20 s of CPU a simulated hour, a hundred
+#: times a signal; its runs differ little.
+_FEW = {"v2ic": 3}
+
+#: Everything that is compared on equal terms; the paper's four first.
+RIVALS = (
+    "dim", "dim-harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop", "reservation",
+    "longest-queue",
+)  # fmt: skip
+
+#: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].
+FAIR_DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
+
+#: Rules of priority that need no communication.
+PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
+
+
+def _cases(
+    controllers: Iterable[str], arms: Iterable[int], densities: Iterable[float]
+) -> tuple[Case, ...]:
+    return tuple(
+        Case("fair", name, name, n, "balanced", float(density))
+        for n, name, density in product(arms, controllers, densities)
+    )
+
+
+STUDIES: MappingProxyType[str, Study] = MappingProxyType({
+    study.name: study
+    for study in (
+        Study("text", "What do the paper's rules and parameters give, as its text prescribes them?",
+              _paper_grid(_TEXT)),
+        Study("as-run", "What do the rules and vehicles that produced the published numbers give?",
+              _paper_grid(_AS_RUN), _FEW),
+        Study("fair", "Which controller is best with one vehicle and speed limit for all?",
+              _cases(RIVALS, (4,), FAIR_DENSITIES)),
+        Study("gate", "What does entering beside crossing vehicles in harmony gain?",
+              _cases(("dim", "dim-harmonious"), (3, 4, 5), DENSITIES)),
+        Study("fairness", "Who waits under which rule of priority?",
+              _cases(PRIORITIES, (4,), DENSITIES)),
+    )
+})  # fmt: skip
+
+
+def study_named(name: str) -> Study:
+    """A study by name; raises `InputError` with the nearest one."""
+    return STUDIES[choice("study", name, STUDIES)]

@@ -1,0 +1,118 @@
+"""`minisim figures` and `minisim reproduce`: what they write, and what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from figures.gallery import GALLERY
+from figures.tables import WRITERS
+from minisim.errors import InputError
+from scenarios import reproduction
+from scenarios.archive import MissingRunsError
+from scenarios.capacity import CASES, Search
+from scenarios.cli import main
+from scenarios.reproduction import PARTS, Plan, find_in, reproduce
+from scenarios.results import Effort
+from scenarios.store import Store
+
+
+def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", "--list"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in GALLERY)
+
+
+def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
+    assert main(["figures", "webster", "harmony-3way", "--out", str(tmp_path / "new")]) == 0
+    names = {f"{name}.{suffix}" for name in ("webster", "harmony-3way") for suffix in WRITERS}
+    assert {file.name for file in (tmp_path / "new").iterdir()} == names
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["figures", "maps", "fairnes"], "did you mean 'fairness'"),
+        (["figures", "webster", "gate"], "gate: drawn from results; give them with --store"),
+        (["figures", "webster", "--store", "STORE"], "there is no store"),
+        (["figures", "--seeds", "1"], "seeds must be an integer 2 … 10000, got 1"),
+        (["reproduce", "--seeds", "1"], "seeds must be an integer"),
+        (["reproduce", "--jobs", "0"], "--jobs must be an integer 1 … 1024, got 0"),
+        (["reproduce", "--only", "fare"], "did you mean 'fair'"),
+    ],
+)
+def test_refused_before_anything_is_written(
+    arguments: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [a.replace("STORE", str(tmp_path / "runs.sqlite")) for a in arguments]
+    folder = tmp_path / "out"
+    assert main([*arguments, "--out", str(folder)]) == 2
+    error = capsys.readouterr().err
+    assert why in error
+    assert error.count("\n") == 1
+    assert not folder.exists()
+    assert not (tmp_path / "runs.sqlite").exists()
+
+
+def test_an_empty_store_says_what_makes_its_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = tmp_path / "runs.sqlite"
+    Store(store).close()
+    assert main(["figures", "gate", "--store", str(store), "--out", str(tmp_path)]) == 2
+    assert "minisim reproduce --seeds 10" in capsys.readouterr().err
+
+
+TINY = Plan(
+    effort=Effort(seeds=2, horizon=100.0, densities=(350.0,)),
+    search=Search(step=400.0, steps=2, seeds=1, horizon=100.0),
+    parts=("fairness", "capacity"),
+)
+
+
+def test_reproduce_computes_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduction, "CASES", CASES[:2])
+    seen: list[tuple[int, int]] = []
+    with Store(tmp_path / "runs.sqlite") as store:
+        first = reproduce(TINY, store, 1, lambda done, total: seen.append((done, total)))
+        again = reproduce(TINY, store, 1, lambda done, total: None)
+        archive = TINY.archive(find_in(store))
+        assert archive.study("fairness").missing == ()
+        with pytest.raises(MissingRunsError):
+            archive.need("text")
+    assert [(part.name, part.runs, part.computed) for part in first] == [
+        ("fairness", 6, 6), ("capacity", 2, 2),
+    ]  # fmt: skip
+    assert [part.computed for part in again] == [0, 0]
+    assert seen[5] == (6, 6)
+    assert seen[-1] == (2, 2)
+    assert first[0].hours == pytest.approx(6 * 100 / 3600)
+    assert not any(part.failed for part in first)
+
+
+def test_plans() -> None:
+    assert Plan.of().effort == Effort()
+    assert Plan.of().parts == PARTS
+    assert Plan.of(quick=True, seeds=3).effort.seeds == 3
+    assert Plan.of(parts=["text"]).parts == ("text",)
+    with pytest.raises(InputError, match="did you mean 'text'"):
+        Plan.of(parts=["texts"])
+
+
+@pytest.mark.slow
+def test_reproduce_quick_from_nothing(tmp_path: Path) -> None:
+    """The same code path as the full run; every figure, and a report that links them."""
+    assert main(["reproduce", "--quick", "--jobs", "2", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "A smoke test" in text
+    assert "## Failed runs\n\nNone." in text
+    for name in GALLERY:
+        assert list((tmp_path / "figures").glob(f"{name}.*"))
+    files = [str(tmp_path / "runs.sqlite"), str(tmp_path / "again")]
+    assert main(["figures", "gate", "--quick", "--store", files[0], "--out", files[1]]) == 0
+    for suffix in ("png", "pdf", "svg"):
+        one, two = (tmp_path / folder / f"gate.{suffix}" for folder in ("figures", "again"))
+        assert one.read_bytes() == two.read_bytes()
