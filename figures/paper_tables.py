@@ -16,7 +16,7 @@ from figures.tables import Table
 from minisim.geometry import ARM_NAMES
 from scenarios.archive import Archive
 from scenarios.comparison import causes, compare, score
-from scenarios.library import five_way, four_way, three_way
+from scenarios.library import MAKERS
 from scenarios.statistics import Interval
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def webster_table() -> Table:
 
 def harmony_table(arms: int) -> Table:
     """The harmony matrix: as published, and whether the geometry says the same."""
-    site = {3: three_way, 4: four_way, 5: five_way}[arms]().site()
+    site = MAKERS[arms]().site()
     ours = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     paper = HarmonyMatrix.paper(arms)
     different = {pair for a, b in ours.disagreements(paper) for pair in ((a, b), (b, a))}

@@ -21,7 +21,8 @@ from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.paper import MAKERS, Cell, replay
+from scenarios.library import MAKERS
+from scenarios.paper import Cell, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
 from tests.runs import Fixed, replayed
 

@@ -11,7 +11,7 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
-from scenarios import Scenario, five_way, four_way, paper, three_way
+from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.cells import AVERAGED, CELL, cells, differences
 from scenarios.controllers import controller_named
 from scenarios.experiment import RESULTS, Experiment, canonical, run_experiment
@@ -228,23 +228,6 @@ def test_equal_numbers_are_one_experiment() -> None:
 def test_what_has_no_canonical_form(odd: object) -> None:
     with pytest.raises(InputError, match="cannot be stored"):
         canonical(odd)
-
-
-def test_the_papers_grid() -> None:
-    four = ("dim", "fixed-time", "dim-lanes", "dim-harmonious")  # four names, whichever
-    grid = paper.experiments(controllers=four)
-    assert len(grid) == 700
-    assert len({experiment.key for experiment in grid}) == 700
-    rows = pd.DataFrame([experiment.identity() for experiment in grid])
-    assert rows.groupby("arms").size().to_dict() == {3: 50, 4: 600, 5: 50}
-    assert set(rows[rows["arms"] != 4]["controller"]) == {"dim"}
-    assert sorted(set(rows["split"])) == ["4:1:4:1", "4:3:2:1", "balanced"]
-    assert sorted(set(rows["density"])) == [150, 200, 250, 300, 350]
-    unbalanced = [e for e in grid if e.scenario.demand.split == (4, 1, 4, 1) and e.name == "dim"]
-    controller = unbalanced[0].controller
-    assert isinstance(controller, Dim)
-    # "the highest being the one with the maximum incoming traffic": a, c, then b, d.
-    assert controller.ranks(unbalanced[0].scenario.site()) == (0, 2, 1, 3)
 
 
 @pytest.mark.parametrize(

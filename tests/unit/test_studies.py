@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines import FixedTime
+from dim import Dim
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.capacity import Search, capacities, grows
@@ -38,6 +39,18 @@ def test_the_paper_s_grid_is_700_hours(name: str) -> None:
     published_cells = published()[["series", "arms", "split", "density"]].drop_duplicates()
     wanted = {tuple(row) for row in published_cells.itertuples(index=False)}
     assert {(c.series, c.arms, c.split, c.density) for c in cases} == wanted
+    runs = STUDIES[name].runs(10)
+    assert len({experiment.key for _, experiment in runs}) == len(runs)
+    assert len(runs) == 700 - 7 * sum(c.series in STUDIES[name].few for c in cases)
+
+
+def test_priorities_by_inflow_where_the_text_has_them() -> None:
+    """The highest is that "with the maximum incoming traffic": a and c, then b and d."""
+    wanted = Case("paper", "dim", "dim-inflow", 4, "4:1:4:1", 200.0)
+    assert wanted in STUDIES["text"].cases
+    experiment = wanted.experiment(1)
+    assert isinstance(experiment.controller, Dim)
+    assert experiment.controller.ranks(experiment.scenario.site()) == (0, 2, 1, 3)
 
 
 def test_the_as_run_study_runs_what_ran() -> None:
