@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
+from statistics import stdev
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
@@ -66,20 +67,15 @@ def _ours(cell: pd.DataFrame | None, column: str, paper: float) -> dict[str, obj
     if cell is None or not values:
         return {"seeds": 0, "mean": math.nan, "sd": math.nan, "low": math.nan, "high": math.nan,
                 "inside": None, "saturated": None}  # fmt: skip
-    mean = math.fsum(values) / len(values)
     one = len(values) == 1
-    sd = math.nan if one else _deviation(values, mean)
-    half = prediction_interval(values).half_width
+    sd = math.nan if one else stdev(values)
+    mean, half, _ = prediction_interval(values)
     low, high = mean - half, mean + half
     return {
         "seeds": len(values), "mean": mean, "sd": sd, "low": low, "high": high,
         "inside": None if one else bool(low <= paper <= high),
         "saturated": saturated(cell),
     }  # fmt: skip
-
-
-def _deviation(values: list[float], mean: float) -> float:
-    return math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (len(values) - 1))
 
 
 class Score(NamedTuple):

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, items, numbers
+from scenarios.cells import pairs
 from scenarios.statistics import Interval, mean_interval
 
 if TYPE_CHECKING:
@@ -112,19 +113,15 @@ def paired_differences(
     """Differences of `metric`, ours minus theirs, at each density, one a common seed.
 
     Args:
-        rows: columns `series`, `density`, `seed` and the metric; failed runs have no metric.
+        rows: of a study (`scenarios.results`), with the metric.
         ours, theirs: series.
         metric: a column.
+
+    Raises:
+        InputError: two runs of one seed with other arrivals.
     """
-    table = rows.pivot_table(index=["density", "seed"], columns="series", values=metric)
-    if not {ours, theirs} <= set(table.columns):
-        return {}
-    gap = (table[ours] - table[theirs]).dropna()
-    return {
-        float(str(density)): values.tolist()
-        for density, values in gap.groupby(level="density")
-        if len(values) > 1
-    }
+    found = pairs(rows, metric, "series", (ours, theirs), ["density"])
+    return {float(density): values for (density,), values in found.items() if len(values) > 1}
 
 
 def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:

@@ -12,13 +12,12 @@ import pytest
 from dim import Dim
 from minisim.errors import InputError
 from scenarios import Scenario, five_way, four_way, three_way
-from scenarios.cells import AVERAGED, CELL, cells, differences
+from scenarios.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.controllers import controller_named
 from scenarios.experiment import RESULTS, Experiment, canonical, run_experiment
 from scenarios.statistics import (
     growing,
     mean_interval,
-    paired_difference,
     prediction_interval,
     queue_growth,
 )
@@ -45,15 +44,6 @@ def test_prediction_interval_holds_the_next_value_as_often_as_it_says() -> None:
         inside += abs(new - mean) <= half_width
     # Binomial(2000, 0.95): sd 9.7; four of them are a false alarm of 6e-5.
     assert inside == pytest.approx(1900, abs=39)
-
-
-def test_pairs_cancel_what_they_share() -> None:
-    shared = np.random.default_rng(1).normal(0, 100, 8)
-    interval = paired_difference((shared + 5).tolist(), shared.tolist())
-    assert interval.mean == pytest.approx(5)
-    assert interval.half_width == pytest.approx(0, abs=1e-9)
-    with pytest.raises(InputError, match="3 values cannot be paired with 2"):
-        paired_difference([1, 2, 3], [1, 2])
 
 
 # --- growing queues --------------------------------------------------------------------------
@@ -200,6 +190,16 @@ def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
     expected = (values["dim"] - values["dim-harmonious"]).mean()
     assert found["difference"][1] == pytest.approx(expected)
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
+
+
+def test_pairs_cancel_what_they_share() -> None:
+    shared = np.random.default_rng(1).normal(0, 100, 8)
+    frame = pd.DataFrame({
+        "who": ["x"] * 8 + ["y"] * 8, "m": [*(shared + 5), *shared[::-1]], "where": 1,
+        "seed": [*range(8), *range(7, -1, -1)], "arrivals": "same", "error": None,
+    })  # fmt: skip
+    found = pairs(frame, "m", "who", ("x", "y"), ["where"])
+    assert found == {(1,): pytest.approx([5.0] * 8)}
 
 
 def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:

@@ -190,7 +190,7 @@ def test_crossing_refuses() -> None:
 def test_differences_are_paired_by_seed() -> None:
     rows = pd.DataFrame({
         "series": ["dim"] * 3 + ["x"] * 3, "density": [150.0] * 6, "seed": [1, 2, 3, 3, 2, 4],
-        "m": [1.0, 2.0, 3.0, 30.0, 20.0, 40.0],
+        "m": [1.0, 2.0, 3.0, 30.0, 20.0, 40.0], "arrivals": "same", "error": None,
     })  # fmt: skip
     assert paired_differences(rows, "dim", "x", "m") == {150.0: [-18.0, -27.0]}
     assert paired_differences(rows, "dim", "nobody", "m") == {}
