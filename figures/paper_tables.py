@@ -138,7 +138,9 @@ def loss_table(archive: Archive) -> Table:
         tuple(crossing_rows(losses(archive))), labels=2,
         notes=(
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
-            "linear between the demands tried. “a to b”: worse between a and b only.",
+            "linear between the demands tried, 50 to 800. “a to b”: worse between a and b only, "
+            "for beyond the capacity of both their order may turn again. “never”: at no demand in "
+            "the mean; an interval “from c” then says that from c on it may be.",
         ),
     )  # fmt: skip
 
@@ -168,9 +170,9 @@ def capacity_table(archive: Archive) -> Table:
 
 
 _EXPLAINED = (
-    "* not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
+    "† not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
     "depends on the horizon. Inside: the paper's single run lies within our 95 % prediction "
-    "interval."
+    "interval; where that is wide, it says little."
 )
 
 
@@ -193,7 +195,7 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
 
 
 def _mark(row: Mapping[Any, Any]) -> str:
-    return "" if row["comparable"] == "yes" else " *"
+    return "" if row["comparable"] == "yes" else " †"
 
 
 def _ours(row: Mapping[Any, Any]) -> str:

@@ -41,13 +41,14 @@ class Crossing(NamedTuple):
     until: float
 
     def __str__(self) -> str:
-        return f"{self.point} ({self.interval})"
+        bounded = math.isfinite(self.low) or math.isfinite(self.high)
+        return f"{self.point} ({self.interval})" if bounded else self.point
 
     @property
     def point(self) -> str:
         """The demand in words."""
         if self.density == -math.inf:
-            return "from the lowest on"
+            return "all" if self.until == math.inf else f"up to {self.until:.0f}"
         if self.density == math.inf:
             return "never"
         end = "" if self.until == math.inf else f" to {self.until:.0f}"
