@@ -75,7 +75,8 @@ def number(
     Raises:
         InputError: not a real number, not finite, or out of range.
     """
-    if isinstance(value, bool) or not isinstance(value, Real):
+    # The plain types first: an abstract one is slow to ask, and every command comes by here.
+    if isinstance(value, bool) or not isinstance(value, (float, int, Real)):
         raise InputError(f"{name} must be a number, got {show(value)}")
     try:
         result = float(value)
@@ -90,7 +91,7 @@ def number(
 def integer(name: str, value: object, *, low: int, high: int | None = None) -> int:
     """Return `value` as an int inside [low, high], or raise `InputError`."""
     allowed = f"an integer of at least {low}" if high is None else f"an integer {low} … {high}"
-    if isinstance(value, bool) or not isinstance(value, Integral):
+    if isinstance(value, bool) or not isinstance(value, (int, Integral)):
         raise InputError(f"{name} must be {allowed}, got {show(value)}")
     result = int(value)
     if result < low or (high is not None and result > high):
