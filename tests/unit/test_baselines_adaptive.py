@@ -9,8 +9,8 @@ import pytest
 
 import minisim
 from baselines import Adaptive, FixedTime
-from baselines.actuated import ActuatedSession, Verdict
 from baselines.adaptive import DelayRule, time_loss
+from baselines.phases import PhaseSession, Verdict
 from minisim.control import Observed, View
 from minisim.errors import InputError
 from minisim.testing import small_scenario
@@ -67,8 +67,8 @@ def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
     class Red:
         name = "red"
 
-        def start(self, site: Any) -> ActuatedSession:
-            return ActuatedSession(
+        def start(self, site: Any) -> PhaseSession:
+            return PhaseSession(
                 site, Watching(Adaptive(), site), detector_range=100.0, wake_on_detector=True,
                 min_green=0.5, amber=0.0,
             )  # fmt: skip
