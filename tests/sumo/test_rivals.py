@@ -1,7 +1,8 @@
 """Our fixed-time, adaptive and actuated signals and all-way stop against SUMO's, same arrivals.
 
 SUMO runs alone here: its junction, drawn by netconvert, its `static`, `delay_based` and `actuated`
-programs, its `allway_stop`, its vehicles. Three things differ from ours by nature; each is tested on its own:
+programs, its `allway_stop`, its vehicles.
+Three things differ from ours by nature; each is tested on its own:
 
 - SUMO's IDM creeps up to a red light, some 4 s longer than a vehicle that brakes comfortably when
   it must (as SUMO's Krauss and our hold lines do). Creeping is no waiting, though it takes as long.
