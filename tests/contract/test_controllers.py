@@ -56,7 +56,6 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(equal_greens=True, max_cycle=90.0),
     Adaptive(),
     Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
-    Adaptive(order=(1, 0, 2)),
     Actuated(),
     Actuated(amber=0.0, min_green=0.5, max_green=8.0, max_gap=1.0),
     LongestQueue(),
