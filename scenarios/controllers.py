@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation, V2ICAsRun
+from baselines import (
+    V2IC,
+    Actuated,
+    Adaptive,
+    AllWayStop,
+    FixedTime,
+    LongestQueue,
+    Reservation,
+    V2ICAsRun,
+)
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -37,6 +46,7 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
     "adaptive": lambda _: Adaptive(),
+    "actuated": lambda _: Actuated(),
     "all-way-stop": lambda _: AllWayStop(),
     "longest-queue": lambda _: LongestQueue(),
     "v2ic": _v2ic,

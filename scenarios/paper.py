@@ -12,7 +12,7 @@ from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING, NamedTuple
 
-from baselines import FixedTime
+from baselines import Actuated, Adaptive, FixedTime
 from dim import AsRunDim
 from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
@@ -188,12 +188,15 @@ def controller_of(
     """What decided in a published run, or would have by its label.
 
     Raises:
-        InputError: no such cell, or its controller is not to be had.
+        InputError: no such cell.
     """
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     if cell.controller == "fts":
         return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
+    if cell.controller == "ats":
+        signal = Actuated if ran.controller == "actuated" else Adaptive
+        return signal(order=PHASES)
     if cell.controller == "dim" and cell.split == RENAMED:
         return AsRunDim(names=RENAMED_ARMS)
     return controller_named(ran.controller or LABELS[cell.controller][0], _profile(cell, ran))

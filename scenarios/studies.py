@@ -25,10 +25,6 @@ SERIES: Mapping[str, str] = MappingProxyType(
     {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
 )
 
-#: Published controller and split whose run had a controller that is not here, an actuated signal:
-#: the delay-based one of the text stands in for it.
-NOT_TO_BE_HAD = (("ats", "4:3:2:1"),)
-
 #: Arms of the paper's junctions other than the common four.
 OTHER_ARMS = (3, 5)
 
@@ -71,12 +67,10 @@ class Case(NamedTuple):
         return regular(self.arms, self.density, **options)
 
     def _published(self, horizon: float) -> tuple[Scenario, Controller]:
-        """What ran, also where that is not what the label says, but for `NOT_TO_BE_HAD`."""
+        """What ran, also where that is not what the label says."""
         name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
         cell = Cell(self.split, int(self.density), self.arms, name)
-        labelled = (name, self.split) in NOT_TO_BE_HAD
-        scenario = published_scenario(*cell, as_labelled=labelled)
-        return replace(scenario, horizon=horizon), controller_of(*cell, as_labelled=labelled)
+        return replace(published_scenario(*cell), horizon=horizon), controller_of(*cell)
 
     def __str__(self) -> str:
         return f"{self.series}, {self.arms} arms, {self.split}, {self.density:g} veh/h/lane"

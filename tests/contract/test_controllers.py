@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -56,6 +56,8 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(equal_greens=True, max_cycle=90.0),
     Adaptive(),
     Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
+    Actuated(),
+    Actuated(amber=0.0, min_green=0.5, max_green=8.0, max_gap=1.0),
     LongestQueue(),
     LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
     AllWayStop(),
