@@ -323,7 +323,12 @@ def test_replays_are_judged_by_the_papers_means() -> None:
         "0 of 1 cells: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
         "SUMO meets the paper in 0 of 1"
     )
-    assert result(Case(four_way(), "dim"), pair()).meets_paper("minisim") is None
+    text = markdown([judged], "x", {})
+    row = "| dim | 4 | balanced | 150 | 0.75 | 0.75 | 0.71 | 66.40 | 66.60 | 65.94 | 0.0 % | yes |"
+    assert row in text
+    drawn = result(Case(four_way(), "dim"), pair())
+    assert drawn.meets_paper("minisim") is None
+    assert "Against the paper" not in markdown([drawn], "x", {})
 
 
 def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
