@@ -43,6 +43,7 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-paper-commit": lambda _: Dim(commit="paper"),
     "dim-as-run": lambda _: AsRunDim(),
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
+    "dim-as-run-exit-14": lambda _: AsRunDim(exit_speed=14.0),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
     "adaptive": lambda _: Adaptive(),
