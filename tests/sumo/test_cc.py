@@ -23,7 +23,7 @@ from scenarios import four_way
 from scenarios.cli import main
 from scenarios.paper import MAKERS, Cell, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
-from tests.runs import Fixed, replayed
+from tests.runs import Fixed, as_run, replayed
 
 AS_RUN_FOUR = four_way(profile="as_run")
 
@@ -109,19 +109,15 @@ def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
 
 
-def test_the_contract_holds_with_the_vehicle_of_the_published_runs() -> None:
-    """`check_controller` has vehicles of its own; here they are those of the profile.
-
-    `AsRunDim` is outside the contract in every host: it still advises vehicles that have left its
-    view, as the authors' driver does.
-    """
+@pytest.mark.parametrize("controller", [FixedTime(), AsRunDim()], ids=lambda c: c.name)
+def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: Controller) -> None:
+    """`check_controller` has vehicles of its own; here they are those of the profile."""
 
     def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
-        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=0.05, depart_speed=0.0)
-        return simulate(small, controller, seed, **options)
+        return simulate(as_run(scenario), controller, seed, **options)
 
     check_controller(
-        FixedTime(), arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
+        controller, arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
     )
 
 
