@@ -154,8 +154,13 @@ def meet(
         behind = ends[q, 0] - law.entry - meetings[q, p, 1] - (driven - law.length)
         past = behind + waits[p, 1] < 0.0
         leaves = wait if kind == PART and wait > 0.0 else ends[q, 0] - law.entry
-        in_the_way = behind < law.length and driven < leaves and (
-            (not past and to_meeting > 0.0) or (kind == JOIN and to_meeting > behind - law.length)
+        in_the_way = (
+            behind < law.length
+            and driven < leaves
+            and (
+                (not past and to_meeting > 0.0)
+                or (kind == JOIN and to_meeting > behind - law.length)
+            )
         )
         if to_meeting < -POSITION_EPS and not in_the_way:
             continue

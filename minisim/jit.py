@@ -54,7 +54,7 @@ def _compile(function: _F, inline: Literal["never", "always"]) -> _F:
         return function
     import numba
 
-    compiled = numba.njit(error_model="numpy", inline=inline)(function)
+    compiled: Any = numba.njit(error_model="numpy", inline=inline)(function)
     compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
     return cast(_F, compiled)
 
@@ -63,11 +63,11 @@ def _compile(function: _F, inline: Literal["never", "always"]) -> _F:
 def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
 
-    class SourcesCache(FunctionCache):  # type: ignore[misc]
+    class SourcesCache(FunctionCache):
         """numba's cache on disk; what is there counts only if none of our sources has changed."""
 
         def __init__(self, function: Callable[..., object]) -> None:
-            super().__init__(function)
+            super().__init__(function)  # type: ignore[no-untyped-call]
             folder = Path(inspect.getfile(function)).parent
             self._cache_file._source_stamp = {_digest(folder), _digest(Path(__file__).parent)}
 
