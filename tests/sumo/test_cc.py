@@ -21,9 +21,9 @@ from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
 from scenarios import five_way, four_way
 from scenarios.cli import main
-from scenarios.paper import MAKERS, Cell, replay
+from scenarios.paper import MAKERS, Cell, controller_of, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
-from tests.runs import Fixed, replayed
+from tests.runs import Fixed, as_run, replayed
 
 AS_RUN_FOUR = four_way(profile="as_run")
 
@@ -91,37 +91,41 @@ def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
         assert (apart <= 0.1 + 1e-9).all()
 
 
+#: Share of the trips whose waiting and travel times are both within 0.1 s in the two hosts, at
+#: least. The issue asks for 0.9; five arms part late in the hour (docs/fidelity.md).
+SHARES = {
+    Cell("balanced", 150, 3): 1.0,
+    Cell("balanced", 350, 3): 0.99,
+    **{Cell("balanced", density, 4): 1.0 for density in (150, 200, 250, 300)},
+    Cell("balanced", 350, 4): 0.99,
+    Cell("4:3:2:1", 350, 4): 0.99,
+    Cell("4:1:4:1", 350, 4): 0.99,
+    Cell("balanced", 350, 5): 0.95,
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "cell",
-    [Cell("balanced", density, 4) for density in (150, 200, 250, 300)] + [Cell("balanced", 150, 3)],
-    ids=str,
-)
+@pytest.mark.parametrize("cell", SHARES, ids=str)
 def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
-    """The issue asks for 90 % of the trips within 0.1 s."""
-    ours, theirs = both(replay(*cell), AsRunDim())
+    ours, theirs = both(replay(*cell), controller_of(*cell))
     ended = ours.columns.arrived & theirs.columns.arrived
     close = np.ones(ended.sum(), bool)
     for metric in ("travel_time_s", "waiting_time_s"):
         apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
         close &= apart <= 0.1 + 1e-9
-    assert close.mean() >= 0.99
+    assert close.mean() >= SHARES[cell]
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
 
 
-def test_the_contract_holds_with_the_vehicle_of_the_published_runs() -> None:
-    """`check_controller` has vehicles of its own; here they are those of the profile.
-
-    `AsRunDim` is outside the contract in every host: it still advises vehicles that have left its
-    view, as the authors' driver does.
-    """
+@pytest.mark.parametrize("controller", [FixedTime(), AsRunDim()], ids=lambda c: c.name)
+def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: Controller) -> None:
+    """`check_controller` has vehicles of its own; here they are those of the profile."""
 
     def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
-        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=0.05, depart_speed=0.0)
-        return simulate(small, controller, seed, **options)
+        return simulate(as_run(scenario), controller, seed, **options)
 
     check_controller(
-        FixedTime(), arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
+        controller, arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
     )
 
 
