@@ -1,5 +1,6 @@
 """What DIM is compared with: controllers that need infrastructure or a fixed rule."""
 
+from baselines.actuated import Actuated
 from baselines.adaptive import Adaptive
 from baselines.all_way_stop import AllWayStop
 from baselines.fixed_time import FixedTime
@@ -11,6 +12,7 @@ from baselines.webster import SignalTiming, webster, webster_delay
 
 __all__ = [
     "V2IC",
+    "Actuated",
     "Adaptive",
     "AllWayStop",
     "FixedTime",

@@ -1,115 +1,132 @@
-"""What signals share whose phases last as long as their rule says: one phase an approach.
+"""The actuated signal: a green lasts until a gap in the traffic over a detector.
 
-Between two phases the old lane shows amber, and the new one turns green when nobody who crosses
-its way is left (`Heads`). The time of a phase runs from the green that is really shown, so that a
-shortest and a longest green mean what drivers see.
+The rule of SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
+has one successor; all constants are its defaults.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
 
-from baselines.signals import Colour, Heads, stopping_sight
-from minisim.control import Command, Observed, Plan, Site, View, Wake
+from baselines.phases import PhaseSession, Verdict, following
+from baselines.signals import full_order, lane_order
+from minisim.control import Site, View
+from minisim.errors import InputError, instance, number
+
+#: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
+PLACE = 7.5
+#: Room for rounding where a mark is passed [m], and where an end is a whole second [s].
+ROUNDING = 1e-6
 
 
-class Verdict(NamedTuple):
-    """What a rule says of the present phase.
+@dataclass(frozen=True)
+class Actuated:
+    """A signal that prolongs a green while vehicles follow each other closely enough.
+
+    One phase an approach, in a fixed order; none is left out. Each lane has a loop before the
+    junction. While the last vehicle left it less than `max_gap` ago, the green goes on: for what
+    is left of `detector_gap`, in which that vehicle reaches the line, up to a whole second of the
+    phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
+    beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
+
+    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
+    its way.
 
     Attributes:
-        lane: whose turn it is; another one than now ends the phase.
-        after: look again after so many seconds; it does not matter when the phase ends.
+        max_gap: between two vehicles [s]; a longer one ends the green.
+        detector_gap: from the loop to the line at the speed limit [s]; the loop is nearer where
+            those between it and the line could not all leave within `min_green`.
+        passing_time: of a waiting vehicle over the line [s].
+        min_green: [s]; the authors' network (`minDur`).
+        max_green: [s]; the authors' network (`maxDur`).
+        amber: [s]; the authors' network.
+        order: the lanes in the order of their greens; None is a, b, c…
+        name: short name.
     """
 
-    lane: int
-    after: float
+    max_gap: float = 3.0
+    detector_gap: float = 2.0
+    passing_time: float = 1.9
+    min_green: float = 3.0
+    max_green: float = 50.0
+    amber: float = 2.0
+    order: tuple[int, ...] | None = None
+    name: str = "actuated"
+
+    def __post_init__(self) -> None:
+        number("max_gap [s]", self.max_gap, low=0, high=3600)
+        number("detector_gap [s]", self.detector_gap, above=0, high=3600)
+        number("passing_time [s]", self.passing_time, low=0.1, high=60)
+        number("min_green [s]", self.min_green, low=0.5, high=3600)
+        number("max_green [s]", self.max_green, low=0.5, high=3600)
+        if self.max_green < self.min_green:
+            raise InputError(
+                f"max_green must be at least min_green, {self.min_green:g} s, "
+                f"got {self.max_green:g} s"
+            )
+        number("amber [s]", self.amber, low=0, high=60)
+        object.__setattr__(self, "order", lane_order(self.order))
+        instance("name", self.name, str)
+
+    def detector(self, site: Site) -> float:
+        """How far the loops are before the junction entry [m]."""
+        waiting = (self.min_green / self.passing_time + 0.5) * PLACE
+        return min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
+
+    def start(self, site: Site) -> PhaseSession:
+        """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
+        rule = GapRule(self, site)
+        return PhaseSession(
+            site,
+            rule,
+            detector_range=rule.detector,
+            marks=(rule.detector - site.vehicle.length,),
+            min_green=self.min_green,
+            amber=self.amber,
+            first=rule.order[0],
+        )
 
 
-class Rule(Protocol):
-    """When a phase ends, and which is next; it may remember what it has seen."""
+class GapRule:
+    """When the last vehicle left a lane's loop, and whether that was too long ago.
+
+    Attributes:
+        detector: how far the loops are before the junction entry [m].
+        order: the lanes in the order of their greens.
+    """
+
+    def __init__(self, signal: Actuated, site: Site) -> None:
+        self._signal = signal
+        self._dt = site.dt
+        self.detector = signal.detector(site)
+        self.order = full_order(signal.order, site.intersection.n)
+        self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
+        self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Take note of a view; called at every wake-up."""
+        """Note who has left a loop since the last view; each mark is passed within one step."""
+        free = self.detector + ROUNDING
+        passed = [v for v in view.vehicles if v.distance + v.length <= free]
+        for v in passed:
+            if v.id not in self._passed:
+                self._left[v.lane] = view.time
+        self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Say how it goes on with the phase of `lane`, green for `elapsed` seconds."""
+        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        signal, gap = self._signal, self._gap(view, lane)
+        if elapsed >= signal.max_green or gap >= signal.max_gap:
+            return Verdict(following(self.order, lane), 0.0)
+        more = max(signal.min_green - elapsed, signal.detector_gap - gap, self._dt)
+        end = math.ceil(elapsed + more - ROUNDING)
+        return Verdict(lane, min(end, signal.max_green) - elapsed)
 
-
-class ActuatedSession:
-    """Shows green to one lane at a time, as a rule tells.
-
-    It is called when its rule asked for it, when somebody clears the junction, and, where the rule
-    wants it, when somebody comes onto a detector.
-
-    Args:
-        site: of the run.
-        rule: when a phase ends, and which is next; the first is lane a.
-        detector_range: how far before the junction the rule sees [m].
-        wake_on_detector: whether the rule must see everybody at the moment when he comes there.
-        min_green: the rule is asked that long after a phase has begun [s].
-        amber: [s].
-    """
-
-    def __init__(
-        self,
-        site: Site,
-        rule: Rule,
-        *,
-        detector_range: float,
-        wake_on_detector: bool,
-        min_green: float,
-        amber: float,
-    ) -> None:
-        self.plan = Plan(
-            marks=(detector_range,) if wake_on_detector else (),
-            wake_on_clear=True,
-            sight=max(detector_range, stopping_sight(site)),
-        )
-        self._rule = rule
-        self._heads = Heads(site)
-        self._dt = site.dt
-        self._lanes = site.intersection.n
-        self._min_green, self._amber = min_green, amber
-        self._lane = self._next = 0
-        self._colour = Colour.GREEN
-        self._began: float | None = None  # when the lane's head turned green
-        self._due = math.inf
-
-    def decide(self, view: View) -> Iterable[Command]:
-        """End the phase or the amber if it is time, and turn the heads.
-
-        Timers ring on whole steps: what is less than half a step away is due.
-        """
-        self._rule.see(view)
-        if view.time + self._dt / 2.0 >= self._due:
-            self._go_on(view)
-        wanted = [Colour.RED] * self._lanes
-        wanted[self._lane] = self._colour
-        commands = self._heads.show(view, wanted)
-        if self._began is None and self._heads.colours[self._lane] is Colour.GREEN:
-            self._began = view.time
-            self._due = view.time + self._min_green
-        return commands if math.isinf(self._due) else [*commands, Wake(self._due)]
-
-    def _go_on(self, view: View) -> None:
-        if self._began is None:  # the amber is over; the green comes when the way is clear
-            self._lane, self._colour, self._due = self._next, Colour.GREEN, math.inf
-            return
-        # Views tell the time to a microsecond.
-        verdict = self._rule.judge(view, self._lane, round(view.time - self._began, 6))
-        if verdict.lane == self._lane:
-            self._due = view.time + max(verdict.after, self._dt)
-            return
-        self._next, self._began = verdict.lane, None
-        if self._amber > 0.0:
-            self._colour = Colour.AMBER
-            self._due = view.time + max(self._amber, self._dt)
-        else:
-            self._go_on(view)
-
-
-def on_detector(view: View, detector_range: float) -> list[Observed]:
-    """Vehicles with any part on the last `detector_range` metres of an approach lane."""
-    return [v for v in view.vehicles if -v.length < v.distance <= detector_range]
+    def _gap(self, view: View, lane: int) -> float:
+        """Time since the lane's loop has been free [s]."""
+        if any(
+            v.lane == lane and v.distance <= self.detector and v.id not in self._passed
+            for v in view.vehicles
+        ):
+            return 0.0
+        return view.time - self._left[lane]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from baselines.actuated import ActuatedSession, Verdict, on_detector
+from baselines.phases import PhaseSession, Verdict, following, on_detector
+from baselines.signals import full_order, lane_order
 from minisim.control import Observed, Site, View
 from minisim.errors import InputError, instance, number
 
@@ -20,7 +21,7 @@ IDLE = 1.0
 class Adaptive:
     """A signal that prolongs a green for vehicles that have lost time before the junction.
 
-    One phase an approach, in the order a, b, c…; none is left out. A vehicle that has lost more
+    One phase an approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
     it takes to the stop line at the speed limit, if that is before `max_green`. While nobody is on
     the other lanes, a green goes on too.
@@ -36,6 +37,7 @@ class Adaptive:
         extend_max_green: while nobody is on the other lanes, a green may last longer than
             `max_green` (SUMO's `extendMaxDur`, off there as here).
         amber: [s]; the authors' network.
+        order: the lanes in the order of their greens; None is a, b, c…
         name: short name.
     """
 
@@ -45,6 +47,7 @@ class Adaptive:
     max_green: float = 50.0
     extend_max_green: bool = False
     amber: float = 2.0
+    order: tuple[int, ...] | None = None
     name: str = "adaptive"
 
     def __post_init__(self) -> None:
@@ -59,27 +62,34 @@ class Adaptive:
             )
         instance("extend_max_green", self.extend_max_green, bool)
         number("amber [s]", self.amber, low=0, high=60)
+        object.__setattr__(self, "order", lane_order(self.order))
         instance("name", self.name, str)
 
-    def start(self, site: Site) -> ActuatedSession:
-        """Begin a run."""
-        return ActuatedSession(
+    def start(self, site: Site) -> PhaseSession:
+        """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
+        rule = DelayRule(self, site)
+        return PhaseSession(
             site,
-            DelayRule(self, site),
+            rule,
             detector_range=self.detector_range,
-            wake_on_detector=True,
+            marks=(self.detector_range,),
             min_green=self.min_green,
             amber=self.amber,
+            first=rule.order[0],
         )
 
 
 class DelayRule:
-    """Which vehicles prolong a green, and by how much."""
+    """Which vehicles prolong a green, and by how much.
+
+    Attributes:
+        order: the lanes in the order of their greens.
+    """
 
     def __init__(self, signal: Adaptive, site: Site) -> None:
         self._signal = signal
         self._speed_limit = site.speed_limit
-        self._lanes = site.intersection.n
+        self.order = full_order(signal.order, site.intersection.n)
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
@@ -106,7 +116,7 @@ class DelayRule:
             prolongation = min(prolongation, signal.max_green - elapsed)
         if prolongation > 0.0:
             return Verdict(lane, prolongation)
-        return Verdict((lane + 1) % self._lanes, 0.0)
+        return Verdict(following(self.order, lane), 0.0)
 
     def _is_delayed(self, vehicle: Observed, now: float) -> bool:
         lost = time_loss(*self._entered[vehicle.id], now, vehicle.distance, self._speed_limit)

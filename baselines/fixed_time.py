@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
-from baselines.signals import Heads, Phase, Program, stopping_sight
+from baselines.signals import Heads, Phase, Program, full_order, lane_order, stopping_sight
 from baselines.webster import SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, integer, items, number, numbers
+from minisim.errors import InputError, instance, number, numbers
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,7 @@ class FixedTime:
         instance("equal_greens", self.equal_greens, bool)
         number("max_cycle [s]", self.max_cycle, above=0, high=3600)
         number("all_red [s]", self.all_red, low=0, high=60)
-        if self.order is not None:
-            lanes = items("order", self.order, "lanes")
-            order = tuple(integer("lane in order", lane, low=0) for lane in lanes)
-            object.__setattr__(self, "order", order)
+        object.__setattr__(self, "order", lane_order(self.order))
         instance("name", self.name, str)
 
     def timing(self, site: Site) -> SignalTiming:
@@ -83,8 +80,6 @@ class FixedTime:
             greens, capped = (self.greens,) * n, False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
-        if self.order is not None and sorted(self.order) != list(range(n)):
-            raise InputError(f"order must be the lanes 0 … {n - 1}, each once, got {self.order}")
         cycle = self._program(greens).cycle
         return timing_of(greens, cycle, site.demand, self.saturation_flow, capped=capped)
 
@@ -93,7 +88,7 @@ class FixedTime:
         return FixedTimeSession(site, self._program(self.timing(site).greens))
 
     def _program(self, greens: Sequence[float]) -> Program:
-        order = range(len(greens)) if self.order is None else self.order
+        order = full_order(self.order, len(greens))
         return Program(
             tuple(Phase((lane,), greens[lane], self.amber, self.all_red) for lane in order)
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from baselines.actuated import ActuatedSession, Verdict, on_detector
+from baselines.phases import PhaseSession, Verdict, on_detector
 from minisim.control import Site, View
 from minisim.errors import instance, number
 
@@ -44,13 +44,12 @@ class LongestQueue:
         number("amber [s]", self.amber, low=0, high=60)
         instance("name", self.name, str)
 
-    def start(self, site: Site) -> ActuatedSession:
+    def start(self, site: Site) -> PhaseSession:
         """Begin a run."""
-        return ActuatedSession(
+        return PhaseSession(
             site,
             QueueRule(self, site),
             detector_range=self.detector_range,
-            wake_on_detector=False,
             min_green=self.interval,
             amber=self.amber,
         )

@@ -28,7 +28,7 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, number, numbers
+from minisim.errors import InputError, instance, integer, items, number, numbers
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
@@ -181,6 +181,22 @@ class Heads:
             and self._crossed[lane][v.lane][v.manoeuvre - 1]
             for v in view.vehicles
         )
+
+
+def lane_order(order: object) -> tuple[int, ...] | None:
+    """Return a signal's `order` of lanes, None being a, b, c…; raises `InputError`."""
+    if order is None:
+        return None
+    return tuple(integer("lane in order", lane, low=0) for lane in items("order", order, "lanes"))
+
+
+def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
+    """The order of n lanes; raises `InputError` if it is not all of them, each once."""
+    if order is None:
+        return tuple(range(n))
+    if sorted(order) != list(range(n)):
+        raise InputError(f"order must be the lanes 0 … {n - 1}, each once, got {order}")
+    return order
 
 
 def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:

@@ -28,11 +28,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import shapely
 
 from baselines.v2i import CRAWL
-from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
+from minisim.control import Advise, Command, Plan, Site, View, Wake
 from minisim.errors import InputError, instance, number
 from minisim.geometry import Intersection
 
@@ -47,6 +48,9 @@ NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks nobody [s]
 
 #: Distance driven at which a vehicle leaves the list [m].
 LEFT = REFERENCE + PLATOON + STOP_LINE
+
+#: Distances driven between which a vehicle registers [m].
+FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
 
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
@@ -105,19 +109,16 @@ def right_hand_conflicts() -> tuple[frozenset[int], ...]:
     )
 
 
-@dataclass(frozen=True)
-class Platoon:
+class Platoon(NamedTuple):
     """What the rules know of one vehicle at one moment.
 
     Attributes:
-        id: of the vehicle.
         movement: index of its movement.
         driven: distance since insertion [m].
         speed: [m/s].
         order: sorts those who register in the same step, as the authors' driver spawned them.
     """
 
-    id: int
     movement: int
     driven: float
     speed: float
@@ -143,34 +144,36 @@ class AsRunList:
         speeds: dict[int, float] = {}
         leaving: list[tuple[int, float]] = []  # movement and leaving time of those ahead
         for vehicle in self.order:
-            me = platoons[vehicle]
-            foes = self._conflicts[me.movement]
-            blocked = max([time for q, time in leaving if q in foes], default=0.0)
+            movement, driven, speed, _ = platoons[vehicle]
             if vehicle in self.granted:
-                time = (LEFT - me.driven) / (me.speed + CRAWL)
-            elif blocked > NEVER_BLOCKED:
-                speed, to_line = me.speed + CRAWL, REFERENCE - STOP_LINE - me.driven
-                speeds[vehicle] = min(max(2.0 * to_line / blocked - speed, 0.0), TOP_SPEED)
-                time = (to_line + PLATOON + 2.0 * STOP_LINE) / speed
+                leaving.append((movement, (LEFT - driven) / (speed + CRAWL)))
+                continue
+            foes = self._conflicts[movement]
+            blocked = max([time for q, time in leaving if q in foes], default=0.0)
+            if blocked > NEVER_BLOCKED:
+                crawling, to_line = speed + CRAWL, REFERENCE - STOP_LINE - driven
+                speeds[vehicle] = min(max(2.0 * to_line / blocked - crawling, 0.0), TOP_SPEED)
+                time = (to_line + PLATOON + 2.0 * STOP_LINE) / crawling
             else:
                 self.granted.add(vehicle)
-                reached = math.sqrt(me.speed**2 + 2.0 * ACCELERATION * (LEFT - me.driven))
+                reached = math.sqrt(speed**2 + 2.0 * ACCELERATION * (LEFT - driven))
                 speeds[vehicle] = min(reached, TOP_SPEED)
-                time = (speeds[vehicle] - me.speed) / ACCELERATION
-            leaving.append((me.movement, time))
+                time = (speeds[vehicle] - speed) / ACCELERATION
+            leaving.append((movement, time))
         return speeds
 
     def _register(self, platoons: dict[int, Platoon]) -> None:
-        listed = set(self.order)
-        new = [
-            platoon
-            for platoon in platoons.values()
-            if platoon.id not in listed
-            and REFERENCE - RANGE <= platoon.driven < REFERENCE - RANGE + REGISTRATION
-        ]
-        self.order += [platoon.id for platoon in sorted(new, key=lambda one: one.order)]
-        self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
-        self.granted.intersection_update(self.order)
+        """Append who has come, remove who has left; in most steps it is neither."""
+        if any(v not in platoons or platoons[v].driven >= LEFT for v in self.order):
+            self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
+            self.granted.intersection_update(self.order)
+        if len(self.order) < len(platoons):
+            new = [
+                (platoon.order, vehicle)
+                for vehicle, platoon in platoons.items()
+                if FIRST <= platoon.driven < LAST and vehicle not in self.order
+            ]
+            self.order += [vehicle for _, vehicle in sorted(new)]
 
 
 class V2ICAsRunSession:
@@ -206,29 +209,27 @@ class V2ICAsRunSession:
 
     def decide(self, view: View) -> Iterable[Command]:
         """One round of the rules; another one in the next step while anybody waits."""
-        rules = self.rules
-        platoons = {vehicle.id: self._platoon(vehicle) for vehicle in view.vehicles}
-        speeds = dict.fromkeys(
-            (v for v in platoons if v not in self._desired), self._approach_speed
-        )
-        speeds.update(rules.step(platoons))
-        desired = {v: speeds.get(v, self._desired.get(v, 0.0)) for v in platoons}
+        rules, desired = self.rules, self._desired
+        speeds = {v.id: self._approach_speed for v in view.vehicles if v.id not in desired}
+        speeds.update(rules.step(self._platoons(view)))
         commands: list[Command] = [
             Advise(vehicle, speed)
-            for vehicle, speed in desired.items()
-            if self._desired.get(vehicle) != speed
+            for vehicle, speed in speeds.items()
+            if desired.get(vehicle) != speed
         ]
-        self._desired = desired
+        desired.update(speeds)
+        if len(desired) > len(view.vehicles):
+            self._desired = {v.id: desired[v.id] for v in view.vehicles}
         if len(rules.granted) < len(rules.order):
             commands.append(Wake(view.time + self._dt))
         return commands
 
-    def _platoon(self, vehicle: Observed) -> Platoon:
-        second = math.floor(vehicle.demand_time + ROUNDING)
-        return Platoon(
-            id=vehicle.id,
-            movement=vehicle.lane * 3 + vehicle.manoeuvre - 1,
-            driven=self._origin - vehicle.distance + ROUNDING,
-            speed=vehicle.speed,
-            order=(second, vehicle.lane, vehicle.id),
-        )
+    def _platoons(self, view: View) -> dict[int, Platoon]:
+        """Who may be in the list: the others do not count, and they are most of the view."""
+        platoons = {}
+        for vehicle, lane, manoeuvre, distance, speed, _, demand_time in view.vehicles:
+            driven = self._origin - distance + ROUNDING
+            if FIRST <= driven < LEFT:
+                order = (math.floor(demand_time + ROUNDING), lane, vehicle)
+                platoons[vehicle] = Platoon(lane * 3 + manoeuvre - 1, driven, speed, order)
+        return platoons

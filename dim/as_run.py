@@ -39,7 +39,7 @@ import networkx as nx
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance
+from minisim.errors import InputError, choice, instance, number
 from minisim.geometry import Movement
 
 #: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
@@ -54,11 +54,19 @@ GREEN = 2.0  #: of the stretch before the bound from which a vehicle goes regard
 FREED = 506.0  #: distance driven at which a place in the action list is given back [m]
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
+#: Distance driven from which on a vehicle is told 20 m/s for good [m]. The authors have no such
+#: limit, but the last word to any vehicle comes before 531 m in the three of their runs where it
+#: was looked up; a host need not show us vehicles for longer.
+FOLLOWED = 600.0
+
+#: A vehicle stays in view a little longer, so that it is still there when it has passed that [m].
+SEEN_BEYOND = 10.0
+
 RED_SPEED = 10.0  #: desired in the red zone [m/s]
 HELD_SPEED = 0.0  #: desired in the yellow zone without right of way [m/s]
 GO_SPEED = 10.0  #: desired with right of way [m/s]
 GREEN_SPEED = 50.0  #: desired in the green zone [m/s]
-EXIT_SPEED = 20.0  #: desired beyond [m/s]
+EXIT_SPEED = 20.0  #: desired beyond, if nothing else is asked for [m/s]
 
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
@@ -76,14 +84,17 @@ class AsRunDim:
         matrix: harmony of the movements; None is the paper's table.
         names: what the authors called the arms, clockwise from north. Names decide who is first;
             in the runs at 4:1:4:1 they were "acbd" instead of in alphabetical order.
+        exit_speed: desired behind the junction, 20 as in every published run of DIM [m/s].
 
     Raises:
-        InputError: an unknown order, or names that do not tell the arms apart.
+        InputError: an unknown order, names that do not tell the arms apart, or an exit speed that
+            is not positive.
     """
 
     order: str = "lanes"
     matrix: HarmonyMatrix | None = None
     names: str = "abcde"
+    exit_speed: float = EXIT_SPEED
 
     def __post_init__(self) -> None:
         choice("order", self.order, ORDERS)
@@ -91,11 +102,14 @@ class AsRunDim:
         instance("names", self.names, str)
         if len(set(self.names)) != len(self.names):
             raise InputError(f"names must be different letters, got {self.names!r}")
+        number("exit_speed [m/s]", self.exit_speed, above=0.0)
 
     @property
     def name(self) -> str:
-        """`dim-as-run`, or `dim-as-run-size`."""
-        return "dim-as-run" if self.order == "lanes" else "dim-as-run-size"
+        """`dim-as-run`, with `-size` and `-exit-14` where it differs from the published runs."""
+        size = "" if self.order == "lanes" else "-size"
+        leaves = "" if self.exit_speed == EXIT_SPEED else f"-exit-{self.exit_speed:g}"
+        return f"dim-as-run{size}{leaves}"
 
     def start(self, site: Site) -> AsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""
@@ -107,7 +121,8 @@ class AsRunDim:
             raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
         if len(self.names) < n:
             raise InputError(f"names must be {n} letters, one an arm, got {self.names!r}")
-        return AsRunSession(site, matrix, self.order, self.names)
+        rules = AsRunRules(n, matrix, self.order, self.names, self.exit_speed)
+        return AsRunSession(site, rules)
 
 
 @dataclass(frozen=True)
@@ -136,7 +151,14 @@ class AsRunRules:
         chosen: ids of those with the right of way.
     """
 
-    def __init__(self, arms: int, matrix: HarmonyMatrix, order: str, names: str = "abcde") -> None:
+    def __init__(
+        self,
+        arms: int,
+        matrix: HarmonyMatrix,
+        order: str,
+        names: str = "abcde",
+        exit_speed: float = EXIT_SPEED,
+    ) -> None:
         self.arms = arms
         self.bound = BOUND[arms]
         self.red_start = self.bound - YELLOW - RED[arms]
@@ -145,6 +167,7 @@ class AsRunRules:
         self.matrix = matrix
         self.order = order
         self.names = names
+        self.exit_speed = exit_speed
         self.serving: list[int] = []
         self.action: list[int] = []
         self.chosen: tuple[int, ...] = ()
@@ -153,7 +176,7 @@ class AsRunRules:
         """Update the lists from what is on the road; the desired speeds that are set now [m/s].
 
         Args:
-            cars: by id, those from the start of the red zone on until they are clear.
+            cars: by id, those from the start of the red zone on until they are clear, at least.
         """
         speeds: dict[int, float] = {}
         visited = sorted(cars.values(), key=lambda car: (car.name, car.id))
@@ -186,11 +209,11 @@ class AsRunRules:
                 if car.id not in self.action and len(self.action) < self.arms:
                     self.action.append(car.id)
                 if car.id in self.chosen and car.id in self.action:
-                    speeds[car.id] = EXIT_SPEED
+                    speeds[car.id] = self.exit_speed
             if car.driven > FREED and car.id in self.action:
                 self.action.remove(car.id)
             if car.driven > self.bound and car.id not in self.action:
-                speeds[car.id] = EXIT_SPEED
+                speeds[car.id] = self.exit_speed
             busy |= self.bound < car.driven <= CLEAR
         return busy
 
@@ -240,22 +263,20 @@ class AsRunSession:
         plan: what the host has to provide: a wake-up wherever a zone begins or ends.
     """
 
-    def __init__(self, site: Site, matrix: HarmonyMatrix, order: str, names: str = "abcde") -> None:
+    def __init__(self, site: Site, rules: AsRunRules) -> None:
         instance("site", site, Site)
-        self.rules = AsRunRules(site.intersection.n, matrix, order, names)
+        self.rules = rules
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
-        rules = self.rules
-        edges = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound, FREED, CLEAR)
+        zones = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound)
         if rules.red_start > self._origin:
             raise InputError(
                 f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "
                 f"leave {self._origin:.4g} m"
             )
         self.plan = Plan(
-            marks=tuple(self._origin - edge for edge in edges),
-            wake_on_clear=True,
+            marks=tuple(self._origin - edge for edge in (*zones, FREED, CLEAR, FOLLOWED)),
             sight=self._origin - rules.red_start,
-            reach=max(CLEAR - self._origin, 0.0),
+            reach=max(FOLLOWED + SEEN_BEYOND - self._origin, 0.0),
             lanes_open=True,
         )
         self._dt = site.dt
@@ -266,20 +287,13 @@ class AsRunSession:
         rules = self.rules
         before = (list(rules.action), rules.chosen)
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
-        gone = [v for v in self._desired if v not in cars]
         speeds = rules.step(cars)
-        commands: list[Command] = []
-        for vehicle, speed in speeds.items():
-            if vehicle in cars and self._desired.get(vehicle) != speed:
-                self._desired[vehicle] = speed
-                commands.append(Advise(vehicle, speed))
-        for vehicle in gone:
-            speed = GO_SPEED if vehicle in rules.chosen else EXIT_SPEED
-            if self._desired[vehicle] != speed:
-                self._desired[vehicle] = speed
-                commands.append(Advise(vehicle, speed))
-            if vehicle not in rules.chosen:
-                del self._desired[vehicle]
+        speeds.update((v, rules.exit_speed) for v, car in cars.items() if car.driven >= FOLLOWED)
+        told = {v: speed for v, speed in speeds.items() if v in cars}
+        commands: list[Command] = [
+            Advise(v, speed) for v, speed in told.items() if self._desired.get(v) != speed
+        ]
+        self._desired = {v: speed for v, speed in self._desired.items() if v in cars} | told
         if before != (rules.action, rules.chosen):
             commands.append(Wake(view.time + self._dt))
         return commands

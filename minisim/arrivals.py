@@ -78,8 +78,8 @@ class Arrivals:
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
-        """Mean inflow of each lane over `horizon` seconds [veh/h]."""
-        counts = np.bincount(self.lane, minlength=n)
+        """Mean inflow of each lane in the first `horizon` seconds [veh/h]."""
+        counts = np.bincount(self.lane[self.time < horizon], minlength=n)
         return tuple(float(c) * 3600.0 / horizon for c in counts)
 
 

@@ -21,7 +21,13 @@ import math
 
 import numpy as np
 
-from minisim.carfollowing import STANDSTILL, cruise_control, distance_control, engine_lag
+from minisim.carfollowing import (
+    STANDSTILL,
+    braking_distance,
+    cruise_control,
+    distance_control,
+    engine_lag,
+)
 from minisim.crossings import Meeting
 from minisim.jit import njit, njit_inline
 from minisim.state import DRIVING, POSITION_EPS, Engine, Floats, Ints, Law, Records, Road
@@ -74,8 +80,12 @@ def accelerate_engines(
                 j = me["ahead"]
             if j >= 0 and vehicles[j]["status"] == DRIVING:
                 ahead = vehicles[j]
-                gap = ahead["s"] - ends[ahead["path"], 0] - law.length - (s - leave)
-                u = min(u, follow(v, gap - law.min_gap, ahead["v"], engine))
+                rear = ahead["s"] - law.length - ends[ahead["path"], 0]
+                gap = rear - (s - leave)
+                # Who is beside it, on another way still, is left to the radar (`adaptToLeader`).
+                beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
+                if not beside:
+                    u = min(u, follow(v, gap - law.min_gap, ahead["v"], engine))
                 if s >= leave:
                     nearest = min(nearest, gap)
             overlap |= nearest <= 0.0
@@ -143,9 +153,14 @@ def meet(
             continue
         behind = ends[q, 0] - law.entry - meetings[q, p, 1] - (driven - law.length)
         past = behind + waits[p, 1] < 0.0
-        entered = behind < law.length
-        in_the_way = entered and (
-            (not past and to_meeting > 0.0) or (kind == JOIN and to_meeting > behind - law.length)
+        leaves = wait if kind == PART and wait > 0.0 else ends[q, 0] - law.entry
+        in_the_way = (
+            behind < law.length
+            and driven < leaves
+            and (
+                (not past and to_meeting > 0.0)
+                or (kind == JOIN and to_meeting > behind - law.length)
+            )
         )
         if to_meeting < -POSITION_EPS and not in_the_way:
             continue
@@ -159,8 +174,9 @@ def meet(
         if kind == JOIN and behind < 0.0:
             behind += max(meetings[q, p, 1] - meetings[p, q, 1], 0.0)
         gap = to_meeting - law.min_gap - behind
-        if kind == JOIN and leads and not led and gap + other["v"] < shortest:
-            shortest = gap + other["v"]
+        stops = gap + braking_distance(other["v"], law.b_max, law.dt)  # if the other brakes hard
+        if kind == JOIN and leads and not led and stops < shortest:
+            shortest = stops
             to_part = law.entry + waits[p, 0] - s  # of its way that the other can meet
             shown = follow(v, gap if gap >= 0.0 else max(to_part, 0.0), other["v"], engine)
         if not approaching and gap >= 0.0:

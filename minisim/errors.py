@@ -75,8 +75,10 @@ def number(
     Raises:
         InputError: not a real number, not finite, or out of range.
     """
-    # The plain types first: an abstract one is slow to ask, and every command comes by here.
-    if isinstance(value, bool) or not isinstance(value, (float, int, Real)):
+    # The usual case first, for every command is checked: abstract types are slow to ask for.
+    if type(value) is float and low <= value <= high and above < value < below:
+        return value
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{name} must be a number, got {show(value)}")
     try:
         result = float(value)
@@ -90,8 +92,10 @@ def number(
 
 def integer(name: str, value: object, *, low: int, high: int | None = None) -> int:
     """Return `value` as an int inside [low, high], or raise `InputError`."""
+    if type(value) is int and low <= value and (high is None or value <= high):
+        return value  # the usual case first, as in `number`
     allowed = f"an integer of at least {low}" if high is None else f"an integer {low} … {high}"
-    if isinstance(value, bool) or not isinstance(value, (int, Integral)):
+    if isinstance(value, bool) or not isinstance(value, Integral):
         raise InputError(f"{name} must be {allowed}, got {show(value)}")
     result = int(value)
     if result < low or (high is not None and result > high):

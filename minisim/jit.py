@@ -2,13 +2,21 @@
 
 Switch it off with the environment variable `MINISIM_JIT=0`: every kernel then runs as the
 Python that stands in the file, step by step in a debugger if need be.
+
+Compiled code is kept on disk. It holds whatever it calls and every constant that it reads, from
+any module, while numba looks only at the file that a function stands in; so ours is kept for one
+state of all sources beside the function and beside this file, and a change of any compiles anew.
 """
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 import os
 from collections.abc import Callable
-from typing import Literal, TypeVar, cast
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast
 
 _F = TypeVar("_F", bound=Callable[..., object])
 
@@ -46,5 +54,30 @@ def _compile(function: _F, inline: Literal["never", "always"]) -> _F:
         return function
     import numba
 
-    compiler = numba.njit(cache=True, error_model="numpy", inline=inline)
-    return cast(_F, compiler(function))
+    compiled: Any = numba.njit(error_model="numpy", inline=inline)(function)
+    compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
+    return cast(_F, compiled)
+
+
+@lru_cache
+def _cache_class() -> Any:
+    from numba.core.caching import FunctionCache
+
+    class SourcesCache(FunctionCache):
+        """numba's cache on disk; what is there counts only if none of our sources has changed."""
+
+        def __init__(self, function: Callable[..., object]) -> None:
+            super().__init__(function)  # type: ignore[no-untyped-call]
+            folder = Path(inspect.getfile(function)).parent
+            self._cache_file._source_stamp = {_digest(folder), _digest(Path(__file__).parent)}
+
+    return SourcesCache
+
+
+@lru_cache
+def _digest(folder: Path) -> bytes:
+    """Of all Python sources of a folder as they stand on disk now."""
+    found = hashlib.sha256()
+    for file in sorted(folder.glob("*.py")):
+        found.update(file.name.encode() + b"\0" + hashlib.sha256(file.read_bytes()).digest())
+    return found.digest()

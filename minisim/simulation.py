@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
@@ -50,6 +51,9 @@ from minisim.state import (
 )
 from minisim.trips import collect_trips
 
+#: `Observed._make` without its check of the number of fields, which is that of `OBSERVED`.
+_as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
+
 
 class Simulation:
     """One run: vehicles on their paths, advanced under a controller.
@@ -96,6 +100,7 @@ class Simulation:
         )
         self._engine = build_engine(self.site)
         self._vehicles = build_vehicles(self.site, arrivals)
+        self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
@@ -170,7 +175,7 @@ class Simulation:
 
     def view(self) -> View:
         """What a session would be shown now."""
-        return View(self.time, tuple(map(Observed._make, self._observed[: self._seen].tolist())))
+        return View(self.time, tuple(map(_as_observed, self._observed[: self._seen].tolist())))
 
     def result(self) -> Run:
         """The result so far."""
@@ -209,12 +214,12 @@ class Simulation:
 
     def _apply(self, command: Command) -> None:
         match command:
+            case Advise(vehicle, speed):
+                self._advice[self._row[vehicle]] = speed
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
-            case Advise(vehicle, speed):
-                self._vehicles["advice"][self._row[vehicle]] = speed
             case Wake(time):
                 self._wake_tick = first_tick(time, self.site.dt)
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
 from scenarios.cells import saturated
-from scenarios.paper import SPLITS, reference
+from scenarios.paper import SERIES, SPLITS, reference
 from scenarios.statistics import prediction_interval
-from scenarios.studies import SERIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,6 +144,7 @@ SHOWN: Mapping[int, str] = MappingProxyType({
     9: "the last arrivals of the published trips, last_arrival_s in scenarios/data/reference.csv",
     10: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
     11: "as-run, which has these greens",
+    12: "as-run, which has the actuated signal",
     13: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
     14: "as-run, which has that matrix: see its collisions",
     15: "as-run, which has these speeds",

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation, V2ICAsRun
+from baselines import (
+    V2IC,
+    Actuated,
+    Adaptive,
+    AllWayStop,
+    FixedTime,
+    LongestQueue,
+    Reservation,
+    V2ICAsRun,
+)
 from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -34,9 +43,11 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-paper-commit": lambda _: Dim(commit="paper"),
     "dim-as-run": lambda _: AsRunDim(),
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
+    "dim-as-run-exit-14": lambda _: AsRunDim(exit_speed=14.0),
     "fixed-time": lambda _: FixedTime(),
     "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
     "adaptive": lambda _: Adaptive(),
+    "actuated": lambda _: Actuated(),
     "all-way-stop": lambda _: AllWayStop(),
     "longest-queue": lambda _: LongestQueue(),
     "v2ic": _v2ic,

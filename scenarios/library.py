@@ -20,9 +20,10 @@ from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_na
 
 Side = Literal["left", "right"]
 
-#: In the authors' 5-arm network the approach lanes are 491.6 m long (4-arm 492.8 and 3-arm
-#: 495.84 follow from the default kerb radius), so its entries lie 8.4 m from the centre.
-FIVE_WAY_RADIUS = 8.4
+#: Distance of the entries from the centre in the authors' networks, by number of arms [m]: their
+#: approach lanes are 495.84, 492.8 and 491.6 m long. The first two follow from the default kerb
+#: radius, but netconvert rounds to centimetres; 3 mm shift who passes the edge of a zone when.
+PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
 def three_way(density: float = 350.0, **options: Any) -> Scenario:
@@ -37,7 +38,7 @@ def four_way(density: float = 350.0, **options: Any) -> Scenario:
 
 def five_way(density: float = 350.0, **options: Any) -> Scenario:
     """The paper's 5-arm junction, with the junction radius of the authors' network."""
-    return _regular("five-way", 5, density, {"junction_radius": FIVE_WAY_RADIUS, **options})
+    return _regular("five-way", 5, density, {"junction_radius": PUBLISHED_RADII[5], **options})
 
 
 #: Arms -> the paper's junction.
@@ -133,7 +134,8 @@ def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scen
     bearings = [360.0 * i / n for i in range(n)]
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
-        options = {"ways": published_ways(n), **options}
+        published = {"ways": published_ways(n), "junction_radius": PUBLISHED_RADII[n]}
+        options = {**published, **options}
     return from_bearings(bearings, density, **{"name": name, **options})
 
 
@@ -144,5 +146,5 @@ def _is_published(n: int, options: dict[str, Any]) -> bool:
         n in PUBLISHED_ARMS
         and options.get("side", "left") == "left"
         and not {"lane_width", "arm_length"} & set(options)
-        and radius == (FIVE_WAY_RADIUS if n == 5 else None)
+        and radius == (PUBLISHED_RADII[5] if n == 5 else None)
     )

@@ -6,11 +6,13 @@ The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`)
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from baselines import FixedTime
+from baselines import Actuated, Adaptive, FixedTime
 from dim import AsRunDim
 from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
@@ -38,6 +40,12 @@ GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.
 PHASES = (2, 1, 0, 3)
+
+
+#: Their names of all four -> ours.
+SERIES: Mapping[str, str] = MappingProxyType(
+    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
+)
 
 
 class Cell(NamedTuple):
@@ -172,12 +180,15 @@ def controller_of(
     """What decided in a published run, or would have by its label.
 
     Raises:
-        InputError: no such cell, or its controller is not to be had.
+        InputError: no such cell.
     """
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     if cell.controller == "fts":
         return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
+    if cell.controller == "ats":
+        signal = Actuated if ran.controller == "actuated" else Adaptive
+        return signal(order=PHASES)
     if cell.controller == "dim" and cell.split == RENAMED:
         return AsRunDim(names=RENAMED_ARMS)
     return controller_named(ran.controller or LABELS[cell.controller][0], _profile(cell, ran))

@@ -14,21 +14,12 @@ from minisim.errors import choice
 from scenarios.controllers import controller_named
 from scenarios.experiment import Experiment
 from scenarios.library import MAKERS, regular
-from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, Cell, controller_of
+from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
 AS_RUN = "as-run"
-
-#: The paper's abbreviations -> our series.
-SERIES: Mapping[str, str] = MappingProxyType(
-    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
-)
-
-#: Published controller and split whose run had a controller that is not here, an actuated signal:
-#: the delay-based one of the text stands in for it.
-NOT_TO_BE_HAD = (("ats", "4:3:2:1"),)
 
 #: The paper's grid: four controllers on four arms, and DIM on three and five.
 PUBLISHED = (*GRID, *BASELINE_GRID)
@@ -69,12 +60,10 @@ class Case(NamedTuple):
         return make(self.density, split=shares, profile=self.profile, horizon=horizon)
 
     def _published(self, horizon: float) -> tuple[Scenario, Controller]:
-        """What ran, also where that is not what the label says, but for `NOT_TO_BE_HAD`."""
+        """What ran, also where that is not what the label says."""
         name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
         cell = Cell(self.split, int(self.density), self.arms, name)
-        labelled = (name, self.split) in NOT_TO_BE_HAD
-        scenario = published_scenario(*cell, as_labelled=labelled)
-        return replace(scenario, horizon=horizon), controller_of(*cell, as_labelled=labelled)
+        return replace(published_scenario(*cell), horizon=horizon), controller_of(*cell)
 
     def __str__(self) -> str:
         return f"{self.series}, {self.arms} arms, {self.split}, {self.density:g} veh/h/lane"

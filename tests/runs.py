@@ -15,7 +15,9 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.control import Command, Plan, Session, Site, Unregulated, View
 from minisim.run import Run
+from minisim.testing import SmallScenario
 from scenarios import Scenario
+from scenarios.scenario import AS_RUN
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -87,3 +89,8 @@ class Deadly:
                 Path(self.once).touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return Unregulated().start(site)
+
+
+def as_run(scenario: SmallScenario) -> SmallScenario:
+    """The same with the vehicle of the published runs, inserted at rest, and steps of 0.02 s."""
+    return dataclasses.replace(scenario, vehicle=AS_RUN.vehicle, dt=0.02, depart_speed=0.0)

@@ -26,7 +26,8 @@ from minisim.sumo.messages import Job
 #: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
 #: junction it follows whoever comes from the same lane or leaves by the same. That also makes it
 #: yield to whoever crosses, where the controller alone is to say who goes: so it ignores all in
-#: the junction (32) as long as somebody drives there who neither shares lane nor exit.
+#: the junction (32) as long as somebody drives there who neither shares lane nor exit. Whom it
+#: would follow there, into the same exit, it is then told to follow by minisim's law.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
 #: The published runs' speed mode: nothing but the model. With a safe gap (1) SUMO would cut what
@@ -110,6 +111,8 @@ class Follower:
         self._vehicle = libsumo.vehicle
         self._limits = limits(job)
         self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
+        self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
+        self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def load(self, cars: Iterable[Car]) -> None:
         """Nothing: the vehicle type says it all."""
@@ -124,12 +127,21 @@ class Follower:
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Tell SUMO what the road ahead asks of everybody up to the exit in the next step."""
         entry = self._law.entry
-        inside = {car.path for lane in lanes for car in lane if car.s >= entry}
+        self._inside = [car for car in self._inside if not car.cleared]
+        known = {car.id for car in self._inside}
+        self._inside += [
+            car for lane in lanes for car in lane if car.s >= entry and car.id not in known
+        ]
+        inside = {car.path for car in self._inside}
         for lane in lanes:
+            foremost = True  # of those on the approach: it follows others than its lane's, too
             for car in lane:
                 held = car.s < entry and not released(car)
-                self._steer(car, held)
-                ignoring = held or not inside.isdisjoint(self._crossing[car.path])
+                crossed = not inside.isdisjoint(self._crossing[car.path])
+                merges = crossed and not held and (car.s >= entry or foremost)
+                foremost &= car.s >= entry
+                self._steer(car, held, self._merging(car) if merges else 0.0)
+                ignoring = held or crossed
                 if ignoring != car.ignoring:
                     mode = IGNORING if ignoring else FOLLOWING
                     self._vehicle.setSpeedMode(car.name, mode)
@@ -141,7 +153,21 @@ class Follower:
         self._desire(car, min(limit * car.factor, car.advice))
         self._hand_back(car)
 
-    def _steer(self, car: Car, held: bool) -> None:
+    def _merging(self, car: Car) -> float:
+        """How much the last before it from another lane into its exit counts (`closeness`)."""
+        mine, law = self._exit[car.path][0], self._law
+        ahead = None
+        for other in self._inside:
+            if other is car:
+                break
+            if other.lane != car.lane and self._exit[other.path][1] == self._exit[car.path][1]:
+                ahead = other
+        if ahead is None:
+            return 0.0
+        gap = (ahead.s - self._exit[ahead.path][0]) - law.length - (car.s - mine)
+        return float(kernel.closeness(car.v, gap, ahead.v, law))
+
+    def _steer(self, car: Car, held: bool, z: float) -> None:
         law = self._law
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
@@ -151,10 +177,11 @@ class Follower:
         held = held and near(v, law.hold - s, law)
         # SUMO would drop to a lower desired speed at once; the law brakes.
         self._desire(car, max(v0, v))
-        if not (slower or held or v > v0 or v0 < LEAST_SPEED):
+        if not (slower or held or v > v0 or v0 < LEAST_SPEED or z > 0.0):
             self._hand_back(car)
             return
-        free = acc = self._free(v, v0)
+        free = self._free(v, v0)
+        acc = min(free, kernel.follow(v, max(v0, LEAST_SPEED), z, law)) if z > 0.0 else free
         while kernel.braking_begins(v, starts[k] - s, law):
             acc = min(acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1

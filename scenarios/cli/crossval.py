@@ -38,11 +38,13 @@ class Wanted(NamedTuple):
 
 @app.command(
     epilog="Writes crossval.md (the report), crossval.csv (one row a cell, lane and metric) and "
-    "the figures. A run that fails is a row with its error.\n\n"
+    "the figures. A run that fails is a row with its error. SUMO's runs are kept in the folder "
+    "sumo beside them and used again by the same version; remove it to run them anew.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim crossval --quick\n\n"
     "minisim crossval four-way five-way -c dim -c dim-harmonious -d 250 --seeds 5\n\n"
     "minisim crossval --replay four-way -d 150 -d 350 --split balanced\n\n"
+    "minisim crossval --replay -c fixed-time -c v2ic --split 4:1:4:1\n\n"
     "[bold]Exit codes[/bold]\n\n"
     "0 done, whether the hosts agree or not; 1 a run failed; 2 bad input, or SUMO is missing."
 )
@@ -60,7 +62,8 @@ def crossval(
         typer.Option(
             "--controller", "-c", metavar="NAME", show_default=False,
             help="Who decides, as for minisim run; repeat it for more. dim and fixed-time by "
-            "default, with --replay dim.",
+            "default. With --replay whose published runs: dim (the default), fixed-time, adaptive "
+            "or v2ic.",
         ),
     ] = None,
     density: Annotated[
@@ -83,8 +86,8 @@ def crossval(
         str | None,
         typer.Option(
             "--profile", "-p", metavar="NAME", show_default=False,
-            help="Vehicle and speeds: fair (the default), paper, or as_run (the default with "
-            "--replay).",
+            help="Vehicle and speeds: fair (the default), paper or as_run; with --replay those of "
+            "the published runs by default.",
         ),
     ] = None,
     seeds: Annotated[
@@ -104,7 +107,8 @@ def crossval(
         bool,
         typer.Option(
             "--replay",
-            help="Replay the arrivals of the published DIM runs, and compare with the paper too.",
+            help="Replay published runs: their arrivals, vehicles and controllers; compare with "
+            "the paper too. With another --profile the arrivals alone are theirs.",
         ),
     ] = False,
     jobs: Annotated[
@@ -146,7 +150,7 @@ def _cases(wanted: Wanted) -> list[Case]:
             wanted.controllers or ["dim"],
             wanted.densities or (list(QUICK_DENSITIES) if wanted.quick else []),
             wanted.splits or (["balanced"] if wanted.quick else []),
-            "as_run" if wanted.profile is None else wanted.profile,
+            wanted.profile,
             horizon,
         )
     return drawn_cases(
@@ -174,7 +178,7 @@ def _compare(cases: list[Case], seeds: range, processes: int, folder: Path, comm
 
     with workers(processes) as executor:
         with bar("simulating in both hosts") as progress:
-            results = crossvalidate(cases, seeds, executor, progress)
+            results = crossvalidate(cases, seeds, executor, progress, folder)
         with bar("recording where they part") as progress:
             results = film(results, executor, progress)
     from figures.crossval import crossval_figures

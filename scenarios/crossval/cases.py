@@ -6,21 +6,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from minisim.control import Controller
 from minisim.errors import InputError, choice, instance
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
-from scenarios.library import scenario_named
-from scenarios.paper import DENSITIES, GRID, SPLITS, Cell, reference, replay
+from scenarios.library import MAKERS, scenario_named
+from scenarios.paper import (
+    BASELINE_GRID,
+    DENSITIES,
+    GRID,
+    SERIES,
+    SPLITS,
+    Cell,
+    controller_of,
+    reference,
+    replay,
+)
 from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
-PUBLISHED: Final = {
-    "dim": "dim",
-    "dim-as-run": "dim",
-    "fixed-time": "fts",
-    "adaptive": "ats",
-    "v2ic": "v2ic",
-}
+PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
+
+#: Names of their junctions -> number of arms.
+JUNCTIONS: Final = {"three-way": 3, "four-way": 4, "five-way": 5}
+
+#: What a replay's mean travel time may differ by from the published one, by the controller's name
+#: in `reference.csv` [s]: what the parts of the published set-up that are not on record allow.
+TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
+
+#: The same of DIM at 350 veh/h, where two vehicles of the published runs were teleported and the
+#: order of vehicles that came in the same second decides more [s].
+TRAVEL_350: Final = 3.0
 
 #: Horizon of the published runs [s].
 HOUR: Final = 3600.0
@@ -33,7 +49,10 @@ class Case:
     Attributes:
         scenario: junction, demand and profile.
         controller: its command-line name.
-        published: the published run whose arrivals are replayed; None where they are drawn.
+        published: the published run that is replayed; None where arrivals are drawn.
+
+    Raises:
+        InputError: an unknown controller, or the published one is not to be had.
     """
 
     scenario: Scenario
@@ -42,11 +61,19 @@ class Case:
 
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, Scenario)
-        controller_named(self.controller, self.scenario.profile)
+        self.decider()
+
+    def decider(self) -> Controller:
+        """Who decides: in a replay with the published vehicle, what did so in the published run."""
+        if self.published is not None and self.same_law:
+            return controller_of(*self.published)
+        return controller_named(self.controller, self.scenario.profile)
 
     @property
     def split(self) -> str:
-        """Of the demand, such as "4:3:2:1"."""
+        """Of the demand, such as "4:3:2:1"; of a published run what its label says."""
+        if self.published is not None:
+            return self.published.split
         shares = self.scenario.demand.split
         return "balanced" if shares is None else ":".join(f"{share:g}" for share in shares)
 
@@ -85,12 +112,12 @@ class Case:
     def reference_tolerance(self, metric: str) -> Tolerance | None:
         """What a replay may differ from the published mean by; None for any other cell.
 
-        Waiting 10 %, travel 0.5 s, and 3 s at 350 veh/h, where two vehicles of the published runs
-        were teleported and the order of vehicles that came in the same second is not on record.
+        Waiting 10 %; travel as in `TRAVEL` and `TRAVEL_350`.
         """
         if self.published is None:
             return None
-        travel = 3.0 if self.published.density == max(DENSITIES) else 0.5
+        who, busiest = self.published.controller, self.published.density == max(DENSITIES)
+        travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
         return {
             "waiting_time_s": Tolerance(0.10),
             "travel_time_s": Tolerance(0.0, travel),
@@ -129,32 +156,42 @@ def replayed_cases(
     controllers: Sequence[str],
     densities: Sequence[float],
     splits: Sequence[str],
-    profile: str | Profile,
+    profile: str | Profile | None,
     horizon: float,
 ) -> list[Case]:
-    """The published runs of DIM, of these junctions, densities and splits; all where empty.
+    """The published runs of these controllers, junctions, densities and splits; all where empty.
+
+    Args:
+        names: of the junctions.
+        controllers: command-line names, of `PUBLISHED`.
+        densities: mean inflows a lane [veh/h].
+        splits: as the runs are labelled.
+        profile: None is each run's own vehicle, with the controller of the run; any other vehicle
+            goes with the controller of that profile.
+        horizon: simulated time [s].
 
     Raises:
         InputError: an unknown name, or no published run is left.
     """
-    cases = []
     for split in splits:
         choice("split of a published run", split, SPLITS)
     for name in names:
-        choice("junction of a published run", name, ("three-way", "four-way", "five-way"))
-    for cell in GRID:
-        scenario = replace(replay(*cell, profile=profile), horizon=horizon)
-        chosen = (
-            (not names or scenario.name in names)
-            and (not densities or cell.density in densities)
-            and (not splits or cell.split in splits)
-        )
-        cases += [Case(scenario, controller, cell) for controller in controllers if chosen]
+        choice("junction of a published run", name, JUNCTIONS)
+    ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
+    arms = [JUNCTIONS[name] for name in names] or list(MAKERS)
+    cases = [
+        Case(replace(replay(*cell, profile=profile), horizon=horizon), ran[cell.controller], cell)
+        for cell in (*GRID, *BASELINE_GRID)
+        if cell.controller in ran
+        and cell.arms in arms
+        and cell.density in (densities or DENSITIES)
+        and cell.split in (splits or SPLITS)
+    ]
     if not cases:
         wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]
         raise InputError(
-            f"the paper has no DIM run of {', '.join(wanted)}; it has "
-            f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only"
+            f"the paper has no {' or '.join(controllers)} run of {', '.join(wanted)}; it has "
+            f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only, with dim"
         )
     return cases
 

@@ -81,6 +81,9 @@ def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]
     ]
     for metric, heading in HEADINGS.items():
         lines += ["", f"## {heading} [s]", "", *_means(results, metric)]
+    replays = [result for result in results if result.meets_paper("minisim") is not None]
+    if replays:
+        lines += ["", "## Against the paper [s]", "", *_replays(replays)]
     lines += ["", "## Where the hosts part", "", *_partings(results)]
     failures = list(_failures(results))
     if failures:
@@ -195,6 +198,34 @@ def _means(results: Sequence[Result], metric: str) -> list[str]:
             if result.rows
         ),
     )
+
+
+def _replays(results: Sequence[Result]) -> list[str]:
+    """The table of `docs/fidelity.md`."""
+    return _table(
+        ("controller", "arms", "split", "veh/h/lane",
+         "waiting, minisim", "SUMO", "published", "travel, minisim", "SUMO", "published",
+         "same", "met"),
+        (
+            (
+                result.case.controller,
+                str(result.case.scenario.intersection.n),
+                result.case.split,
+                f"{result.case.density:g}",
+                *(
+                    _number(value)
+                    for metric in HEADINGS
+                    for row in [result.row(metric)]
+                    for value in (
+                        row.minisim.mean, row.sumo.mean, result.case.reference(metric, "all")
+                    )
+                ),
+                _share(result.agreement),
+                _yes(result.meets_paper("minisim")),
+            )
+            for result in results
+        ),
+    )  # fmt: skip
 
 
 def _lanes(results: Sequence[Result]) -> list[str]:

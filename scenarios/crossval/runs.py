@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from minisim.arrivals import Arrivals
 from minisim.control import Site
 from minisim.errors import MinisimError
 from minisim.recording import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
-from minisim.trips import Trips
-from scenarios.controllers import controller_named
 from scenarios.crossval.cases import Case
 from scenarios.crossval.comparison import (
     Divergence,
@@ -23,6 +23,7 @@ from scenarios.crossval.comparison import (
     first_divergence,
     first_parting,
 )
+from scenarios.crossval.outcome import Outcome, kept_file, read_outcome, write_outcome
 from scenarios.crossval.results import Failure, Film, Result
 from scenarios.scenario import Scenario
 
@@ -46,15 +47,22 @@ def crossvalidate(
     seeds: Sequence[int],
     executor: Executor,
     progress: Progress | None = None,
+    folder: Path | None = None,
 ) -> list[Result]:
     """Run every case with every seed in both hosts, and compare.
 
-    A run that fails becomes a `Failure` of its case. Replays have one run, for nothing in them
-    is drawn.
+    A run that fails becomes a `Failure` of its case. Replays have one run: their arrivals are not
+    drawn.
+
+    Args:
+        cases, seeds: what to run.
+        executor: runs it.
+        progress: called with the number of runs done and of all.
+        folder: where SUMO's runs are kept and found again; None runs them all.
     """
     runs = [
         [
-            (case, host, seed)
+            (case, host, seed, folder)
             for seed in (seeds if case.published is None else [0])
             for host in HOSTS
         ]
@@ -63,7 +71,7 @@ def crossvalidate(
     tasks = [run for of_case in runs for run in of_case]
     outcomes = iter(_gather(executor, _run, tasks, progress))
     return [
-        _result(case, {run[1:]: next(outcomes) for run in of_case})
+        _result(case, {run[1:3]: next(outcomes) for run in of_case})
         for case, of_case in zip(cases, runs, strict=True)
     ]
 
@@ -83,15 +91,6 @@ def film(
         result if result.divergence is None else _filmed(result, next(frames), next(frames))
         for result in results
     ]
-
-
-class _Outcome(NamedTuple):
-    """What a run gave: its trips, or its error."""
-
-    trips: Trips | None = None
-    collisions: int = 0
-    sumo: str = ""
-    error: str = ""
 
 
 @dataclass(frozen=True)
@@ -124,13 +123,24 @@ class _Excerpt:
         return self.scenario.arrivals(seed)
 
 
-def _run(task: tuple[Case, str, int]) -> _Outcome:
-    case, host, seed = task
+def _run(task: tuple[Case, str, int, Path | None]) -> Outcome:
+    case, host, seed, folder = task
+    if folder is None or host != HOSTS[1]:
+        return _outcome(case, host, seed)
+    file = kept_file(folder, case, seed, importlib.metadata.version("libsumo"))
+    kept = read_outcome(file)
+    if kept is None:
+        kept = _outcome(case, host, seed)
+        write_outcome(file, kept)
+    return kept
+
+
+def _outcome(case: Case, host: str, seed: int) -> Outcome:
     try:
         run = _simulate(case, case.scenario, host, seed)
     except MinisimError as error:
-        return _Outcome(error=str(error))
-    return _Outcome(run.columns, len(run.collisions), run.host.get("sumo", ""))
+        return Outcome(error=str(error))
+    return Outcome(run.columns, len(run.collisions), run.host.get("sumo", ""))
 
 
 def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:
@@ -149,7 +159,7 @@ def _simulate(
 ) -> Run:
     """Run in a host; vehicles of the published runs do touch, anybody else's must not."""
     options["on_collision"] = "record" if case.same_law else "stop"
-    controller = controller_named(case.controller, case.scenario.profile)
+    controller = case.decider()
     if host == "minisim":
         from minisim.simulation import simulate
 
@@ -178,9 +188,9 @@ def _gather(
     return [future.exception() or future.result() for future in futures]
 
 
-def _result(case: Case, outcomes: dict[tuple[str, int], _Outcome | BaseException]) -> Result:
+def _result(case: Case, outcomes: dict[tuple[str, int], Outcome | BaseException]) -> Result:
     ended = {
-        run: _Outcome(error=_reason(made)) if isinstance(made, BaseException) else made
+        run: Outcome(error=_reason(made)) if isinstance(made, BaseException) else made
         for run, made in outcomes.items()
     }
     both = [

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 import minisim
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import Dim
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from dim import AsRunDim, Dim
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -31,6 +31,7 @@ from minisim.control import (
     Wake,
 )
 from minisim.errors import InputError
+from minisim.run import Run
 from minisim.testing import (
     ContractError,
     SmallScenario,
@@ -39,6 +40,7 @@ from minisim.testing import (
     drained,
     small_scenario,
 )
+from tests.runs import as_run
 
 #: Every controller there is, with its variants. A new one is added here.
 CONTROLLERS: tuple[Controller, ...] = (
@@ -56,6 +58,8 @@ CONTROLLERS: tuple[Controller, ...] = (
     FixedTime(equal_greens=True, max_cycle=90.0),
     Adaptive(),
     Adaptive(amber=0.0, min_green=0.5, max_green=8.0, extend_max_green=True),
+    Actuated(),
+    Actuated(amber=0.0, min_green=0.5, max_green=8.0, max_gap=1.0),
     LongestQueue(),
     LongestQueue(interval=2.0, amber=0.0, detector_range=30.0),
     AllWayStop(),
@@ -70,6 +74,16 @@ CONTROLLERS: tuple[Controller, ...] = (
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_every_controller_keeps_the_contract(controller: Controller) -> None:
     check_controller(controller, horizon=120.0)
+
+
+@pytest.mark.parametrize("controller", [AsRunDim(), AsRunDim(order="size")], ids=lambda c: c.name)
+def test_the_published_rules_keep_the_contract_but_for_collisions(controller: Controller) -> None:
+    """With the vehicle and the step that they are made for; 0.1 s is too coarse for their zones."""
+
+    def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
+        return minisim.simulate(as_run(scenario), controller, seed, **options)
+
+    check_controller(controller, horizon=120.0, collision_free=False, host=run)
 
 
 def test_the_contract_without_safety() -> None:

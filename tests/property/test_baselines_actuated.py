@@ -1,4 +1,4 @@
-"""Adaptive and longest-queue signals and the all-way stop on any junction, with any parameters."""
+"""Signals with a rule and the all-way stop on any junction, with any parameters."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from baselines import Adaptive, AllWayStop, LongestQueue
+from baselines import Actuated, Adaptive, AllWayStop, LongestQueue
 from minisim.control import Controller
 from minisim.safety import encroachments
 from scenarios.scenario import Scenario
@@ -23,6 +23,20 @@ def adaptives(draw: st.DrawFn) -> Adaptive:
         min_green=min_green,
         max_green=min_green + draw(floats(0.0, 40.0)),
         extend_max_green=draw(st.booleans()),
+        amber=draw(st.sampled_from([0.0, 0.04, 2.0, 3.03])),
+    )
+
+
+@st.composite
+def gap_signals(draw: st.DrawFn) -> Actuated:
+    """Loops from just before the line to beyond short roads, any gap, any amber."""
+    min_green = draw(floats(0.5, 10.0))
+    return Actuated(
+        max_gap=draw(floats(0.0, 10.0)),
+        detector_gap=draw(floats(0.1, 20.0)),
+        passing_time=draw(floats(0.1, 5.0)),
+        min_green=min_green,
+        max_green=min_green + draw(floats(0.0, 40.0)),
         amber=draw(st.sampled_from([0.0, 0.04, 2.0, 3.03])),
     )
 
@@ -55,6 +69,14 @@ def check(scenario: Scenario, controller: Controller) -> None:
 @given(emptying(), adaptives())
 def test_adaptive_signals_collide_nobody_and_serve_everybody(
     scenario: Scenario, signal: Adaptive
+) -> None:
+    check(scenario, signal)
+
+
+@share(0.5)
+@given(emptying(), gap_signals())
+def test_actuated_signals_collide_nobody_and_serve_everybody(
+    scenario: Scenario, signal: Actuated
 ) -> None:
     check(scenario, signal)
 

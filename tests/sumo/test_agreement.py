@@ -16,7 +16,10 @@ from minisim.sumo import simulate
 from scenarios import four_way
 from scenarios.controllers import controller_named
 
-CONTROLLERS = ("dim", "dim-harmonious", "fixed-time", "adaptive", "all-way-stop", "longest-queue")
+CONTROLLERS = (
+    "dim", "dim-harmonious", "fixed-time", "adaptive", "all-way-stop", "longest-queue", "v2ic",
+    "reservation",
+)  # fmt: skip
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
 MEASURES = ("waiting_time_s", "travel_time_s")
 

@@ -19,12 +19,12 @@ from minisim.errors import InputError, SumoError
 from minisim.simulation import Run
 from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
-from scenarios import four_way
+from scenarios import five_way, four_way
 from scenarios.cli import main
 from scenarios.library import MAKERS
-from scenarios.paper import Cell, replay
+from scenarios.paper import Cell, controller_of, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
-from tests.runs import Fixed, replayed
+from tests.runs import Fixed, as_run, replayed
 
 AS_RUN_FOUR = four_way(profile="as_run")
 
@@ -92,37 +92,41 @@ def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
         assert (apart <= 0.1 + 1e-9).all()
 
 
+#: Share of the trips whose waiting and travel times are both within 0.1 s in the two hosts, at
+#: least. The issue asks for 0.9; five arms part late in the hour (docs/fidelity.md).
+SHARES = {
+    Cell("balanced", 150, 3): 1.0,
+    Cell("balanced", 350, 3): 0.99,
+    **{Cell("balanced", density, 4): 1.0 for density in (150, 200, 250, 300)},
+    Cell("balanced", 350, 4): 0.99,
+    Cell("4:3:2:1", 350, 4): 0.99,
+    Cell("4:1:4:1", 350, 4): 0.99,
+    Cell("balanced", 350, 5): 0.95,
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "cell",
-    [Cell("balanced", density, 4) for density in (150, 200, 250, 300)] + [Cell("balanced", 150, 3)],
-    ids=str,
-)
+@pytest.mark.parametrize("cell", SHARES, ids=str)
 def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
-    """The issue asks for 90 % of the trips within 0.1 s."""
-    ours, theirs = both(replay(*cell), AsRunDim())
+    ours, theirs = both(replay(*cell), controller_of(*cell))
     ended = ours.columns.arrived & theirs.columns.arrived
     close = np.ones(ended.sum(), bool)
     for metric in ("travel_time_s", "waiting_time_s"):
         apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
         close &= apart <= 0.1 + 1e-9
-    assert close.mean() >= 0.99
+    assert close.mean() >= SHARES[cell]
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
 
 
-def test_the_contract_holds_with_the_vehicle_of_the_published_runs() -> None:
-    """`check_controller` has vehicles of its own; here they are those of the profile.
-
-    `AsRunDim` is outside the contract in every host: it still advises vehicles that have left its
-    view, as the authors' driver does.
-    """
+@pytest.mark.parametrize("controller", [FixedTime(), AsRunDim()], ids=lambda c: c.name)
+def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: Controller) -> None:
+    """`check_controller` has vehicles of its own; here they are those of the profile."""
 
     def run(scenario: Any, controller: Controller, seed: int = 0, **options: Any) -> Run:
-        small = replace(scenario, vehicle=AS_RUN.vehicle, dt=0.05, depart_speed=0.0)
-        return simulate(small, controller, seed, **options)
+        return simulate(as_run(scenario), controller, seed, **options)
 
     check_controller(
-        FixedTime(), arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
+        controller, arms=(4,), density=150.0, horizon=20.0, collision_free=False, host=run
     )
 
 
@@ -212,3 +216,27 @@ def test_the_command_line_replays_in_sumo(
     assert simulate(
         small_scenario(4, demand_time=5.0, drain=5.0), Unregulated()
     ).provenance["sumo_model"] == "IDM"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("pair", "controller", "sumo_sees"),
+    [
+        # Ways that cross, for netconvert foes.
+        (((0, 2), (1, 3)), Unregulated(), 1),
+        # In harmony by the paper's table, and no foes: they pass 1.48 m apart, a car is 1.8 m wide.
+        (((1, 4), (4, 3)), AsRunDim(), 0),
+    ],
+    ids=["crossing", "passing"],
+)
+def test_sumo_looks_for_collisions_between_foes_only(
+    pair: tuple[tuple[int, int], ...], controller: Controller, sumo_sees: int
+) -> None:
+    """Why minisim counts more touches in the published run of 5 arms at 350 veh/h."""
+    five = five_way(profile="as_run")
+    scenario = replayed(five, *((0.0, *movement) for movement in pair), horizon=70.0)
+    ours, theirs = both(scenario, controller, record="all")
+    assert len(ours.collisions) == 1
+    assert len(theirs.collisions) == sumo_sees
+    touch = ours.collisions[0]
+    there = theirs.trajectories[np.isclose(theirs.trajectories["time_s"], touch.time)]
+    assert there["s_m"].tolist() == pytest.approx(list(touch.positions), abs=0.01)

@@ -22,6 +22,7 @@ from hypothesis import given
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim
+from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
     Command,
@@ -225,8 +226,8 @@ def busy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run, Path]:
         4, density=900.0, demand_time=240.0, arm_length=150.0,
         vehicle=VehicleType(speed_deviation=0.1),
     )  # fmt: skip
-    ours = minisim.simulate(scenario, Dim(), seed=2, record="junction")
-    theirs = simulate(scenario, Dim(), seed=2, record="junction", keep_files=folder)
+    ours = minisim.simulate(scenario, Dim(), seed=2, record="all")
+    theirs = simulate(scenario, Dim(), seed=2, record="all", keep_files=folder)
     return ours, theirs, folder
 
 
@@ -594,3 +595,33 @@ def test_wrong_options_are_one_line(
     captured = capsys.readouterr()
     assert message in captured.err
     assert (captured.out, captured.err.count("\n")) == ("", 1)
+
+
+@pytest.mark.parametrize(
+    ("density", "seed", "horizon", "merging"), [(300.0, 202, 190.0, 49), (150.0, 201, 850.0, 126)]
+)
+def test_whoever_is_crossed_still_follows_into_its_exit(
+    density: float, seed: int, horizon: float, merging: int
+) -> None:
+    """While somebody crosses, SUMO would ignore all in the junction, whom it merges behind too.
+
+    These vehicles hold a reservation right behind another into the same exit, while a third drives
+    across; not seeing the other in time they ran into it, or into the way of a fourth.
+    """
+    full = four_way(density, profile="fair")
+    arrivals = full.arrivals(seed)
+    early = arrivals.time < horizon
+    recorded = Arrivals(arrivals.time[early], arrivals.lane[early], arrivals.manoeuvre[early])
+    scenario = replace(full, horizon=horizon, recorded=recorded)
+    ours = minisim.simulate(
+        scenario, Reservation(), record="all", record_window=(horizon - 30.0, horizon)
+    )
+    theirs = simulate(
+        scenario, Reservation(), record="all", record_window=(horizon - 30.0, horizon)
+    )
+    assert theirs.collisions == ()
+    slowest = [
+        run.trajectories.set_index("vehicle").loc[merging, "speed_mps"].min()
+        for run in (ours, theirs)
+    ]
+    assert max(slowest) < 1.0

@@ -1,7 +1,8 @@
-"""Our fixed-time signal, adaptive signal and all-way stop against SUMO's own, same arrivals.
+"""Our fixed-time, adaptive and actuated signals and all-way stop against SUMO's, same arrivals.
 
-SUMO runs alone here: its junction, drawn by netconvert, its `static` and `delay_based` programs,
-its `allway_stop`, its vehicles. Three things differ from ours by nature; each is tested on its own:
+SUMO runs alone here: its junction, drawn by netconvert, its `static`, `delay_based` and `actuated`
+programs, its `allway_stop`, its vehicles.
+Three things differ from ours by nature; each is tested on its own:
 
 - SUMO's IDM creeps up to a red light, some 4 s longer than a vehicle that brakes comfortably when
   it must (as SUMO's Krauss and our hold lines do). Creeping is no waiting, though it takes as long.
@@ -24,7 +25,7 @@ import numpy as np
 import pytest
 
 import minisim
-from baselines import Adaptive, AllWayStop, FixedTime, all_way_stop
+from baselines import Actuated, Adaptive, AllWayStop, FixedTime, all_way_stop
 from minisim.control import Controller, Site
 from minisim.geometry import ARM_NAMES, Floats
 from minisim.sumo.host import sumo_home
@@ -36,6 +37,7 @@ from tests.runs import replayed
 OURS: dict[str, Controller] = {
     "fixed-time": FixedTime(),
     "adaptive": Adaptive(),
+    "actuated": Actuated(),
     "all-way-stop": AllWayStop(),
 }
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
@@ -119,18 +121,21 @@ def routes(scenario: Scenario, seed: int, model: str) -> Iterator[str]:
 
 
 def program(folder: Path, name: str, site: Site) -> Iterator[str]:
-    """One phase an approach: the same greens, or SUMO's `delay_based` with the same limits."""
+    """One phase an approach: the same greens, or a rule of SUMO's with the same limits."""
     connections = ET.parse(folder / "x.net.xml").getroot().iter("connection")
     arms = {int(c.attrib["linkIndex"]): c.attrib["from"][0] for c in connections if c.get("tl")}
-    adaptive = Adaptive()
-    kind, limits = "static", {}
-    if name == "adaptive":
-        kind = "delay_based"
-        limits = {"minDur": adaptive.min_green, "maxDur": adaptive.max_green}
+    kind, limits, parameters = "static", {}, {}
+    match OURS[name]:
+        case Adaptive() as ours:
+            kind, limits = "delay_based", {"minDur": ours.min_green, "maxDur": ours.max_green}
+            parameters = {"detectorRange": ours.detector_range, "minTimeloss": ours.min_time_loss}
+        case Actuated() as ours:
+            kind, limits = "actuated", {"minDur": ours.min_green, "maxDur": ours.max_green}
+            parameters = {"max-gap": ours.max_gap, "detector-gap": ours.detector_gap}
+            parameters["passing-time"] = ours.passing_time
     yield f'<tlLogic id="C" type="{kind}" programID="ours" offset="0">'
-    if name == "adaptive":
-        yield tag("param", {"key": "detectorRange", "value": adaptive.detector_range})
-        yield tag("param", {"key": "minTimeloss", "value": adaptive.min_time_loss})
+    for key, value in parameters.items():
+        yield tag("param", {"key": key, "value": value})
     for arm, green in zip("abcd", FixedTime().timing(site).greens, strict=True):
         for light, seconds, more in (("G", green, limits), ("y", AMBER, {})):
             state = "".join(light if arms[i] == arm else "r" for i in range(len(arms)))
@@ -216,6 +221,7 @@ def test_a_quarter_of_an_hour_compares() -> None:
     assert order(ours, "waiting") == order(theirs, "waiting")
     assert alike(ours["fixed-time"], theirs["fixed-time"])
     assert alike(ours["adaptive"], theirs["adaptive"])
+    assert alike(ours["actuated"], theirs["actuated"])
 
 
 @pytest.mark.slow
@@ -231,7 +237,7 @@ def test_hours_compare_at_every_density(monkeypatch: pytest.MonkeyPatch) -> None
             cells = itertools.chain(ours[density][name], theirs[name])
             print(f"{name:<13} {density:4.0f}", *(f"{c:7.2f}" for c in cells))  # noqa: T201
         assert order(ours[density], "waiting") == order(theirs, "waiting")
-        signals = ("fixed-time", "adaptive")
+        signals = ("fixed-time", "adaptive", "actuated")
         outside += [(n, density) for n in signals if not alike(ours[density][n], theirs[n])]
     assert outside == []
 

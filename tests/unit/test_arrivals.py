@@ -83,6 +83,15 @@ def test_every_model_has_the_mean_that_was_asked_for(model: str) -> None:
     assert arrivals.rates(4, DAY) == pytest.approx(counts / 24.0)
 
 
+def test_inflow_counts_who_comes_before_the_horizon() -> None:
+    """Three vehicles in the first minute are 180 an hour, however many come later."""
+    arrivals = Arrivals(
+        np.array([0.0, 20.0, 59.9, 60.0, 61.0]), np.array([0, 0, 1, 1, 0]), np.ones(5, int)
+    )
+    assert arrivals.rates(3, 60.0) == pytest.approx((120.0, 60.0, 0.0))
+    assert arrivals.rates(3, 3600.0) == pytest.approx((3.0, 2.0, 0.0))
+
+
 # --- shares ------------------------------------------------------------------------------------
 
 

@@ -17,8 +17,17 @@ from minisim.carfollowing import (
 )
 from minisim.control import Advise, Command, Plan, Site, Unregulated, View
 from minisim.crossings import Meeting, meetings, sagittas
+from minisim.engine import accelerate_engines
 from minisim.errors import InputError
 from minisim.geometry import Intersection
+from minisim.state import (
+    DRIVING,
+    build_engine,
+    build_lanes,
+    build_law,
+    build_road,
+    build_vehicles,
+)
 from minisim.vehicle import EngineVehicle, VehicleType
 from scenarios import AS_RUN, Scenario, four_way
 from scenarios.published import published_ways
@@ -249,6 +258,67 @@ def test_who_only_crosses_does_not_slow_an_approaching_vehicle() -> None:
     assert second == pytest.approx(alone, abs=0.0)
 
 
+def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
+    """Accelerations [m/s²] of cars alone on the published 4-arm junction, one step on.
+
+    Each is (lane, manoeuvre, s, v, a, tick of entering the junction); all want 10 m/s inside and
+    14 m/s before it.
+    """
+    what = scenario(*((0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars))
+    site = what.site(0)
+    plan = Unregulated().start(site).plan
+    road, engine = build_road(site, plan), build_engine(site)
+    law = build_law(
+        site, plan, depart_speed=what.depart_speed, record=None, record_window=(0.0, math.inf)
+    )
+    vehicles = build_vehicles(site, what.arrivals(0))
+    lanes = build_lanes(site, vehicles, plan.lanes_open)
+    assert engine is not None
+    rows = []
+    for lane, _, s, v, a, entered in cars:
+        row = int(lanes[lane]["first"])
+        vehicles["status"][row] = DRIVING
+        for name, value in (("s", s), ("v", v), ("a", a), ("entered", entered)):
+            vehicles[name][row] = value
+        lanes["next"][lane] = row + 1
+        if s >= law.entry:
+            lanes["front"][lane] = row + 1
+            vehicles["advice"][row] = 10.0
+        exit_arm = int(road.ends[vehicles["path"][row], 2])
+        if s >= road.ends[vehicles["path"][row], 0]:
+            lanes["tail"][exit_arm] = row
+        rows.append(row)
+    accelerate_engines(vehicles, lanes, road, law, engine)
+    return [float(vehicles["a"][row]) for row in rows]
+
+
+def test_of_two_who_join_the_radar_shows_the_one_with_less_room() -> None:
+    """SUMO 1.28, published arrivals of 4 arms at 350 veh/h, 1546.08 s: a1 looks at c3 and d2.
+
+    Behind d2 are 49.42 m, behind the slower c3 50.44 m; with the speeds added it would be c3.
+    """
+    a1 = (0, 1, 435.31567089466705, 13.159965240067596, -2.164292267392976, 0)
+    c3 = (2, 3, 496.9210771013592, 5.607380270153639, 3.9, 154482)
+    d2 = (3, 2, 496.10070821309107, 6.852836973840388, 3.8, 154551)
+    assert chosen(a1, c3, d2)[0] == pytest.approx(-2.1681235211490605, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "acceleration"),
+    [
+        (506.9371341949611, 0.244816),  # still inside: the radar shows it, as if bumper to bumper
+        (507.04277405851946, 0.26953906033426733),  # in the exit lane, its rear beside: nobody
+    ],
+)
+def test_who_has_entered_the_exit_lane_from_beside_restrains_nobody(
+    ahead: float, acceleration: float
+) -> None:
+    """SUMO 1.28, the same run at 1547.33 s: d2 beside c3, which it overlaps."""
+    d2 = (3, 2, 505.68493538437724, 7.841895997802385, 0.23176776149717707, 154551)
+    c3 = (2, 3, ahead, 10.56398635583315, 3.99, 154482)
+    assert chosen(d2, c3)[0] == pytest.approx(acceleration, abs=1e-6)
+
+
 # --- given ways ----------------------------------------------------------------------------------
 
 
@@ -258,7 +328,7 @@ def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
         (4, 492.8, (9.03, 14.4, 14.2)),
         (5, 491.6, (9.09, 15.22, 17.18, 15.55)),
     ):
-        from scenarios.paper import MAKERS
+        from scenarios.library import MAKERS
 
         junction = MAKERS[arms](profile="as_run").intersection
         assert junction.approach_length == pytest.approx(approach, abs=0.01)

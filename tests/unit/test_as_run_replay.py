@@ -8,12 +8,11 @@ import pytest
 
 import minisim
 from minisim.errors import InputError
-from scenarios.controllers import controller_named
-from scenarios.paper import GRID, Cell, reference, reference_value, replay, scenario
+from scenarios.paper import GRID, Cell, controller_of, reference, reference_value, replay, scenario
 from scenarios.published import published_arrivals, published_ways
 
-#: Means of SUMO 1.28 (CC model, same arrivals in the same order, step 0.01 s) from a driver
-#: written for this comparison: wait and travel [s].
+#: Means of SUMO 1.28 (CC model, same arrivals in the same order, step 0.01 s): wait and travel [s].
+#: Up to 300 veh/h and on 3 arms from a driver written for this comparison, others from our host.
 SUMO = {
     Cell("balanced", 150, 4): (0.7589, 65.9877),
     Cell("balanced", 200, 4): (1.2420, 67.6987),
@@ -21,12 +20,14 @@ SUMO = {
     Cell("balanced", 300, 4): (1.9918, 70.3453),
     Cell("balanced", 150, 3): (0.3006, 64.7428),
     Cell("balanced", 350, 3): (1.1222, 68.1589),
+    Cell("balanced", 350, 4): (4.0452, 80.9100),
+    Cell("4:3:2:1", 350, 4): (4.2089, 79.1332),
+    Cell("4:1:4:1", 350, 4): (4.8362, 80.6999),
 }
 
 
 def run(cell: Cell) -> dict[str, float]:
-    controller = controller_named("dim", "as_run")
-    return minisim.simulate(replay(*cell), controller, on_collision="record").summary()
+    return minisim.simulate(replay(*cell), controller_of(*cell), on_collision="record").summary()
 
 
 def within(cell: Cell, summary: dict[str, float]) -> None:

@@ -253,16 +253,37 @@ def test_the_session_reads_views_and_tells_changes_once() -> None:
     assert list(session.decide(seen(466.0))) == []
     assert list(session.decide(seen(485.0))) == [Wake(50.01)]  # 0, then 10 again: nothing to tell
     assert session.rules.action == [7]
-    assert list(session.decide(View(60.0, ()))) == [Advise(7, 20.0), Wake(60.01)]
+    assert list(session.decide(seen(508.1))) == [Advise(7, 20.0), Wake(50.01)]
+    assert list(session.decide(View(60.0, ()))) == []
+
+
+def test_nobody_is_told_anything_that_is_not_in_the_view() -> None:
+    """Who still has the right of way far behind the junction is told 20 m/s at 600 m, for good."""
+    site = four_way(profile="as_run").site()
+    session = AsRunDim().start(site)
+    origin = 492.8 - 4.1
+
+    def seen(first: float, second: float | None) -> View:
+        cars = [Observed(1, 0, 1, origin - first, 10.0, 4.0, 12.01)]
+        if second is not None:
+            cars.append(Observed(2, 2, 1, origin - second, 10.0, 4.0, 13.01))
+        return View(50.0, tuple(cars))
+
+    session.decide(seen(485.0, 485.0))
+    assert session.rules.chosen == (1, 2)
+    assert Advise(1, EXIT_SPEED) not in list(session.decide(seen(599.9, 491.0)))
+    assert list(session.decide(seen(600.0, 491.0))) == [Advise(1, EXIT_SPEED)]
+    assert 1 in session.rules.chosen  # the second one keeps the junction busy
+    told = list(session.decide(View(51.0, seen(0.0, 492.0).vehicles[1:])))
+    assert all(command.vehicle != 1 for command in told if isinstance(command, Advise))
 
 
 def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     plan = AsRunDim().start(four_way(profile="as_run").site()).plan
     assert isinstance(plan, Plan)
-    assert plan.marks == pytest.approx((23.7, 3.7, 0.7, -1.3, -17.3, -19.3))
-    assert plan.reach == pytest.approx(19.3)
+    assert plan.marks == pytest.approx((23.7, 3.7, 0.7, -1.3, -17.3, -19.3, -111.3))
+    assert plan.reach > 111.3 + 0.5  # a step at most
     assert plan.lanes_open
-    assert plan.wake_on_clear
 
 
 def test_names_and_orders() -> None:
@@ -270,6 +291,15 @@ def test_names_and_orders() -> None:
     assert controller_named("dim", "as_run") == AsRunDim(order="lanes")
     assert controller_named("dim", "fair") == Dim()
     assert controller_named("dim-as-run-size").name == "dim-as-run-size"
+    assert controller_named("dim-as-run-exit-14").name == "dim-as-run-exit-14"
+
+
+def test_the_exit_speed_can_be_that_of_the_signals() -> None:
+    """as_run.md, discrepancy 15."""
+    rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", exit_speed=14.0)
+    assert step(rule, car("v1.a_1", 508.01)) == {1: 14.0}
+    with pytest.raises(InputError, match=r"exit_speed \[m/s\]"):
+        AsRunDim(exit_speed=0.0)
     with pytest.raises(InputError, match="order"):
         AsRunDim(order="alphabet")
 

@@ -9,8 +9,8 @@ import pytest
 
 import minisim
 from baselines import Adaptive, FixedTime
-from baselines.actuated import ActuatedSession, Verdict
 from baselines.adaptive import DelayRule, time_loss
+from baselines.phases import PhaseSession, Verdict
 from minisim.control import Observed, View
 from minisim.errors import InputError
 from minisim.testing import small_scenario
@@ -67,9 +67,9 @@ def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
     class Red:
         name = "red"
 
-        def start(self, site: Any) -> ActuatedSession:
-            return ActuatedSession(
-                site, Watching(Adaptive(), site), detector_range=100.0, wake_on_detector=True,
+        def start(self, site: Any) -> PhaseSession:
+            return PhaseSession(
+                site, Watching(Adaptive(), site), detector_range=100.0, marks=(100.0,),
                 min_green=0.5, amber=0.0,
             )  # fmt: skip
 
@@ -148,6 +148,13 @@ def test_the_last_lane_is_followed_by_the_first() -> None:
     assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in range(4)] == [1, 2, 3, 0]
 
 
+def test_the_greens_come_in_the_given_order() -> None:
+    rule = DelayRule(Adaptive(order=(2, 1, 0, 3)), SITE)
+    assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in (2, 1, 0, 3)] == [1, 0, 3, 2]
+    answers = drive(Adaptive(order=(2, 1, 0, 3)), SITE, 60.0)
+    assert answers == {0: ["Open 2"], 50: ["Close 2"], 52: ["Open 1"]}
+
+
 # The session.
 
 
@@ -223,8 +230,15 @@ def test_it_waits_less_than_the_fixed_time_signal() -> None:
         ({"extend_max_green": 1}, "extend_max_green"),
         ({"amber": -1.0}, "amber"),
         ({"name": None}, "name"),
+        ({"order": "abc"}, "order must be a sequence of lanes"),
+        ({"order": (0, 1.5)}, "lane in order"),
     ],
 )
 def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Adaptive(**arguments)
+
+
+def test_an_order_that_does_not_fit_the_junction_is_refused() -> None:
+    with pytest.raises(InputError, match="order must be the lanes 0 … 3"):
+        Adaptive(order=(0, 1, 2)).start(SITE)

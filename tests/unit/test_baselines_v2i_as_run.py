@@ -25,12 +25,13 @@ def index(name: str) -> int:
     return [str(m) for m in MOVEMENTS].index(name)
 
 
-def platoon(id: int, name: str, driven: float, speed: float = 16.6) -> Platoon:
-    return Platoon(id, index(name), driven, speed, (0.0, MOVEMENTS[index(name)].origin, id))
+def platoon(id: int, name: str, driven: float, speed: float = 16.6) -> tuple[int, Platoon]:
+    order = (0.0, MOVEMENTS[index(name)].origin, id)
+    return id, Platoon(index(name), driven, speed, order)
 
 
-def step(rules: AsRunList, *platoons: Platoon) -> dict[int, float]:
-    return rules.step({one.id: one for one in platoons})
+def step(rules: AsRunList, *platoons: tuple[int, Platoon]) -> dict[int, float]:
+    return rules.step(dict(platoons))
 
 
 # --- the conflicts ----------------------------------------------------------------------------

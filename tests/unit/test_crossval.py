@@ -17,7 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dim import Dim
+from baselines import FixedTime, V2ICAsRun
+from dim import AsRunDim, Dim
 from figures import save
 from figures.crossval import DODGE, crossval_figures
 from minisim.errors import InputError, SumoError
@@ -48,7 +49,9 @@ from scenarios.crossval.comparison import (
     times,
 )
 from scenarios.crossval.report import markdown, summary, table
-from scenarios.paper import GRID, Cell, replay
+from scenarios.paper import GREENS, GRID, PHASES, Cell, reference_value, replay
+from scenarios.published import published_arrivals
+from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from scenarios.statistics import ks_distance, mean_interval
 
 END = 100.0
@@ -223,14 +226,48 @@ def test_replays_are_the_published_grid_and_its_numbers() -> None:
     assert short[0].reference("waiting_time_s", "all") is None, "the paper's are of an hour"
 
 
+def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> None:
+    """What ran, not what the label says; the numbers are those of the label."""
+    (v2ic,) = replayed_cases([], ["v2ic"], [350], ["4:3:2:1"], None, 3600.0)
+    assert v2ic.name == "four-way 4:3:2:1 350 v2ic"
+    assert v2ic.decider() == V2ICAsRun(approach_speed=14.0)
+    assert v2ic.reference("travel_time_s", "all") == reference_value(
+        Cell("4:3:2:1", 350, 4, "v2ic"), "travel_time_s"
+    )
+    assert v2ic.reference_tolerance("travel_time_s") == Tolerance(0.0, 1.0)
+    balanced, unbalanced = replayed_cases(
+        [], ["fixed-time"], [200], ["balanced", "4:3:2:1"], None, 3600.0
+    )
+    assert balanced.scenario.profile == AS_RUN_SIGNALS
+    assert balanced.decider() == FixedTime(greens=GREENS[200], order=PHASES)
+    assert unbalanced.scenario.profile == AS_RUN
+    assert unbalanced.decider() == FixedTime(greens=5.0, order=PHASES)
+    assert balanced.reference_tolerance("travel_time_s") == Tolerance(0.0, 2.0)
+
+
+def test_dims_arms_have_the_names_of_their_run() -> None:
+    (case,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
+    assert case.decider() == AsRunDim(names="acbd")
+    assert case.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
+
+
+def test_published_arrivals_with_another_vehicle() -> None:
+    """The controller goes with the vehicle, and the paper's numbers are not asked for."""
+    dim, signal = replayed_cases([], ["dim", "fixed-time"], [200], ["4:1:4:1"], "fair", 3600.0)
+    assert (dim.decider(), signal.decider()) == (Dim(), FixedTime())
+    assert dim.reference("waiting_time_s", "all") is None
+    recorded = dim.scenario.arrivals(0)
+    assert np.array_equal(recorded.time, published_arrivals("4:1:4:1", 200, 4).time)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ((["four-wy"], [], []), "junction of a published run"),
-        (([], [400], []), "no DIM run of 400 veh/h; it has 150, 200, 250, 300, 350"),
+        (([], [400], []), "no dim run of 400 veh/h; it has 150, 200, 250, 300, 350"),
         (
             (["five-way"], [], ["4:3:2:1"]),
-            "no DIM run of five-way, 4:3:2:1; .* 5 arms balanced only",
+            "no dim run of five-way, 4:3:2:1; .* 5 arms balanced only",
         ),
         (([], [], ["1:1:1:1"]), "unknown split of a published run"),
     ],
@@ -286,7 +323,12 @@ def test_replays_are_judged_by_the_papers_means() -> None:
         "0 of 1 cells: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
         "SUMO meets the paper in 0 of 1"
     )
-    assert result(Case(four_way(), "dim"), pair()).meets_paper("minisim") is None
+    text = markdown([judged], "x", {})
+    row = "| dim | 4 | balanced | 150 | 0.75 | 0.75 | 0.71 | 66.40 | 66.60 | 65.94 | 0.0 % | yes |"
+    assert row in text
+    drawn = result(Case(four_way(), "dim"), pair())
+    assert drawn.meets_paper("minisim") is None
+    assert "Against the paper" not in markdown([drawn], "x", {})
 
 
 def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
@@ -313,6 +355,49 @@ def test_a_run_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     text = markdown([failed], "minisim crossval", {})
     assert "| four-way balanced 150 dim | sumo | 1 | SUMO's process died \\| after 3.0 s |" in text
     assert summary([failed]).endswith("; 2 runs failed")
+
+
+def test_runs_of_sumo_are_kept_and_used_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    ran: list[int] = []
+
+    def instead(scenario: Any, controller: Any, seed: int, **options: Any) -> Run:
+        ran.append(seed)
+        return simulate(scenario, controller, seed, **options)
+
+    monkeypatch.setattr("minisim.sumo.simulate", instead)
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "1.0")
+    case = Case(four_way(300, profile="fair", horizon=90), "dim")
+
+    def agreement_of(what: Case) -> float:
+        with ThreadPoolExecutor(1) as executor:
+            return crossvalidate([what], [1, 2], executor, folder=tmp_path)[0].agreement
+
+    assert agreement_of(case) == agreement_of(case) == 1.0
+    assert sorted(ran) == [1, 2], "the second time nothing is run in SUMO"
+    files = sorted((tmp_path / "sumo").iterdir())
+    assert len(files) == 2
+    files[0].write_bytes(b"PK half of a file")
+    assert agreement_of(case) == 1.0
+    assert len(ran) == 3, "what is not whole is run again"
+    agreement_of(Case(case.scenario, "dim-harmonious"))
+    assert len(ran) == 5, "another controller is another run"
+
+
+def test_a_run_of_sumo_that_fails_is_not_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def die(*_: object, **__: object) -> None:
+        raise SumoError("SUMO's process died")
+
+    monkeypatch.setattr("minisim.sumo.simulate", die)
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "1.0")
+    with ThreadPoolExecutor(1) as executor:
+        case = Case(four_way(150, profile="fair", horizon=20), "dim")
+        (failed,) = crossvalidate([case], [1], executor, folder=tmp_path)
+    assert len(failed.failures) == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_fault_of_the_program_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -390,7 +475,9 @@ BAD = [
     (("--horizon", "0"), "horizon"),
     (("--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("--replay", "6-way"), "unknown junction of a published run"),
-    (("--replay", "-d", "400"), "no DIM run of 400"),
+    (("--replay", "-d", "400"), "no dim run of 400"),
+    (("--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
+    (("--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
 ]
 
 

@@ -24,10 +24,10 @@ from scenarios.archive import Archive, MissingRunsError
 from scenarios.capacity import Search
 from scenarios.cells import saturated
 from scenarios.experiment import Experiment
-from scenarios.paper import Cell, reference_value
+from scenarios.paper import SERIES, Cell, reference_value
 from scenarios.reproduction import CAPACITY, PARTS, Made
 from scenarios.results import Effort
-from scenarios.studies import RIVALS, SERIES, STUDIES
+from scenarios.studies import RIVALS, STUDIES
 from tests.synthetic import capacity_of, synthetic_find, synthetic_row
 
 EFFORT, SEARCH = Effort(seeds=2), Search(step=20.0, steps=64, seeds=2)
