@@ -31,8 +31,6 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from baselines.prediction import NOBODY, Floats, Leader, Motion, predict, ways
 from baselines.zones import conflict_zones
 from minisim.control import (
@@ -186,11 +184,11 @@ class Manager:
         s, v = motion
         return Slot(
             seen.id, seen.lane, p, now, s, v,
-            enters=now + int(np.searchsorted(s, 0.0)),
+            enters=now + int(s.searchsorted(0.0)),
             zones={
                 q: (
-                    now + int(np.searchsorted(s, first, side="right")) - 1,
-                    now + int(np.searchsorted(s, last)),
+                    now + int(s.searchsorted(first, side="right")) - 1,
+                    now + int(s.searchsorted(last)),
                 )
                 for q, (first, last) in self._zones[p].items()
             },

@@ -52,7 +52,10 @@ def fair_figure(archive: Archive) -> Figure:
     _title(figure, "Every controller on four arms, profile fair")
     lines.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
     lines.marks_legend(figure, 0.012, 0.842, paper=False)
-    lines.footnote(figure, missing_note([results], lambda _: True))
+    lines.footnote(figure, (
+        f"{missing_note([results], lambda _: True)}  Waiting is standing on the road: it leaves "
+        "out the queue before a full road, and V2I-C's vehicles crawl."
+    ))  # fmt: skip
     return figure
 
 
@@ -90,15 +93,15 @@ def crossing_figure(archive: Archive) -> Figure:
                     _draw_crossing(axes, found[name, gate, rival], gate, place + aside, low, high)
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
         axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
-        axes.set_xlim(low - 60, high + 60)
+        axes.set_xlim(low, high + 10)
         axes.set_xticks(FAIR_DENSITIES[1::2])
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
-    _title(figure, "Demand from which on DIM does worse than …")
+    _title(figure, "Demands at which DIM does worse than …")
     lines.series_legend(figure, GATES, 0.012, 0.925)
     figure.text(
-        0.012, 0.845, "bar: 95 % interval of the demand at which the paired difference is 0.   "
-        "◀ worse from the lowest demand on   ▶ at none", fontsize=8.5, color=style.INK, va="center",
+        0.012, 0.845, "pale bar: demands at which DIM does worse     marker and line: where that "
+        "begins, with its 95 % interval", fontsize=8.5, color=style.INK, va="center",
     )  # fmt: skip
     (results,) = archive.need("fair")
     lines.footnote(figure, missing_note([results], lambda _: True))
@@ -109,16 +112,25 @@ def _draw_crossing(
     axes: Axes, found: Crossing, gate: str, y: float, low: float, high: float
 ) -> None:
     look = style.look(gate)
-    ends = [min(max(value, low - 40), high + 40) for value in (found.low, found.high)]
-    bounded = abs(found.low) < math.inf or abs(found.high) < math.inf
-    if bounded:
-        axes.plot(ends, [y, y], color=look.colour, linewidth=2.0, solid_capstyle="butt", zorder=2)
-    x = min(max(found.density, low - 40), high + 40)
-    marker = "<" if found.density == -math.inf else ">" if found.density == math.inf else None
-    axes.plot(
-        [x], [y], marker=marker or look.marker, color=look.colour, markersize=7.5,
-        linestyle="none", zorder=3, clip_on=False,
-    )  # fmt: skip
+
+    def shown(value: float) -> float:
+        return min(max(value, low), high)
+
+    if found.density < math.inf:
+        axes.barh(
+            [y], shown(found.until) - shown(found.density), left=shown(found.density), height=0.24,
+            color=look.colour, alpha=0.35, zorder=2,
+        )  # fmt: skip
+    elif not math.isfinite(found.low):
+        axes.text(high, y, "nowhere", ha="right", va="center", fontsize=8.5, color=style.MUTED)
+    if math.isfinite(found.low) or math.isfinite(found.high):
+        axes.plot(
+            [shown(found.low), shown(found.high)], [y, y], color=look.colour, marker="|",
+            markersize=8.0, markeredgewidth=1.6, linewidth=1.6, zorder=3,
+        )  # fmt: skip
+    if math.isfinite(found.density):
+        axes.plot([found.density], [y], marker=look.marker, color=look.colour, markersize=5.5,
+                  zorder=4)  # fmt: skip
 
 
 def gate_figure(archive: Archive) -> Figure:

@@ -90,14 +90,24 @@ def _schematic() -> Iterable[Item]:
 def _beyond() -> Iterable[Item]:
     yield Item("fair", "every controller up to 800 veh/h/lane", beyond.fair_figure, ("fair",))
     yield Item("losses", "demand from which on DIM loses", beyond.crossing_figure, ("fair",))
-    yield Item("losses-table", "the same as a table", paper_tables.loss_table, ("fair",))
+    yield Item(
+        "losses-table",
+        "losses in numbers",
+        paper_tables.loss_table,
+        ("fair",),
+    )
     yield Item("gate", "clear against harmonious gate", beyond.gate_figure, ("gate",))
     yield Item(
         "fairness", "fixed, rotating and longest-waiting priority", beyond.fairness_figure,
         ("fairness",),
     )  # fmt: skip
     yield Item("capacity", "largest demand served", beyond.capacity_figure, ("capacity",))
-    yield Item("capacity-table", "the same as a table", paper_tables.capacity_table, ("capacity",))
+    yield Item(
+        "capacity-table",
+        "capacity in numbers",
+        paper_tables.capacity_table,
+        ("capacity",),
+    )
 
 
 #: All figures and tables, in the order of the paper, then what it does not have.

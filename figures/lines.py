@@ -34,6 +34,10 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
         series: in the order of the legend; one without rows is left out.
     """
     if rows.empty:
+        axes.text(
+            0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top", fontsize=11,
+            color=style.MUTED,
+        )  # fmt: skip
         return
     for place, name in enumerate(series):
         found = rows[(rows["series"] == name) & rows[metric].notna()]

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from figures import lines, style
+from scenarios import paper
 from scenarios.archive import Archive, missing_note
 from scenarios.comparison import published
 from scenarios.paper import DENSITIES
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 #: The paper's controllers, in the order of its text.
-SERIES = ("dim", "fixed-time", "adaptive", "v2ic")
+SERIES = tuple(paper.SERIES.values())
 #: Study -> title of its panel.
 PANELS: Mapping[str, str] = MappingProxyType({
     "as-run": "As the published runs were made",

@@ -16,7 +16,7 @@ from figures.tables import Table
 from minisim.geometry import ARM_NAMES
 from scenarios.archive import Archive
 from scenarios.comparison import causes, compare, score
-from scenarios.library import five_way, four_way, three_way
+from scenarios.library import MAKERS
 from scenarios.statistics import Interval
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def webster_table() -> Table:
 
 def harmony_table(arms: int) -> Table:
     """The harmony matrix: as published, and whether the geometry says the same."""
-    site = {3: three_way, 4: four_way, 5: five_way}[arms]().site()
+    site = MAKERS[arms]().site()
     ours = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     paper = HarmonyMatrix.paper(arms)
     different = {pair for a, b in ours.disagreements(paper) for pair in ((a, b), (b, a))}
@@ -138,7 +138,9 @@ def loss_table(archive: Archive) -> Table:
         tuple(crossing_rows(losses(archive))), labels=2,
         notes=(
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
-            "linear between the demands tried. “a to b”: worse between a and b only.",
+            "linear between the demands tried, 50 to 800. “a to b”: worse between a and b only, "
+            "for beyond the capacity of both their order may turn again. “never”: at no demand in "
+            "the mean; an interval “from c” then says that from c on it may be.",
         ),
     )  # fmt: skip
 
@@ -168,9 +170,9 @@ def capacity_table(archive: Archive) -> Table:
 
 
 _EXPLAINED = (
-    "* not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
+    "† not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
     "depends on the horizon. Inside: the paper's single run lies within our 95 % prediction "
-    "interval."
+    "interval; where that is wide, it says little."
 )
 
 
@@ -193,7 +195,7 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
 
 
 def _mark(row: Mapping[Any, Any]) -> str:
-    return "" if row["comparable"] == "yes" else " *"
+    return "" if row["comparable"] == "yes" else " †"
 
 
 def _ours(row: Mapping[Any, Any]) -> str:

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from figures import style
+from figures.beyond import GATES, OTHERS, losses
 from figures.gallery import GALLERY, Drawing, write
 from figures.tables import Table
 from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.version import __version__
-from scenarios.archive import Archive, MissingRunsError
+from scenarios.archive import Archive, MissingRunsError, make_command
 from scenarios.cells import saturated
-from scenarios.comparison import compare, discrepancies, score
+from scenarios.comparison import SHOWN, compare, discrepancies, score
+from scenarios.crossing import METRICS
 from scenarios.reproduction import Made
 from scenarios.results import Results
 from scenarios.studies import STUDIES, Case
@@ -35,7 +37,7 @@ SECTIONS = {
     ),
     "The paper's tables": ("lanes", "webster", "harmony-4way"),
     "When does DIM lose, and how far does the harmonious gate move it?": (
-        "fair", "losses-table", "losses", "gate",
+        "fair", "losses", "losses-table", "gate",
     ),
     "Capacity": ("capacity", "capacity-table"),
     "Fairness": ("fairness",),
@@ -98,8 +100,9 @@ def _report(
     yield "# The paper's experiments, reproduced"
     yield (
         f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s a run, "
-        f"{jobs} {'process' if jobs == 1 else 'processes'}. Every controller of a study gets the "
-        "same arrivals. Intervals are 95 %, Student's t over seeds."
+        f"{jobs} {'process' if jobs == 1 else 'processes'}. Every controller of a cell gets the "
+        "same arrivals, but in `as-run`, where some met another inflow than their label says. "
+        "Intervals are 95 %, Student's t over seeds."
     )
     if effort.densities is not None:
         yield (
@@ -124,7 +127,7 @@ def _report(
         if isinstance(table, Table):
             yield table.markdown()
     yield "## Causes of the differences"
-    yield _causes()
+    yield _causes(archive)
     yield "## Collisions"
     yield _collisions(studies)
     yield "## Over-saturated cells"
@@ -138,24 +141,28 @@ def _made_table(made: Sequence[Made]) -> Table:
     questions["capacity"] = "Which demand is served without a growing queue?"
     rows = [
         (part.name, questions[part.name], f"{part.runs}", f"{part.hours:.1f}", f"{part.computed}",
-         f"{part.wall_s:.0f}", f"{len(part.failed)}")
+         f"{part.wall_s:.0f}", f"{part.cpu_s:.0f}", f"{len(part.failed)}")
         for part in made
     ]  # fmt: skip
     rows.append((
         "all", "", f"{sum(p.runs for p in made)}", f"{sum(p.hours for p in made):.1f}",
         f"{sum(p.computed for p in made)}", f"{sum(p.wall_s for p in made):.0f}",
+        f"{sum(p.cpu_s for p in made):.0f}",
         f"{sum(len(p.failed) for p in made)}",
     ))  # fmt: skip
     return Table(
         "Studies; what the store had already was not computed again",
-        ("study", "question", "runs", "simulated h", "computed now", "wall [s]", "failed"),
+        ("study", "question", "runs", "simulated h", "computed now", "wall [s]", "CPU [s]",
+         "failed"),
         tuple(rows), labels=2,
         notes=(
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
             "clique first) and says what the paper's rules give; `as-run` are the profiles "
             "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
             "the published numbers must be compared with; `fair`, `gate`, `fairness` and "
-            "`capacity` are the profile `fair`: one vehicle, one limit for all.",
+            "`capacity` are the profile `fair`: one vehicle, one limit for all. Wall is of what "
+            "was computed now, drawing not counted; CPU is of all runs, whenever made, and a run "
+            "that two studies share counts in both.",
         ),
     )  # fmt: skip
 
@@ -186,6 +193,7 @@ def _verdict(archive: Archive) -> Iterator[str]:
     for study in PAPER:
         results = archive.study(study)
         if results.good.empty:
+            lines.append(f"- `{study}`: not run (`{make_command(archive.effort, study)}`).")
             continue
         table = compare(results.good)
         lines.append(
@@ -199,7 +207,35 @@ def _verdict(archive: Archive) -> Iterator[str]:
             if score(part).judged
         ]
         lines.append(f"  By controller: {', '.join(by)}.")
-    yield "\n".join(lines) if lines else "No run of the paper's grid."
+    lines.append(
+        "- Inside says that one more run of ours could well give the paper's value; where our runs "
+        "spread widely, near saturation, nearly every value is inside."
+    )
+    yield "\n".join(lines)
+    yield _gates(archive)
+
+
+def _gates(archive: Archive) -> str:
+    """The question that the paper leaves open, answered in sentences."""
+    try:
+        found = losses(archive)
+    except MissingRunsError as error:
+        return f"From which demand on DIM loses is not known: {error}."
+    return "\n".join([
+        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
+        "harmonious gate; from the first on, with its 95 % interval, to the highest tried (800) "
+        "unless an end is given; \"all\" from the lowest tried (50) on:\n",
+        *(
+            f"- {style.look(rival).label}: " + "; ".join(
+                f"{name} " + " → ".join(
+                    str(found[name, gate, rival]) if (name, gate, rival) in found else "not run"
+                    for gate in GATES
+                )
+                for name in METRICS
+            )
+            for rival in OTHERS
+        ),
+    ])  # fmt: skip
 
 
 def _shown(name: str, drawing: Drawing, folder: str) -> str:
@@ -209,8 +245,8 @@ def _shown(name: str, drawing: Drawing, folder: str) -> str:
     return drawing.markdown()
 
 
-def _causes() -> str:
-    """The known discrepancies, each once, with where it holds."""
+def _causes(archive: Archive) -> str:
+    """The known discrepancies, each once: where it holds, and what shows it."""
     found: dict[tuple[int, str], list[str]] = {}
     for known in sorted(discrepancies()):
         where = ", ".join(
@@ -226,8 +262,18 @@ def _causes() -> str:
             if text
         )
         found.setdefault((known.number, known.cause), []).append(where)
-    return "\n".join(
-        f"- **{number}** {cause} ({'; '.join(where)})" for (number, cause), where in found.items()
+    listed = "\n".join(
+        f"- **{number}** {cause} ({'; '.join(where)}.) "
+        + (f"*Shown by {SHOWN[number]}.*" if number in SHOWN else "*Not isolated by a run here.*")
+        for (number, cause), where in found.items()
+    )
+    ran = not archive.study("as-run").good.empty
+    return (
+        f"{'' if ran else 'The study `as-run` was not run for this report. '}"
+        "The numbers are those of the column “causes”. Every cause is an attribution, read from "
+        "the authors' code, networks and result files: that it holds for a cell does not mean that "
+        "it explains all of the difference. Where a run or a file here shows it, that is named. A "
+        "cell that is outside and has no cause is not explained.\n\n" + listed
     )
 
 

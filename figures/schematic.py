@@ -11,12 +11,11 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from dim import Dim, Explanation, HarmonyMatrix, explain
 from figures import junction, style
 from figures.decision import decision_figure
-from scenarios.library import five_way, four_way, three_way
+from scenarios.library import MAKERS, four_way
 from scenarios.scenario import Scenario
 
 #: Number of arms -> a case whose decision is worth a picture; the paper's own on four arms.
 DECISIONS = {3: ("a1", "b1", "c1"), 4: ("a1", "b2", "c2", "d2"), 5: ("a1", "b2", "c2", "d2", "e2")}
-MAKERS = {3: three_way, 4: four_way, 5: five_way}
 #: Metres shown around each junction of the map.
 MAP_REACH = 48.0
 

@@ -47,7 +47,8 @@ class Archive:
         if not found:
             raise MissingRunsError(
                 f"the store has no search for capacities with the seeds 1 … {self.search.seeds} "
-                f"over {self.search.horizon:g} s; make it with: {make_command(self.effort)}"
+                f"over {self.search.horizon:g} s; make it with: "
+                f"{make_command(self.effort, 'capacity')}"
             )
         return found, missing
 
@@ -62,15 +63,16 @@ class Archive:
             raise MissingRunsError(
                 f"the store has no run of {' or '.join(names)} with the seeds 1 … "
                 f"{self.effort.seeds} over {self.effort.horizon:g} s; make them with: "
-                f"{make_command(self.effort)}"
+                f"{make_command(self.effort, *names)}"
             )
         return found
 
 
-def make_command(effort: Effort) -> str:
-    """The command that makes the runs of an effort."""
-    quick = effort.densities is not None
-    return f"minisim reproduce{' --quick' if quick else ''} --seeds {effort.seeds}"
+def make_command(effort: Effort, *names: str) -> str:
+    """The command that makes an effort's runs of studies."""
+    only = "".join(f" --only {name}" for name in names)
+    quick = " --quick" if effort.densities is not None else ""
+    return f"minisim reproduce{only}{quick} --seeds {effort.seeds}"
 
 
 def smoke_test(effort: Effort) -> str:

@@ -5,12 +5,13 @@ A cell is all that was run alike but for the seed.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
 from minisim.geometry import ARM_NAMES
 from minisim.trips import METRICS
-from scenarios.statistics import growing, mean_interval, paired_difference, prediction_interval
+from scenarios.statistics import growing, mean_interval, prediction_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,9 +59,6 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
 def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.DataFrame:
     """Mean of `metric` under one controller less that under another, run by run.
 
-    Runs are paired by seed, and only where both controllers met the same arrivals, so that what
-    varies between seeds alike for both cancels.
-
     Returns:
         One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` and
         `difference_ci95`.
@@ -73,16 +71,10 @@ def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.
     choice("metric", metric, AVERAGED)
     for name in (first, second):
         choice("controller of these rows", name, sorted(set(rows["controller"])))
-    good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
     by = [column for column in CELL if column != "controller"]
-    both = good[good["controller"] == first].merge(
-        good[good["controller"] == second], on=[*by, "seed"], suffixes=("", "_other")
-    )
-    if (both["arrivals"] != both["arrivals_other"]).any():
-        raise InputError(f"{first} and {second} did not meet the same arrivals")
     found = []
-    for names, group in both.groupby(by, sort=False):
-        interval = paired_difference(group[metric].tolist(), group[f"{metric}_other"].tolist())
+    for names, values in pairs(rows, metric, "controller", (first, second), by).items():
+        interval = mean_interval(values)
         found.append({
             **dict(zip(by, names, strict=True)),
             "pairs": interval.size,
@@ -90,6 +82,34 @@ def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.
             "difference_ci95": interval.half_width,
         })  # fmt: skip
     return pd.DataFrame(found)
+
+
+def pairs(
+    rows: pd.DataFrame, metric: str, column: str, names: tuple[str, str], by: Sequence[str]
+) -> dict[tuple[Any, ...], list[float]]:
+    """Differences of `metric` between two controllers: values of `by` -> one value a seed.
+
+    Runs are paired by seed, and only where both controllers met the same arrivals, so that what
+    varies between seeds alike for both cancels.
+
+    Args:
+        rows: of a sweep; failed runs and missing values are left out.
+        metric: a column; the first controller's less the second's.
+        column: where `names` stand, such as "controller".
+        names: of both controllers.
+        by: columns that name a cell.
+
+    Raises:
+        InputError: two runs of one seed with other arrivals.
+    """
+    good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
+    one, other = (good[good[column] == name] for name in names)
+    both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
+    if (both["arrivals"] != both["arrivals_other"]).any():
+        raise InputError(f"{' and '.join(names)} did not meet the same arrivals")
+    gap = both[metric].astype(float) - both[f"{metric}_other"].astype(float)
+    grouped = gap.groupby([both[key] for key in by], sort=False)
+    return {key: values.tolist() for key, values in grouped}
 
 
 def _averaged(good: pd.DataFrame) -> dict[str, object]:

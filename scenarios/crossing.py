@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, items, numbers
+from scenarios.cells import pairs
 from scenarios.statistics import Interval, mean_interval
 
 if TYPE_CHECKING:
@@ -40,13 +41,14 @@ class Crossing(NamedTuple):
     until: float
 
     def __str__(self) -> str:
-        return f"{self.point} ({self.interval})"
+        bounded = math.isfinite(self.low) or math.isfinite(self.high)
+        return f"{self.point} ({self.interval})" if bounded else self.point
 
     @property
     def point(self) -> str:
         """The demand in words."""
         if self.density == -math.inf:
-            return "from the lowest on"
+            return "all" if self.until == math.inf else f"up to {self.until:.0f}"
         if self.density == math.inf:
             return "never"
         end = "" if self.until == math.inf else f" to {self.until:.0f}"
@@ -112,19 +114,15 @@ def paired_differences(
     """Differences of `metric`, ours minus theirs, at each density, one a common seed.
 
     Args:
-        rows: columns `series`, `density`, `seed` and the metric; failed runs have no metric.
+        rows: of a study (`scenarios.results`), with the metric.
         ours, theirs: series.
         metric: a column.
+
+    Raises:
+        InputError: two runs of one seed with other arrivals.
     """
-    table = rows.pivot_table(index=["density", "seed"], columns="series", values=metric)
-    if not {ours, theirs} <= set(table.columns):
-        return {}
-    gap = (table[ours] - table[theirs]).dropna()
-    return {
-        float(str(density)): values.tolist()
-        for density, values in gap.groupby(level="density")
-        if len(values) > 1
-    }
+    found = pairs(rows, metric, "series", (ours, theirs), ["density"])
+    return {float(density): values for (density,), values in found.items() if len(values) > 1}
 
 
 def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from minisim.arrivals import Arrivals, Demand
@@ -39,6 +39,10 @@ def four_way(density: float = 350.0, **options: Any) -> Scenario:
 def five_way(density: float = 350.0, **options: Any) -> Scenario:
     """The paper's 5-arm junction, with the junction radius of the authors' network."""
     return _regular("five-way", 5, density, {"junction_radius": PUBLISHED_RADII[5], **options})
+
+
+#: Arms -> the paper's junction.
+MAKERS: dict[int, Callable[..., Scenario]] = {3: three_way, 4: four_way, 5: five_way}
 
 
 def regular(n: int, density: float = 350.0, **options: Any) -> Scenario:

@@ -1,4 +1,4 @@
-"""The paper's grid of experiments, its reference numbers, and replays of its runs.
+"""The paper's runs: how each was set up, replays of them, and its reference numbers.
 
 The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`) and V2I-C
 (`v2ic`). Some of its runs were not what their label says; `RAN` lists how.
@@ -6,10 +6,10 @@ The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`)
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from baselines import Actuated, Adaptive, FixedTime
@@ -17,18 +17,9 @@ from dim import AsRunDim
 from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
 from scenarios.controllers import controller_named
-from scenarios.experiment import Experiment
-from scenarios.library import five_way, four_way, three_way
+from scenarios.library import MAKERS
 from scenarios.published import PUBLISHED_ARMS, RENAMED, RENAMED_ARMS, published_arrivals
-from scenarios.scenario import (
-    AS_RUN,
-    AS_RUN_SIGNALS,
-    FAIR,
-    Profile,
-    Scenario,
-    parse_split,
-    profile_named,
-)
+from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario, parse_split
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,11 +33,6 @@ SPLITS = ("balanced", "4:3:2:1", "4:1:4:1")
 #: What the paper compares DIM with, as in `reference.csv`; on 4 arms only.
 BASELINES = ("fts", "ats", "v2ic")
 
-#: The same by their names here, and DIM.
-COMPARED = ("dim", "fixed-time", "adaptive", "v2ic")
-
-MAKERS = {3: three_way, 4: four_way, 5: five_way}
-
 #: Greens of the published fixed-time runs, by mean inflow a lane [s]: Webster's, as the paper's
 #: table rounds them. 5 and 7 s follow from the trips, where cycles last 28 and 36 s; 61.75 is in
 #: the network file, and 19.25 (the table prints 19.75) in that of the adaptive signal.
@@ -54,6 +40,12 @@ GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.
 PHASES = (2, 1, 0, 3)
+
+
+#: Their names of all four -> ours.
+SERIES: Mapping[str, str] = MappingProxyType(
+    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
+)
 
 
 class Cell(NamedTuple):
@@ -212,51 +204,6 @@ def _profile(cell: Cell, ran: Ran) -> Profile:
 
 def _shares(split: str) -> tuple[float, ...] | None:
     return None if split == "balanced" else tuple(parse_split(split))
-
-
-def experiments(
-    profile: str | Profile = "paper",
-    seeds: Iterable[int] = range(1, 11),
-    horizon: float = 3600.0,
-    controllers: Iterable[str] = COMPARED,
-) -> list[Experiment]:
-    """The paper's whole grid: 70 cells with all controllers, each with every seed.
-
-    Under `as_run` the published runs as they were set up (`scenario`, `controller_of`), with the
-    controllers named as in `COMPARED`. Collisions are counted and do not stop a run, for two of
-    the published controllers collide.
-
-    Raises:
-        InputError: an unknown profile or controller, or a horizon or seed that is not allowed.
-    """
-    chosen = profile_named(profile)
-    names, runs = list(controllers), list(seeds)
-    return [
-        Experiment(replace(what, horizon=horizon), who, seed, label=name, on_collision="record")
-        for cell in GRID
-        for name in names
-        if cell.arms == 4 or name == "dim"
-        for what, who in [_setting(name, cell, chosen)]
-        for seed in runs
-    ]
-
-
-def _setting(name: str, cell: Cell, profile: Profile) -> tuple[Scenario, Controller]:
-    """What is simulated in a cell, and who decides there.
-
-    With unequal inflow "the lane priorities are set according to the incoming traffic" (Results
-    and Discussion); as run they were not. The paper's greens depend on the mean density alone
-    (its table of Webster's times), so the signal's are equal, but where comparison is to be fair.
-    """
-    if profile.name == AS_RUN.name and name in COMPARED:
-        ran = cell._replace(controller=("dim", *BASELINES)[COMPARED.index(name)])
-        return scenario(*ran), controller_of(*ran)
-    if cell.split != "balanced":
-        if name == "dim":
-            name = "dim-inflow"
-        elif name == "fixed-time" and profile.name != FAIR.name:
-            name = "fixed-time-equal"
-    return scenario(*cell, profile=profile), controller_named(name, profile)
 
 
 @lru_cache

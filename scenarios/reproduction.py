@@ -72,6 +72,7 @@ class Made:
         hours: simulated by them.
         computed: how many were not in the store before.
         wall_s: time that it took.
+        cpu_s: processor time of all its runs, whenever they were made.
         failed: rows of failed runs.
     """
 
@@ -80,6 +81,7 @@ class Made:
     hours: float
     computed: int
     wall_s: float
+    cpu_s: float
     failed: tuple[Row, ...]
 
 
@@ -119,13 +121,15 @@ def _study(name: str, plan: Plan, store: Store, jobs: int, report: Report) -> Ma
     known = sum(row is not None for row in find_in(store)(experiments))
     began = time.monotonic()
     failed = []
+    cpu = 0.0
     for done, (_, row) in enumerate(finished(experiments, jobs=jobs, store=store), start=1):
         report(done, len(experiments))
+        cpu += row.get("cpu_s", 0.0)
         if row["error"] is not None:
             failed.append(row)
     return Made(
         name, len(experiments), len(experiments) * plan.effort.horizon / 3600.0,
-        len(experiments) - known, time.monotonic() - began, tuple(failed),
+        len(experiments) - known, time.monotonic() - began, cpu, tuple(failed),
     )  # fmt: skip
 
 
@@ -135,16 +139,18 @@ def _capacity(plan: Plan, store: Store, jobs: int, report: Report) -> Made:
     rounds = search.steps.bit_length() - 1
     total = rounds * search.seeds * len(CASES)
     known = asked = 0
+    cpu = 0.0
     failed: list[Row] = []
     began = time.monotonic()
     with workers(jobs) as executor:
 
         def run(experiments: Sequence[Experiment]) -> list[Row | None]:
-            nonlocal known, asked
+            nonlocal known, asked, cpu
             known += sum(row is not None for row in find_in(store)(experiments))
             rows: dict[int, Row] = {}
             for k, row in finished(experiments, executor, store=store):
                 rows[k] = row
+                cpu += row.get("cpu_s", 0.0)
                 report(asked + len(rows), total)
             asked += len(experiments)
             failed.extend(row for row in rows.values() if row["error"] is not None)
@@ -153,5 +159,5 @@ def _capacity(plan: Plan, store: Store, jobs: int, report: Report) -> Made:
         capacities(CASES, search, run)
     return Made(
         CAPACITY, asked, asked * search.horizon / 3600.0, asked - known,
-        time.monotonic() - began, tuple(failed),
+        time.monotonic() - began, cpu, tuple(failed),
     )  # fmt: skip

@@ -49,11 +49,7 @@ class Effort:
 
     def runs(self, study: Study) -> list[tuple[Case, Experiment]]:
         """The runs of a study, seed by seed within each case."""
-        return [
-            (case, case.experiment(seed, self.horizon))
-            for case in self.cases(study)
-            for seed in range(1, min(self.seeds, study.few.get(case.series, self.seeds)) + 1)
-        ]
+        return study.runs(self.seeds, self.horizon, self.cases(study))
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,20 +68,6 @@ def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> In
     return Interval(mean, t * math.sqrt(variance * (1.0 + 1.0 / count)), count)
 
 
-def paired_difference(
-    first: Iterable[float], second: Iterable[float], confidence: float = 0.95
-) -> Interval:
-    """Mean of first − second over pairs (runs on common arrivals), and its interval.
-
-    Raises:
-        InputError: not as many values of one as of the other; otherwise as `mean_interval`.
-    """
-    ours, theirs = numbers("first", first), numbers("second", second)
-    if len(ours) != len(theirs):
-        raise InputError(f"{len(ours)} values cannot be paired with {len(theirs)}")
-    return mean_interval([a - b for a, b in zip(ours, theirs, strict=True)], confidence)
-
-
 def queue_growth(
     demand_time: npt.NDArray[np.float64], leave: npt.NDArray[np.float64], end: float
 ) -> float:

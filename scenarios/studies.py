@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
@@ -12,21 +13,16 @@ from minisim.control import Controller
 from minisim.errors import choice
 from scenarios.controllers import controller_named
 from scenarios.experiment import Experiment
-from scenarios.library import five_way, four_way, regular, three_way
-from scenarios.paper import DENSITIES, SPLITS, Cell, controller_of
+from scenarios.library import MAKERS, regular
+from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
 AS_RUN = "as-run"
 
-#: The paper's abbreviations -> our series.
-SERIES: Mapping[str, str] = MappingProxyType(
-    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
-)
-
-#: Arms of the paper's junctions other than the common four.
-OTHER_ARMS = (3, 5)
+#: The paper's grid: four controllers on four arms, and DIM on three and five.
+PUBLISHED = (*GRID, *BASELINE_GRID)
 
 
 class Case(NamedTuple):
@@ -59,12 +55,9 @@ class Case(NamedTuple):
         return Experiment(scenario, controller, seed, label=self.series, on_collision="record")
 
     def _drawn(self, horizon: float) -> Scenario:
-        makers = {3: three_way, 4: four_way, 5: five_way}
         shares = None if self.split == "balanced" else parse_split(self.split)
-        options = {"split": shares, "profile": self.profile, "horizon": horizon}
-        if self.arms in makers:
-            return makers[self.arms](self.density, **options)
-        return regular(self.arms, self.density, **options)
+        make = MAKERS.get(self.arms) or partial(regular, self.arms)
+        return make(self.density, split=shares, profile=self.profile, horizon=horizon)
 
     def _published(self, horizon: float) -> tuple[Scenario, Controller]:
         """What ran, also where that is not what the label says."""
@@ -92,41 +85,34 @@ class Study:
     cases: tuple[Case, ...]
     few: Mapping[str, int] = field(default_factory=dict)
 
-
-def _paper_grid(profile_of: dict[str, tuple[str, str]]) -> tuple[Case, ...]:
-    """The paper's grid: four controllers on four arms, and DIM on three and five.
-
-    `profile_of` gives each series its profile and controller.
-    """
-    four = [
-        Case(*_named(profile_of, series, split), 4, split, float(density))
-        for split, series, density in product(SPLITS, profile_of, DENSITIES)
-    ]
-    others = [
-        Case(*_named(profile_of, "dim", "balanced"), arms, "balanced", float(density))
-        for arms, density in product(OTHER_ARMS, DENSITIES)
-    ]
-    return (*four, *others)
-
-
-def _named(profile_of: dict[str, tuple[str, str]], series: str, split: str) -> tuple[str, str, str]:
-    profile, controller = profile_of[series]
-    if split != "balanced":
-        controller = _UNBALANCED.get(controller, controller)
-    return profile, series, controller
+    def runs(
+        self, seeds: int, horizon: float = 3600.0, cases: Iterable[Case] | None = None
+    ) -> list[tuple[Case, Experiment]]:
+        """The seeds 1 … `seeds` of all cases or some, seed by seed within each case."""
+        return [
+            (case, case.experiment(seed, horizon))
+            for case in (self.cases if cases is None else cases)
+            for seed in range(1, min(seeds, self.few.get(case.series, seeds)) + 1)
+        ]
 
 
 #: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
 #: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
 _UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
 
-_TEXT = {
-    "dim": ("paper", "dim"),
-    "fixed-time": ("paper", "fixed-time"),
-    "adaptive": ("paper", "adaptive"),
-    "v2ic": ("paper", "v2ic"),
-}
-_AS_RUN = dict.fromkeys(_TEXT, (AS_RUN, AS_RUN))
+
+def _as_text(cell: Cell) -> Case:
+    """A published cell by the rules and parameters of the text."""
+    series = SERIES[cell.controller]
+    controller = series if cell.split == "balanced" else _UNBALANCED.get(series, series)
+    return Case("paper", series, controller, cell.arms, cell.split, float(cell.density))
+
+
+def _as_run(cell: Cell) -> Case:
+    """A published cell as it was run."""
+    series = SERIES[cell.controller]
+    return Case(AS_RUN, series, AS_RUN, cell.arms, cell.split, float(cell.density))
+
 
 #: The published V2I-C decides every 0.01 s and costs some 20 s of CPU a simulated hour, a hundred
 #: times a signal; its runs differ little.
@@ -158,9 +144,9 @@ STUDIES: MappingProxyType[str, Study] = MappingProxyType({
     study.name: study
     for study in (
         Study("text", "What do the paper's rules and parameters give, as its text prescribes them?",
-              _paper_grid(_TEXT)),
+              tuple(map(_as_text, PUBLISHED))),
         Study("as-run", "What do the rules and vehicles that produced the published numbers give?",
-              _paper_grid(_AS_RUN), _FEW),
+              tuple(map(_as_run, PUBLISHED)), _FEW),
         Study("fair", "Which controller is best with one vehicle and speed limit for all?",
               _cases(RIVALS, (4,), FAIR_DENSITIES)),
         Study("gate", "What does entering beside crossing vehicles in harmony gain?",

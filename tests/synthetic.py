@@ -54,7 +54,7 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, "queue_growth": excess, "growing": excess > 0.0,
-        "cpu_s": 0.1, "version": "test", "error": None,
+        "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
     }  # fmt: skip
 
 

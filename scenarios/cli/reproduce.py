@@ -17,7 +17,13 @@ from scenarios.cli.terminal import bar
     epilog="Simulates the paper's grid twice, as its text prescribes it and as the published runs "
     "were made, and what the paper leaves open: every controller on equal terms, gates, rules of "
     "priority and capacities. Writes DIR/report.md, DIR/figures and the store. What the store has "
-    "already is not simulated again, so an interrupted run goes on where it was."
+    "already is not simulated again, so an interrupted run goes on where it was.\n\n"
+    "[bold]How long[/bold]\n\n"
+    "Processor time with 10 seeds, on a machine that simulates an hour under DIM in 0.1 s: text, "
+    "the paper's grid of 700 hours and the first to be run, 2.5 minutes; fair 6; gate and fairness "
+    "1; capacity 10; as-run, with its step of 0.01 s, some 25. Two processes halve it. To have the "
+    "paper's grid alone: [bold]minisim reproduce --only text[/bold].\n\n"
+    "The report says what each study took, and CPU seconds a simulated hour by controller."
 )
 def reproduce(
     out: Annotated[

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from minisim.errors import InputError, integer, number
+from minisim.errors import InputError, choice, integer, number
 from scenarios.cli.app import app
 from scenarios.cli.terminal import bar, show
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from scenarios.experiment import Experiment
     from scenarios.store import Store
 
-PAPER_GRID = "paper"
+#: The study that is the paper's grid as its text prescribes it.
+PAPER = {"paper": "text"}
 
 
 @app.command(
@@ -32,9 +33,11 @@ PAPER_GRID = "paper"
     "  density = \\[150, 250, 350]\n\n"
     "and also profile, side, split, turns, model, arrivals, seeds, horizon, on_collision; "
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
-    "one that is stored is not made again.\n\n"
+    "one that is stored is not made again, whether a file, a study or [bold]minisim "
+    "reproduce[/bold] asked for it.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim sweep paper --seeds 10 --out paper.db\n\n"
+    "minisim sweep fair --seeds 3 --out fair.db --export fair.csv\n\n"
     "minisim sweep mine.toml --jobs 2 --out mine.db --export mine.csv\n\n"
     "minisim sweep mine.toml --scheduler tcp://10.0.0.1:8786 --out mine.db\n\n"
     "[bold]Exit codes[/bold]\n\n"
@@ -44,9 +47,10 @@ def sweep(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="FILE.toml|paper", show_default=False,
-            help="The experiments, or the paper's grid: its four controllers, five densities and "
-            "three splits on 4 arms, DIM alone on 3 and 5.",
+            metavar="FILE.toml|paper|STUDY", show_default=False,
+            help="The experiments; or the paper's grid: its four controllers, five densities and "
+            "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
+            "study of minisim reproduce: as-run, fair, gate or fairness.",
         ),
     ],
     out: Annotated[
@@ -83,13 +87,6 @@ def sweep(
             metavar="S", show_default=False, help="Simulated time; as the file says, or 3600."
         ),
     ] = None,
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            "--profile", "-p", metavar="NAME", show_default=False,
-            help="Of the paper's grid: paper (the default), fair or as_run.",
-        ),
-    ] = None,
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.recording import write_table
@@ -109,7 +106,7 @@ def sweep(
     check_apart({"FILE.toml": Path(what), "--out": out, "--export": export})
     if export is not None:
         check_table(export)
-    experiments = _experiments(what, seeds, horizon, profile)
+    experiments = _experiments(what, seeds, horizon)
     with _executor(scheduler) as executor, Store(out) as store:
         rows = _run(experiments, executor, jobs or os.cpu_count() or 1, store, out)
     show(sweep_table(cells(rows)), sweep_notes(rows, experiments))
@@ -121,20 +118,16 @@ def sweep(
         raise typer.Exit(1)
 
 
-def _experiments(
-    what: str, seeds: int | None, horizon: float | None, profile: str | None
-) -> list[Experiment]:
-    from scenarios import paper
+def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Experiment]:
+    """A study's, or those of a file; a word that is neither is taken for a study's name."""
     from scenarios.experiment_file import check_can_run, read_experiments
+    from scenarios.studies import STUDIES
 
-    if what == PAPER_GRID:
-        found = paper.experiments(
-            profile or "paper",
-            range(1, 11 if seeds is None else seeds + 1),
-            3600.0 if horizon is None else horizon,
-        )
-    elif profile is not None:
-        raise InputError("--profile is for the paper's grid; a file has its own")
+    studies = (*PAPER, *STUDIES)
+    if what in studies or not (Path(what).suffix or Path(what).exists()):
+        study = STUDIES[PAPER.get(name := choice("study", what, studies), name)]
+        runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
+        found = [experiment for _, experiment in runs]
     else:
         found = read_experiments(what, seeds=seeds, horizon=horizon)
     with bar("checking"):

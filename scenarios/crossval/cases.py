@@ -10,14 +10,12 @@ from minisim.control import Controller
 from minisim.errors import InputError, choice, instance
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
-from scenarios.library import scenario_named
+from scenarios.library import MAKERS, scenario_named
 from scenarios.paper import (
     BASELINE_GRID,
-    BASELINES,
-    COMPARED,
     DENSITIES,
     GRID,
-    MAKERS,
+    SERIES,
     SPLITS,
     Cell,
     controller_of,
@@ -27,7 +25,7 @@ from scenarios.paper import (
 from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
-PUBLISHED: Final = dict(zip(COMPARED, ("dim", *BASELINES), strict=True))
+PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
 
 #: Names of their junctions -> number of arms.
 JUNCTIONS: Final = {"three-way": 3, "four-way": 4, "five-way": 5}

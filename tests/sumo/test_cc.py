@@ -21,7 +21,8 @@ from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
 from scenarios import five_way, four_way
 from scenarios.cli import main
-from scenarios.paper import MAKERS, Cell, controller_of, replay
+from scenarios.library import MAKERS
+from scenarios.paper import Cell, controller_of, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
 from tests.runs import Fixed, as_run, replayed
 

@@ -328,7 +328,7 @@ def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
         (4, 492.8, (9.03, 14.4, 14.2)),
         (5, 491.6, (9.09, 15.22, 17.18, 15.55)),
     ):
-        from scenarios.paper import MAKERS
+        from scenarios.library import MAKERS
 
         junction = MAKERS[arms](profile="as_run").intersection
         assert junction.approach_length == pytest.approx(approach, abs=0.01)

@@ -23,7 +23,8 @@ from minisim.errors import InputError
 from minisim.geometry import Movement
 from scenarios import four_way, regular
 from scenarios.controllers import controller_named
-from scenarios.paper import MAKERS, replay
+from scenarios.library import MAKERS
+from scenarios.paper import replay
 
 
 def car(name: str, driven: float, id: int | None = None) -> Car:

@@ -11,14 +11,13 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
-from scenarios import Scenario, five_way, four_way, paper, three_way
-from scenarios.cells import AVERAGED, CELL, cells, differences
+from scenarios import Scenario, five_way, four_way, three_way
+from scenarios.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.controllers import controller_named
 from scenarios.experiment import RESULTS, Experiment, canonical, run_experiment
 from scenarios.statistics import (
     growing,
     mean_interval,
-    paired_difference,
     prediction_interval,
     queue_growth,
 )
@@ -45,15 +44,6 @@ def test_prediction_interval_holds_the_next_value_as_often_as_it_says() -> None:
         inside += abs(new - mean) <= half_width
     # Binomial(2000, 0.95): sd 9.7; four of them are a false alarm of 6e-5.
     assert inside == pytest.approx(1900, abs=39)
-
-
-def test_pairs_cancel_what_they_share() -> None:
-    shared = np.random.default_rng(1).normal(0, 100, 8)
-    interval = paired_difference((shared + 5).tolist(), shared.tolist())
-    assert interval.mean == pytest.approx(5)
-    assert interval.half_width == pytest.approx(0, abs=1e-9)
-    with pytest.raises(InputError, match="3 values cannot be paired with 2"):
-        paired_difference([1, 2, 3], [1, 2])
 
 
 # --- growing queues --------------------------------------------------------------------------
@@ -202,6 +192,16 @@ def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
 
 
+def test_pairs_cancel_what_they_share() -> None:
+    shared = np.random.default_rng(1).normal(0, 100, 8)
+    frame = pd.DataFrame({
+        "who": ["x"] * 8 + ["y"] * 8, "m": [*(shared + 5), *shared[::-1]], "where": 1,
+        "seed": [*range(8), *range(7, -1, -1)], "arrivals": "same", "error": None,
+    })  # fmt: skip
+    found = pairs(frame, "m", "who", ("x", "y"), ["where"])
+    assert found == {(1,): pytest.approx([5.0] * 8)}
+
+
 def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
@@ -228,23 +228,6 @@ def test_equal_numbers_are_one_experiment() -> None:
 def test_what_has_no_canonical_form(odd: object) -> None:
     with pytest.raises(InputError, match="cannot be stored"):
         canonical(odd)
-
-
-def test_the_papers_grid() -> None:
-    four = ("dim", "fixed-time", "dim-lanes", "dim-harmonious")  # four names, whichever
-    grid = paper.experiments(controllers=four)
-    assert len(grid) == 700
-    assert len({experiment.key for experiment in grid}) == 700
-    rows = pd.DataFrame([experiment.identity() for experiment in grid])
-    assert rows.groupby("arms").size().to_dict() == {3: 50, 4: 600, 5: 50}
-    assert set(rows[rows["arms"] != 4]["controller"]) == {"dim"}
-    assert sorted(set(rows["split"])) == ["4:1:4:1", "4:3:2:1", "balanced"]
-    assert sorted(set(rows["density"])) == [150, 200, 250, 300, 350]
-    unbalanced = [e for e in grid if e.scenario.demand.split == (4, 1, 4, 1) and e.name == "dim"]
-    controller = unbalanced[0].controller
-    assert isinstance(controller, Dim)
-    # "the highest being the one with the maximum incoming traffic": a, c, then b, d.
-    assert controller.ranks(unbalanced[0].scenario.site()) == (0, 2, 1, 3)
 
 
 @pytest.mark.parametrize(

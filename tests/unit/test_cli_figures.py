@@ -61,7 +61,7 @@ def test_an_empty_store_says_what_makes_its_runs(
     store = tmp_path / "runs.sqlite"
     Store(store).close()
     assert main(["figures", "gate", "--store", str(store), "--out", str(tmp_path)]) == 2
-    assert "minisim reproduce --seeds 10" in capsys.readouterr().err
+    assert "minisim reproduce --only gate --seeds 10" in capsys.readouterr().err
 
 
 TINY = Plan(

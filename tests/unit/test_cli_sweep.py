@@ -7,14 +7,18 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from scenarios import paper
+from scenarios import studies
 from scenarios.cli import main
+from scenarios.reproduction import find_in
+from scenarios.results import Effort, collect
 from scenarios.store import Store
+from scenarios.studies import STUDIES
 
 ROOT = Path(__file__).parents[2]
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
@@ -80,15 +84,19 @@ def test_a_capped_signal_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_the_papers_grid(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(paper.experiments, "__defaults__", (
-        "paper", range(1, 11), 3600.0, ("dim", "fixed-time"),
-    ))  # fmt: skip
+    """The study `text`: what `minisim reproduce` needs of it is then in the store."""
+    text = STUDIES["text"]
+    some = replace(text, cases=tuple(case for case in text.cases if case.density == 300))
+    monkeypatch.setattr(studies, "STUDIES", {"text": some})
     store = tmp_path / "s.db"
-    few = ["--seeds", "1", "--horizon", "5", "--jobs", "1", "--out", str(store)]
-    assert main(["sweep", "paper", *few, "--profile", "fair"]) == 0
-    assert "40 runs in" in capsys.readouterr().out
+    few = ["--seeds", "2", "--horizon", "5", "--jobs", "1", "--out", str(store)]
+    assert main(["sweep", "paper", *few]) == 0
+    assert "28 runs in" in capsys.readouterr().out
     with Store(store) as kept:
-        assert set(kept.frame()["profile"]) == {"fair"}
+        assert len(kept) == 28
+        assert set(kept.frame()["profile"]) == {"paper"}
+        effort = Effort(seeds=2, horizon=5.0, densities=(300.0,))
+        assert collect(text, effort, find_in(kept)).missing == ()
 
 
 @pytest.mark.parametrize(
@@ -100,10 +108,10 @@ def test_the_papers_grid(
         (["FILE", "--horizon", "-5"], "--horizon [s] must be above 0"),
         (["FILE", "--horizon", "nan"], "--horizon [s] must be above 0"),
         (["FILE", "--jobs", "2", "--scheduler", "tcp://x:1"], "give one"),
-        (["FILE", "--profile", "fair"], "--profile is for the paper's grid"),
         (["FILE", "--export", "rows.txt"], "suffix of rows.txt"),
         (["FILE", "--export", "missing/rows.csv"], "there is no folder"),
-        (["paper", "--profile", "fare"], "did you mean 'fair'"),
+        (["fare"], "unknown study 'fare'; allowed: paper, text, as-run"),
+        (["papers"], "did you mean 'paper'"),
         (["missing.toml"], "cannot read experiments from missing.toml"),
         ([], "Missing argument"),
     ],

@@ -13,9 +13,8 @@ from dim import HarmonyMatrix
 from minisim.errors import FileError, InputError
 from minisim.geometry import Intersection, Movement
 from minisim.vehicle import VehicleType
-from scenarios import PAPER, five_way, four_way, three_way
-
-MAKERS = {3: three_way, 4: four_way, 5: five_way}
+from scenarios import PAPER, five_way, four_way
+from scenarios.library import MAKERS
 
 #: The paper's table "Harmony matrix for a four-way intersection", row by row.
 PAPER_TABLE = """

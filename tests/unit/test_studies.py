@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines import FixedTime
+from dim import Dim
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.capacity import Search, capacities, grows
@@ -38,6 +39,18 @@ def test_the_paper_s_grid_is_700_hours(name: str) -> None:
     published_cells = published()[["series", "arms", "split", "density"]].drop_duplicates()
     wanted = {tuple(row) for row in published_cells.itertuples(index=False)}
     assert {(c.series, c.arms, c.split, c.density) for c in cases} == wanted
+    runs = STUDIES[name].runs(10)
+    assert len({experiment.key for _, experiment in runs}) == len(runs)
+    assert len(runs) == 700 - 7 * sum(c.series in STUDIES[name].few for c in cases)
+
+
+def test_priorities_by_inflow_where_the_text_has_them() -> None:
+    """The highest is that "with the maximum incoming traffic": a and c, then b and d."""
+    wanted = Case("paper", "dim", "dim-inflow", 4, "4:1:4:1", 200.0)
+    assert wanted in STUDIES["text"].cases
+    experiment = wanted.experiment(1)
+    assert isinstance(experiment.controller, Dim)
+    assert experiment.controller.ranks(experiment.scenario.site()) == (0, 2, 1, 3)
 
 
 def test_the_as_run_study_runs_what_ran() -> None:
@@ -147,10 +160,11 @@ def test_crossing_finds_the_root_of_a_line(root: float, slope: float, points: in
 def test_crossing_at_the_ends() -> None:
     always = crossing({100.0: (1.0, 1.1), 200.0: (2.0, 2.1)})
     assert always.density == -math.inf
-    assert always.point == "from the lowest on"
+    assert always.point == "all"
+    assert crossing({100.0: (1.0, 1.0), 200.0: (-1.0, -1.0)}).point == "up to 150"
     never = crossing({100.0: (-1.0, -1.1), 200.0: (0.0, 0.0)})
     assert never.density == math.inf
-    assert str(never) == "never (–)"
+    assert str(never) == "never"
     again = crossing({0.0: (-1.0, -1.0), 100.0: (1.0, 1.0), 200.0: (1.0, 1.0), 400.0: (-1.0, -1.0)})
     assert (again.density, again.until) == (50.0, 300.0)
     assert str(again) == "50 to 300 (50 to 50)"
@@ -177,7 +191,7 @@ def test_crossing_refuses() -> None:
 def test_differences_are_paired_by_seed() -> None:
     rows = pd.DataFrame({
         "series": ["dim"] * 3 + ["x"] * 3, "density": [150.0] * 6, "seed": [1, 2, 3, 3, 2, 4],
-        "m": [1.0, 2.0, 3.0, 30.0, 20.0, 40.0],
+        "m": [1.0, 2.0, 3.0, 30.0, 20.0, 40.0], "arrivals": "same", "error": None,
     })  # fmt: skip
     assert paired_differences(rows, "dim", "x", "m") == {150.0: [-18.0, -27.0]}
     assert paired_differences(rows, "dim", "nobody", "m") == {}
