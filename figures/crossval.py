@@ -53,7 +53,9 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
         title = ", ".join(group)
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
-        yield _file("trips", *group), f"{title}: every trip", trips_figure(ordered)
+        drawable = [result for result in ordered if any(len(ours) for ours, _ in _both(result))]
+        if drawable:  # in a short run nobody may have arrived
+            yield _file("trips", *group), f"{title}: every trip", trips_figure(drawable)
     for result in results:
         if result.film is not None and result.film.parting is not None:
             name = result.case.name

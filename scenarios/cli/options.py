@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from minisim.errors import InputError
+from minisim.geometry import ARM_NAMES
 
 if TYPE_CHECKING:
+    from minisim.arrivals import Arrivals as ArrivalTable
     from scenarios.scenario import Scenario
 
 ScenarioName = Annotated[
@@ -60,7 +62,8 @@ ProfileName = Annotated[
     typer.Option(
         "--profile", "-p", metavar="NAME",
         help="Vehicle and speeds: paper (what its text prescribes), fair (one vehicle and "
-        "speed limit for every controller) or as_run (what produced the published numbers).",
+        "speed limit for every controller), as_run (what produced the published numbers) or "
+        "as_run_signals (the vehicle of its signals).",
     ),
 ]  # fmt: skip
 Side = Annotated[
@@ -103,7 +106,7 @@ SumoModel = Annotated[
     str | None,
     typer.Option(
         metavar="IDM|Krauss|CC",
-        help="SUMO's car-following model; by default CC under the profile as_run, else IDM.",
+        help="SUMO's car-following model; by default the vehicle's own.",
         show_default=False,
     ),
 ]  # fmt: skip
@@ -155,7 +158,26 @@ def build_scenario(
     )
     if arrivals is None:
         return made
-    return replace(made, recorded=read_arrivals(arrivals, made.intersection.n))
+    recorded = read_arrivals(arrivals, made.intersection.n)
+    _check_arms(arrivals, recorded, made.intersection.n)
+    return replace(made, recorded=recorded)
+
+
+#: Arrivals that use neither the last lane nor the last manoeuvre by chance: with equal shares on 4
+#: arms (1/2)^30, one in 10^9.
+ENOUGH = 30
+
+
+def _check_arms(path: Path, recorded: ArrivalTable, n: int) -> None:
+    """Refuse a table that was recorded on a junction with fewer arms: it would be read wrongly."""
+    if len(recorded) < ENOUGH:
+        return
+    arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
+    if arms < n:
+        raise InputError(
+            f"{path} looks like arrivals of a junction with {arms} arms: none comes from lane "
+            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+        )
 
 
 def _numbers(option: str, text: str, separator: str, example: str) -> tuple[float, ...]:

@@ -565,3 +565,16 @@ def test_bad_input_to_the_proofs(
     monkeypatch.chdir(tmp_path)
     assert message in fails(capsys, *arguments)
     assert not list(tmp_path.iterdir())
+
+
+def test_arrivals_of_a_smaller_junction_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """They fit, but a 3-arm manoeuvre 2 would be read as straight on."""
+    table = tmp_path / "three.csv"
+    rows = [f"{k},{'abc'[k % 3]},{k % 2 + 1}" for k in range(40)]
+    table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows, ""]))
+    message = fails(capsys, "run", "four-way", "--arrivals", str(table))
+    assert "junction with 3 arms" in message
+    table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows[:3], ""]))
+    assert main(["run", "four-way", "--arrivals", str(table), "--horizon", "60"]) == 0
