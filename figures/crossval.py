@@ -104,7 +104,7 @@ def trips_figure(results: Sequence[Result]) -> Figure:
     figure = style.new_figure(max(6.4, 2.7 * columns + 0.9), 7.6)
     panels = figure.subplots(3, columns, squeeze=False)
     figure.subplots_adjust(
-        left=0.62 / figure.get_figwidth(), right=1.0 - 0.15 / figure.get_figwidth(), top=0.865,
+        left=0.75 / figure.get_figwidth(), right=1.0 - 0.15 / figure.get_figwidth(), top=0.865,
         bottom=0.065, wspace=0.3, hspace=0.5,
     )  # fmt: skip
     for k, result in enumerate(results):

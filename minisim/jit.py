@@ -67,7 +67,7 @@ def _cache_class() -> Any:
         """numba's cache on disk; what is there counts only if none of our sources has changed."""
 
         def __init__(self, function: Callable[..., object]) -> None:
-            super().__init__(function)  # type: ignore[no-untyped-call]
+            super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
             self._cache_file._source_stamp = {_digest(folder), _digest(Path(__file__).parent)}
 

@@ -225,25 +225,32 @@ def reference() -> pd.DataFrame:
     return _reference().copy()
 
 
-def reference_value(
-    cell: Cell, metric: str, controller: str | None = None, lane: str = "all"
-) -> float:
-    """One published mean [s], of the cell's controller or of another; raises `InputError`."""
+def reference_rows(cell: Cell, metric: str, lane: str = "all") -> pd.DataFrame:
+    """What the paper has of one mean of a cell: the rows of `reference`, none or one."""
     table = _reference()
-    controller = cell.controller if controller is None else controller
-    choice("metric", metric, sorted(set(table["metric"])))
-    choice("published controller", controller, sorted(set(table["controller"])))
-    chosen = table[
-        (table["controller"] == controller)
+    return table[
+        (table["controller"] == cell.controller)
         & (table["arms"] == cell.arms)
         & (table["split"] == cell.split)
         & (table["density"] == cell.density)
         & (table["metric"] == metric)
         & (table["lane"] == lane)
-    ]
-    if chosen.empty:
-        raise InputError(f"the paper has no {metric} of {controller}, lane {lane}, for {cell}")
-    return float(chosen["value"].iloc[0])
+    ].copy()
+
+
+def reference_value(
+    cell: Cell, metric: str, controller: str | None = None, lane: str = "all"
+) -> float:
+    """One published mean [s], of the cell's controller or of another; raises `InputError`."""
+    table = _reference()
+    if controller is not None:
+        cell = cell._replace(controller=controller)
+    choice("metric", metric, sorted(set(table["metric"])))
+    choice("published controller", cell.controller, sorted(set(table["controller"])))
+    rows = reference_rows(cell, metric, lane)
+    if rows.empty:
+        raise InputError(f"the paper has no {metric} of {cell.controller}, lane {lane}, for {cell}")
+    return float(rows["value"].iloc[0])
 
 
 def _cell(split: str, density: int, arms: int, controller: str) -> Cell:

@@ -211,6 +211,7 @@ def _results(
             except BrokenExecutor as error:
                 yield k, error
                 return
+            # k=k keeps this k, not the loop's last; mypy cannot infer such a default.
             running[k].add_done_callback(lambda _, k=k: done.put(k))  # type: ignore[misc]
 
     try:

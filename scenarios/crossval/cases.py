@@ -19,7 +19,7 @@ from scenarios.paper import (
     SPLITS,
     Cell,
     controller_of,
-    reference,
+    reference_rows,
     replay,
 )
 from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
@@ -96,15 +96,11 @@ class Case:
         """The paper's mean [s]; None where it has none that the cell could be expected to give."""
         if not self.same_law or self.scenario.horizon != HOUR:
             return None
-        table = reference()
-        chosen = table[
-            (table["controller"] == PUBLISHED.get(self.controller))
-            & (table["arms"] == self.scenario.intersection.n)
-            & (table["split"] == self.split)
-            & (table["density"] == self.density)
-            & (table["metric"] == metric)
-            & (table["lane"] == lane)
-        ]
+        who = PUBLISHED.get(self.controller)
+        if who is None or not float(self.density).is_integer():
+            return None
+        cell = Cell(self.split, int(self.density), self.scenario.intersection.n, who)
+        chosen = reference_rows(cell, metric, lane)
         if self.published is None:
             chosen = chosen[chosen["comparable"] == "yes"]
         return None if chosen.empty else float(chosen["value"].iloc[0])

@@ -110,6 +110,7 @@ class Traffic(RuleBasedStateMachine):
         simulation = self._simulation()
         simulation.advance(self.time)
         session = simulation._session
+        # Of `CheckedSession`; the protocol of sessions does not have it.
         self.going = set(session._going)  # type: ignore[attr-defined]
         return simulation.view()
 

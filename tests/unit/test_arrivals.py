@@ -178,7 +178,7 @@ def test_the_table_is_sorted_by_time_then_lane_and_read_only() -> None:
 def test_broken_columns_are_refused(columns: tuple[object, ...], message: str) -> None:
     time, lane, manoeuvre = columns
     with pytest.raises(InputError, match=message):
-        Arrivals(time=time, lane=lane, manoeuvre=manoeuvre)  # type: ignore[arg-type]
+        Arrivals(time=time, lane=lane, manoeuvre=manoeuvre)  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_check_names_what_the_geometry_does_not_have() -> None:
@@ -213,7 +213,7 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
 )
 def test_impossible_demand_is_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        Demand(**{"density": 100.0, **options})  # type: ignore[arg-type]
+        Demand(**{"density": 100.0, **options})  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
@@ -318,7 +318,7 @@ def test_unreadable_files_are_reported(tmp_path: Path) -> None:
         with pytest.raises(FileError, match="cannot read arrivals from"):
             read_arrivals(path)
     with pytest.raises(InputError, match="arrivals file must be"):
-        read_arrivals(3)  # type: ignore[arg-type]
+        read_arrivals(3)  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_unwritable_files_are_reported(tmp_path: Path) -> None:
