@@ -57,7 +57,9 @@ class Agent:
         half of the green zone after losing its right of way ("it is granted the right of way by
         others"). By the stoppable rule such a vehicle is stopping, and waits. Not yet its lane's
         front vehicle, or held out by the gate, it does what it did before. Otherwise it goes
-        exactly if it belongs to the clique.
+        exactly if it belongs to the clique; where it does not know somebody's intent, exactly if
+        it belongs to the clique of every case that may be meant. So all who go belong to the
+        clique of the true case, however little each of them knows.
 
         Args:
             percept: what it sees.
@@ -72,8 +74,6 @@ class Agent:
             if rules.gate == "clear":
                 return self.right_of_way
         if self.vehicle in percept.participants:
-            case = percept.case
-            if percept.crossing:
-                case = table.admitted(case, percept.occupied)
-            self.right_of_way = bool(table.lanes(case) >> self.lane & 1)
+            lanes = table.surely(percept.case, percept.unknown, percept.occupied)
+            self.right_of_way = bool(lanes >> self.lane & 1)
         return self.right_of_way

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
-from itertools import combinations, pairwise
+from functools import cache, lru_cache, reduce
+from itertools import combinations, pairwise, product
+from operator import and_, mul
 
 import networkx as nx
 
@@ -140,6 +141,9 @@ class DecisionTable:
         admitted: (case, crossing) -> the case without the participants that are in conflict with
             one of the movements `crossing`, an integer with bit k set for the k-th movement.
             Movements of one lane follow each other and are not in conflict.
+        surely: (case, unknown, crossing) -> lanes with the right of way whatever manoeuvre the
+            participants of the lanes `unknown` (bit i for lane i) take, who are missing in the
+            case, among those whom `crossing` admits.
 
     Raises:
         InputError: unknown order, or priorities that are no permutation of the lanes.
@@ -157,6 +161,7 @@ class DecisionTable:
         self.priorities = lane_ranks(priorities, matrix.n)
         self.lanes = cache(self._solve)
         self.admitted = lru_cache(maxsize=1 << 16)(self._admit)
+        self.surely = lru_cache(maxsize=1 << 16)(self._agree)
 
     def case(self, movements: Iterable[Movement | str]) -> int:
         """The case of these participants; raises `InputError` as `decide` does."""
@@ -209,6 +214,15 @@ class DecisionTable:
             )
 
         return self.case(m for m in self.participants(case) if free(m))
+
+    def _agree(self, case: int, unknown: int, crossing: int) -> int:
+        n = self.matrix.n
+        digits = [n**lane for lane in range(n) if unknown >> lane & 1]
+        possible = (
+            case + sum(map(mul, manoeuvres, digits))
+            for manoeuvres in product(range(1, n), repeat=len(digits))
+        )
+        return reduce(and_, (self.lanes(self.admitted(c, crossing)) for c in possible))
 
 
 @lru_cache(maxsize=1024)

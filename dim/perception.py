@@ -22,6 +22,9 @@ COMMITS = ("stoppable", "paper")
 #: A host may report a front bumper that has just passed a mark a rounding error before it [m].
 ROUNDING = 1e-6
 
+#: The manoeuvre of a vehicle whose intent the ego does not know, in what it sees: it may take any.
+UNKNOWN = 0
+
 #: What an ego sees of a view: again a view, ordered as every view is. It sees itself exactly.
 See = Callable[[View, Observed], View]
 
@@ -57,13 +60,17 @@ class Percept(NamedTuple):
         crossing: ids of the vehicles that are crossing: committed, or any part of the body in
             the junction.
         case: the participants' movements as an integer, see `DecisionTable`.
-        occupied: the crossing vehicles' movements, an integer with bit k for the k-th movement.
+        occupied: the crossing vehicles' movements, an integer with bit k for the k-th movement;
+            all of its lane where the intent is `UNKNOWN`.
+        unknown: lanes whose participant's intent is `UNKNOWN`, an integer with bit i for lane i;
+            the case is without them.
     """
 
     participants: tuple[int, ...]
     crossing: tuple[int, ...]
     case: int
     occupied: int
+    unknown: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,7 +109,8 @@ class Reader:
         """Who takes part and who is crossing, in a view ordered by lane and front to back."""
         n, start = self.n, self.zones.yellow_start + ROUNDING
         participants, crossing = [], []
-        case = occupied = 0
+        case = occupied = unknown = 0
+        any_manoeuvre = (1 << n - 1) - 1
         lane_served = -1
         for vehicle in view.vehicles:
             if vehicle.distance > start:
@@ -113,8 +121,10 @@ class Reader:
                 lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
-                occupied |= 1 << lane * (n - 1) + manoeuvre - 1
+                bits = any_manoeuvre if manoeuvre == UNKNOWN else 1 << manoeuvre - 1
+                occupied |= bits << lane * (n - 1)
             elif front:
                 participants.append(vehicle.id)
                 case += manoeuvre * n**lane
-        return Percept(tuple(participants), tuple(crossing), case, occupied)
+                unknown |= (manoeuvre == UNKNOWN) << lane
+        return Percept(tuple(participants), tuple(crossing), case, occupied, unknown)

@@ -6,7 +6,7 @@ import itertools
 from random import Random
 
 import numpy as np
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from dim import DecisionTable, HarmonyMatrix, decide, explain
@@ -77,3 +77,31 @@ def test_whoever_goes_first_does_not_change_who_goes_with_it(
     before = chosen(set(participants), crossing)
     gone = {m for m in sorted(before) if random.random() < 0.5}
     assert chosen(set(participants) - gone, crossing | gone) == before - gone
+
+
+@given(cases(), st.integers(min_value=0), st.data())
+def test_with_unknown_intents_whoever_goes_surely_goes_in_every_case_that_may_be_meant(
+    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]],
+    hidden: int,
+    data: st.DataObject,
+) -> None:
+    matrix, movements, order, ranks = case
+    assume(matrix.n <= 5)  # (n−1)^n cases are compared
+    table = DecisionTable(matrix, order, ranks)
+    known = [m for m in movements if not hidden >> m.origin & 1]
+    unknown = sorted({m.origin for m in movements} - {m.origin for m in known})
+    lanes = table.surely(table.case(known), sum(1 << lane for lane in unknown), 0)
+    meant = [
+        decide([*known, *(Movement(lane, j) for lane, j in zip(unknown, wishes, strict=True))],
+               matrix, order, ranks)
+        for wishes in itertools.product(range(1, matrix.n), repeat=len(unknown))
+    ]  # fmt: skip
+    assert [lane for lane in range(matrix.n) if lanes >> lane & 1] == sorted(
+        set.intersection(*({m.origin for m in clique} for clique in meant))
+    )
+    crossing = data.draw(st.integers(0, 2 ** len(matrix.movements) - 1))
+    held_out = table.surely(table.case(known), sum(1 << lane for lane in unknown), crossing)
+    occupied = [m for k, m in enumerate(matrix.movements) if crossing >> k & 1]
+    for m in known:
+        if held_out >> m.origin & 1:
+            assert all(m.origin == o.origin or matrix.harmony(m, o) for o in occupied)

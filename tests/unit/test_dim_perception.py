@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dim import DecisionTable, ExactPerception, HarmonyMatrix, Perception, Zones
-from dim.perception import Reader
+from dim.perception import UNKNOWN, Reader
 from minisim.control import COMMIT_MARGIN, Observed, View
 from minisim.errors import InputError
 from scenarios import four_way
@@ -30,7 +30,14 @@ def occupied(*movements: str) -> int:
 
 
 def test_an_empty_view() -> None:
-    assert STOPPABLE.read(view()) == ((), (), 0, 0)
+    assert STOPPABLE.read(view()) == ((), (), 0, 0, 0)
+
+
+def test_a_vehicle_of_unknown_intent_may_take_any_manoeuvre() -> None:
+    crossing = car(1, "b2", -3.0)._replace(manoeuvre=UNKNOWN)
+    taking_part = car(2, "c1", 4.0)._replace(manoeuvre=UNKNOWN)
+    percept = STOPPABLE.read(view(crossing, taking_part, car(3, "d3", 5.0)))
+    assert percept == ((2, 3), (1,), 3 * 4**3, occupied("b1", "b2", "b3"), 1 << 2)
 
 
 def test_front_vehicles_between_yellow_start_and_junction_take_part() -> None:
@@ -73,15 +80,15 @@ def test_a_committed_front_vehicle_blocks_its_lane_until_it_has_entered(
 ) -> None:
     others = car(2, "a3", 7.0), car(3, "b1", 5.0)
     percept = reader.read(view(car(1, "a1", distance, speed), *others))
-    assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"))
+    assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"), 0)
     percept = reader.read(view(car(1, "a1", -0.01, speed), *others))
-    assert percept == ((2, 3), (1,), TABLE.case(["a3", "b1"]), occupied("a1"))
+    assert percept == ((2, 3), (1,), TABLE.case(["a3", "b1"]), occupied("a1"), 0)
 
 
 def test_all_committed_vehicles_of_a_lane_are_crossing() -> None:
     """6.25 m to stop at 5 m/s: neither of the two can."""
     percept = STOPPABLE.read(view(car(1, "a1", 0.5, 5.0), car(2, "a2", 5.5, 5.0)))
-    assert percept == ((), (1, 2), 0, occupied("a1", "a2"))
+    assert percept == ((), (1, 2), 0, occupied("a1", "a2"), 0)
 
 
 def test_behind_vehicles_in_the_junction_the_next_one_is_the_front_vehicle() -> None:
@@ -149,7 +156,7 @@ def test_braking_for_the_hold_line_never_looks_committed(green: float, b: float)
 
 def test_outside_the_yellow_zone_nobody_counts() -> None:
     percept = STOPPABLE.read(view(car(1, "a1", 8.4, 13.0)))
-    assert percept == ((), (), 0, 0)
+    assert percept == ((), (), 0, 0, 0)
 
 
 def test_exact_perception_is_the_view_itself() -> None:
