@@ -16,9 +16,10 @@ from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.pool import workers
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep.experiment import Experiment
-from scenarios.sweep.runner import sweep, workers
+from scenarios.sweep.runner import sweep
 
 if TYPE_CHECKING:
     import pandas as pd

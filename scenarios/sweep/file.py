@@ -134,7 +134,8 @@ def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
     except (OSError, ValueError, RecursionError) as error:
-        raise FileError(f"cannot read experiments from {os.fspath(path)}: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"cannot read experiments from {os.fspath(path)}: {reason}") from error
 
 
 def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
