@@ -18,8 +18,8 @@ from scenarios.controllers import controller_named
 from scenarios.library import four_way
 from scenarios.pool import workers
 from scenarios.statistics import Interval, mean_interval
+from scenarios.sweep import sweep
 from scenarios.sweep.experiment import Experiment
-from scenarios.sweep.runner import sweep
 
 if TYPE_CHECKING:
     import pandas as pd

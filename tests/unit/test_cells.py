@@ -20,8 +20,8 @@ from scenarios.statistics import (
     queue_growth,
 )
 from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs
+from scenarios.sweep import sweep
 from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
-from scenarios.sweep.runner import sweep
 
 Floats = npt.NDArray[np.float64]
 

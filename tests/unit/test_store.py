@@ -18,8 +18,8 @@ from minisim.errors import FileError, InputError
 from scenarios import four_way, three_way
 from scenarios.cli import main
 from scenarios.sweep import experiment as experiment_module
+from scenarios.sweep import sweep
 from scenarios.sweep.experiment import Experiment, Outcome, failed, run_experiment
-from scenarios.sweep.runner import sweep
 from scenarios.sweep.store import APPLICATION, SCHEMA, Store
 
 ROOT = Path(__file__).parents[2]
@@ -224,7 +224,7 @@ from minisim.errors import FileError
 from scenarios import three_way
 from scenarios.sweep.experiment import Experiment
 from scenarios.sweep.store import Store
-from scenarios.sweep.runner import sweep
+from scenarios.sweep import sweep
 from minisim.simulation import simulate
 
 simulate(three_way(200, horizon=1), Dim())  # compile, and write what that writes, before the limit

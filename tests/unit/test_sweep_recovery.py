@@ -18,9 +18,9 @@ from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
 from scenarios.pool import pooled, processes
+from scenarios.sweep import Experiment, sweep
 from scenarios.sweep.experiment import MEASURED
 from scenarios.sweep.file import read_experiments
-from scenarios.sweep.runner import Experiment, sweep
 from scenarios.sweep.store import Store
 from tests.runs import Deadly, killing
 
@@ -80,7 +80,7 @@ def test_giving_up_ends_what_runs() -> None:
 
 PARENT = """
 import os, time
-from scenarios.sweep.runner import workers
+from scenarios.pool import workers
 if __name__ == "__main__":
     pool = workers(2)
     held = [pool.submit(time.sleep, 0.5) for _ in range(2)]
