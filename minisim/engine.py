@@ -13,6 +13,9 @@ that any of its leaders asks for (`MSVehicle::planMoveInternal`, with the model'
 Who only crosses its way is no leader: for those SUMO asks of a vehicle no more than to be able to
 stop before the crossing (`adaptToJunctionLeader`), and the CC model answers that question with the
 radar's leader, whoever is meant.
+
+One rule is left out: inside the junction SUMO's vehicles also follow who crosses before them, while
+there is room up to the crossing. `docs/fidelity.md` shows the one replay in which that was seen.
 """
 
 from __future__ import annotations

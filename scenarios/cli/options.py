@@ -33,7 +33,7 @@ ControllerName = Annotated[
         "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
         "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
         "dim-paper-commit, dim-as-run, dim-as-run-size, dim-as-run-exit-14, fixed-time, "
-        "fixed-time-equal, adaptive, all-way-stop, longest-queue, "
+        "fixed-time-equal, adaptive, actuated, all-way-stop, longest-queue, "
         "v2ic (serving list and speed advice; the published run's under the profile as_run), "
         "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
         "unregulated.",
