@@ -190,7 +190,7 @@ class DimSession:
         agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
         start = self.plan.marks[0] + ROUNDING
         look_again = waiting = False
-        table, until = self._table(view)
+        table, until = self.table(view)
         seen = percept = None
         for ego in view.vehicles:
             if ego.distance > start:
@@ -215,8 +215,8 @@ class DimSession:
             commands.append(Wake(max(until, view.time + self._dt)))
         return commands
 
-    def _table(self, view: View) -> tuple[DecisionTable, float]:
-        """The table of the ranks in force now, and until when they are [s]."""
+    def table(self, view: View) -> tuple[DecisionTable, float]:
+        """The table of the ranks in force now, and until when they are [s]; same view, same."""
         if self._ranks is None:
             return self.rules.table, math.inf
         ranks, until = self._ranks(view)
