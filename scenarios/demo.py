@@ -17,7 +17,8 @@ from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
 from scenarios.statistics import Interval, mean_interval
-from scenarios.sweep import Experiment, sweep, workers
+from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.runner import sweep, workers
 
 if TYPE_CHECKING:
     import pandas as pd

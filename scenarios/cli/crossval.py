@@ -174,7 +174,7 @@ def _compare(cases: list[Case], seeds: range, processes: int, folder: Path, comm
     """Run, write, and tell; whether a run failed."""
     from scenarios.crossval import crossvalidate, film, write_report
     from scenarios.crossval.report import CSV, REPORT, summary
-    from scenarios.sweep import workers
+    from scenarios.sweep.runner import workers
 
     with workers(processes) as executor:
         with bar("simulating in both hosts") as progress:

@@ -27,7 +27,7 @@ from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
 from scenarios.scenario import FAIR, Profile, Scenario, parse_split, profile_named
-from scenarios.sweep import Experiment
+from scenarios.sweep.runner import Experiment
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)
 FOUR = Intersection(BEARINGS, arm_length=60.0)

@@ -52,8 +52,9 @@ from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.cli import main
 from scenarios.scenario import FAIR, Scenario
+from scenarios.strategies import intersections
+from tests.examples import share
 from tests.runs import Fixed, replayed
-from tests.strategies import intersections, share
 
 FAIR_FOUR = four_way(100, profile="fair")
 

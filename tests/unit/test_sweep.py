@@ -23,9 +23,9 @@ from minisim.control import Command, Plan, Site, Unregulated, View
 from minisim.errors import InputError, MinisimError
 from scenarios import four_way, three_way
 from scenarios.demo import METRICS, Tour, average, run_tour
-from scenarios.experiment import MEASURED
 from scenarios.statistics import mean_interval, student_quantile
-from scenarios.sweep import Experiment, sweep, workers
+from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.runner import Experiment, sweep, workers
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,7 +97,7 @@ def test_rows_do_not_depend_on_the_executor() -> None:
 
 def test_default_is_a_pool_of_processes() -> None:
     script = (
-        "from scenarios.sweep import Experiment, sweep\n"
+        "from scenarios.sweep.runner import Experiment, sweep\n"
         "from scenarios import three_way\n"
         "from dim import Dim\n"
         "if __name__ == '__main__':\n"

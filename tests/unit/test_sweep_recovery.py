@@ -16,10 +16,10 @@ import pytest
 from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
-from scenarios.experiment import MEASURED
-from scenarios.experiment_file import read_experiments
-from scenarios.store import Store
-from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.file import read_experiments
+from scenarios.sweep.runner import Experiment, sweep
+from scenarios.sweep.store import Store
 from tests.runs import Deadly
 
 ROOT = Path(__file__).parents[2]
@@ -57,7 +57,7 @@ def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
 
 PARENT = """
 import os, time
-from scenarios.sweep import workers
+from scenarios.sweep.runner import workers
 if __name__ == "__main__":
     pool = workers(2)
     held = [pool.submit(time.sleep, 0.5) for _ in range(2)]

@@ -22,13 +22,11 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
 from minisim.errors import instance, integer
-from scenarios.experiment import Experiment, Outcome, Row, failed, run_experiment
-from scenarios.store import Store
+from scenarios.sweep.experiment import Experiment, Outcome, Row, failed, run_experiment
+from scenarios.sweep.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Experiment", "Progress", "finished", "sweep", "workers"]
 
 Progress = Callable[[int, int], None]
 

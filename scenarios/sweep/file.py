@@ -42,9 +42,9 @@ from minisim.errors import (
     show,
 )
 from scenarios.controllers import controller_named
-from scenarios.experiment import Experiment
 from scenarios.library import scenario_named
 from scenarios.scenario import Scenario, parse_split, profile_named
+from scenarios.sweep.experiment import Experiment
 
 #: More is surely a typing error.
 MAX_EXPERIMENTS = 1_000_000
