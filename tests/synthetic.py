@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dim import NoisyPerception
+from dim.tally import Tallied
 from minisim.geometry import ARM_NAMES
 from scenarios.sweep.experiment import Experiment
 
@@ -28,8 +30,9 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
-    base = CURVES[experiment.label][0]
-    load = density / capacity_of(experiment.label, arms)
+    label = experiment.label or "dim"  # the studies of perception name what errs, not a series
+    base = CURVES[label][0]
+    load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
     waiting = wobble * base / max(1.0 - load, 0.02)
     trips = int(density * arms * horizon / 3600.0)
@@ -53,8 +56,22 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     return {
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
-        **lanes, "queue_growth": excess, "growing": excess > 0.0,
+        **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
         "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
+    }  # fmt: skip
+
+
+def tally(experiment: Experiment, trips: int) -> dict[str, float]:
+    """Counts of `dim.tally`, in proportion to the intent errors; nothing where nobody errs."""
+    controller = experiment.controller
+    if not isinstance(controller, Tallied):
+        return {}
+    perception = controller.dim.perception
+    assert isinstance(perception, NoisyPerception)
+    errors = max(perception.intent_error, *perception.unsignalled)
+    return {
+        "collisions": int(errors * 40), "crossings": trips - 9, "false_grants": int(errors * 300),
+        "disagreement_s": 400.0 * errors, "deadlock_s": 0.0 if perception.shared else 50.0,
     }  # fmt: skip
 
 
