@@ -154,9 +154,15 @@ class DimSession:
         rules: those that all agents hold.
         reader: how they read what they see.
         plan: what the host has to provide.
+
+    Args:
+        dim, site: whose run it is, and where.
+        follows: whether the vehicle of an id follows DIM; others are seen, but not hosted.
     """
 
-    def __init__(self, dim: Dim, site: Site) -> None:
+    def __init__(
+        self, dim: Dim, site: Site, follows: Callable[[int], bool] = lambda _: True
+    ) -> None:
         instance("dim", dim, Dim)
         instance("site", site, Site)
         zones = dim.zones
@@ -178,6 +184,7 @@ class DimSession:
         self._ranks = _ranking(dim, site)
         self._see = dim.perception.start(site)
         self._dt = site.dt
+        self._follows = follows
         self._agents: dict[int, Agent] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -189,9 +196,9 @@ class DimSession:
         table, until = self._table(view)
         seen = percept = None
         for ego in view.vehicles:
-            if ego.distance > start:
-                continue
             vehicle = ego.id
+            if ego.distance > start or not self._follows(vehicle):
+                continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
             sight = self._see(view, ego)
