@@ -68,8 +68,9 @@ class Humans:
             drivers as in the usual maximum-likelihood estimate (Tian et al. 1999, Transp. Res. A
             33:187). 0 makes all drivers alike, as the HCM takes it; a published value for these
             junctions was not found.
-        reaction: from seeing that the way is free to moving [s]. 1.1 s is the median of Olson and
-            Sivak (1986); highway design takes 2.0 s at a stop sign, for slow drivers (AASHTO).
+        reaction: from standing at the line to moving, where nobody is in the way [s]. The HCM's
+            all-way stop has a departure headway of 3.9 s then, of which 2.0 s are for moving up
+            (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign (AASHTO).
         unsignalled: the share of near and far turns that no indicator announces: 29 % of right
             and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid. Anal. Prev.
             74:1).
@@ -83,7 +84,7 @@ class Humans:
     critical_gaps: tuple[float, float, float] = (6.2, 6.5, 7.1)
     follow_up: tuple[float, float, float] = (3.3, 4.0, 3.5)
     deviation: float = 0.0
-    reaction: float = 1.1
+    reaction: float = 1.9
     unsignalled: tuple[float, float] = (0.29, 0.25)
     trust: str = "signals"
 

@@ -8,8 +8,8 @@ as at an all-way stop (the junction of equal roads), looks, and goes when
 - every vehicle inside has left its way,
 - no vehicle of DIM rolls through its yellow zone, and none will arrive within the critical gap,
 
-and that has been so for its reaction time. It sees positions, speeds and indicators, never a right
-of way.
+as soon as it has stood for its reaction time, for it foresees when a way becomes free. It sees
+positions, speeds and indicators, never a right of way.
 
 Nobody collides, if nobody believes in silence (`dim.humans.TRUSTS`): when a human starts, vehicles
 of DIM that are in conflict with it stand, or are outside the yellow zone, and no rule gives them
@@ -23,6 +23,7 @@ driving intend (SAE J3134); otherwise each would let the other go first.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -164,7 +165,7 @@ def _taken(
 
 
 class _Humans:
-    """The human drivers of a run: who stands since when, who may go since when, who went.
+    """The human drivers of a run: who stands since when, and who went.
 
     Attributes:
         sight: how far before the junction they look [m].
@@ -181,7 +182,6 @@ class _Humans:
         longest = max(humans.critical_gaps) * (1.0 + 3.0 * humans.deviation)
         self.sight = longest * site.speed_limit
         self._standing: dict[int, float] = {}  # vehicle: since [s]
-        self._free: dict[int, float] = {}  # vehicle: its way is free since [s]
         self._gone: set[int] = set()
         self._went: dict[int, float] = {}  # lane: when its last driver went [s]
 
@@ -207,27 +207,24 @@ class _Humans:
         queue = [v for v in here if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))
         commands: list[Command] = []
-        free: dict[int, float] = {}
         waiting: list[Observed] = []
         for vehicle in queue:
-            if self._is_free(vehicle, waiting, crossing, rolling):
-                free[vehicle.id] = self._free.get(vehicle.id, now)
-            if vehicle.id in free and self._is_ready(vehicle, free[vehicle.id], now):
+            free = self._is_free(vehicle, waiting, crossing, rolling)
+            if free and self._is_ready(vehicle, now):
                 commands.append(Go(vehicle.id))
                 self._gone.add(vehicle.id)
                 self._went[vehicle.lane] = now
                 crossing.append(vehicle)
             else:
                 waiting.append(vehicle)
-        self._free = free
         return [*commands, Wake(now + max(LOOK, self._dt))] if here else commands
 
-    def _is_ready(self, vehicle: Observed, free: float, now: float) -> bool:
-        """Whether a driver whose way is free since `free` has reacted; timers ring on steps."""
-        turn = self._readings.turns[self._readings.index(vehicle)]
-        followed = self._went.get(vehicle.lane, -self._humans.follow_up[turn])
-        ready = max(free + self._humans.reaction, followed + self._humans.follow_up[turn])
-        return now + self._dt / 2.0 >= ready
+    def _is_ready(self, vehicle: Observed, now: float) -> bool:
+        """Whether a driver has looked, and followed no sooner than it can; half a step early."""
+        humans, turn = self._humans, self._readings.turns[self._readings.index(vehicle)]
+        looked = self._standing[vehicle.id] + humans.reaction
+        followed = self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn]
+        return now + self._dt / 2.0 >= max(looked, followed)
 
     def _is_free(
         self,
