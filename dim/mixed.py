@@ -195,9 +195,7 @@ class _Humans:
             if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
                 heads.setdefault(vehicle.lane, vehicle)
         here = [v for v in heads.values() if drivers[v.id].human and v.distance <= self._yellow]
-        rolling = [
-            v for v in heads.values() if v.speed > STANDING and not drivers[v.id].human
-        ]
+        rolling = [v for v in heads.values() if v.speed > STANDING and not drivers[v.id].human]
         before = self._standing
         self._standing = {
             v.id: before.get(v.id, now)

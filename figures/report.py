@@ -41,6 +41,7 @@ SECTIONS = {
     ),
     "Capacity": ("capacity", "capacity-table"),
     "Fairness": ("fairness",),
+    "Human drivers": ("humans",),
     "Schematic figures": ("maps", "decision-4way", "worst-case"),
 }  # fmt: skip
 
@@ -159,10 +160,10 @@ def _made_table(made: Sequence[Made]) -> Table:
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
             "clique first) and says what the paper's rules give; `as-run` are the profiles "
             "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
-            "the published numbers must be compared with; `fair`, `gate`, `fairness` and "
-            "`capacity` are the profile `fair`: one vehicle, one limit for all. Wall is of what "
-            "was computed now, drawing not counted; CPU is of all runs, whenever made, and a run "
-            "that two studies share counts in both.",
+            "the published numbers must be compared with; `fair`, `gate`, `fairness`, "
+            "`humans` and `capacity` are the profile `fair`: one vehicle, one limit for all. Wall "
+            "is of what was computed now, drawing not counted; CPU is of all runs, whenever made, "
+            "and a run that two studies share counts in both.",
         ),
     )  # fmt: skip
 

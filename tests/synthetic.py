@@ -28,8 +28,9 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
-    base = CURVES[experiment.label][0]
-    load = density / capacity_of(experiment.label, arms)
+    label, _, share = experiment.label.partition("-humans-")
+    base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
+    load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
     waiting = wobble * base / max(1.0 - load, 0.02)
     trips = int(density * arms * horizon / 3600.0)
@@ -50,7 +51,13 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
         "time_loss_s": 3.0 + 1.5 * waiting,
         "depart_delay_s": 10.0 * max(load - 1.0, 0.0),
     }
+    groups = ("human", "automated") if share else ()
     return {
+        **{
+            f"{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+            for k, group in enumerate(groups)
+            for key, value in times.items()
+        },
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, "queue_growth": excess, "growing": excess > 0.0,

@@ -18,6 +18,7 @@ from scenarios.cli.options import (
     Density,
     Gui,
     Host,
+    Humans,
     KeepFiles,
     ProfileName,
     ScenarioName,
@@ -47,6 +48,7 @@ HOSTS = ("minisim", "sumo")
     "minisim run four-way --controller dim --density 300\n\n"
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
+    "minisim run four-way -c dim-harmonious -d 200 --profile fair --humans 0.3\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
     "[bold]Exit codes[/bold]\n\n"
@@ -55,6 +57,7 @@ HOSTS = ("minisim", "sumo")
 def run(
     scenario: ScenarioName,
     controller: ControllerName = "dim",
+    humans: Humans = 0.0,
     density: Density = None,
     split: Split = None,
     turns: Turns = None,
@@ -104,6 +107,7 @@ def run(
     from minisim.safety import safety_summary
     from scenarios.cli.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
+    from scenarios.mixing import driver_means, with_humans
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -119,7 +123,7 @@ def run(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    who = controller_named(controller, profile)
+    who = with_humans(controller_named(controller, profile), humans)
     everything = fcd is not None or trajectories is not None
     options = {
         "record": "all" if everything else "junction" if safety else None,
@@ -133,7 +137,7 @@ def run(
         raise InputError("--sumo-model, --gui, --keep-files and --sumo-fcd need --host sumo")
     else:
         result = simulate(what, who, seed, **options)
-    summary = result.summary()
+    summary = {**result.summary(), "drivers": driver_means(result)}
     with bar("measuring"):
         summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
         if trips is not None:
