@@ -137,7 +137,9 @@ def run(
         raise InputError("--sumo-model, --gui, --keep-files and --sumo-fcd need --host sumo")
     else:
         result = simulate(what, who, seed, **options)
-    summary = {**result.summary(), "drivers": driver_means(result)}
+    summary = result.summary()
+    if drivers := driver_means(result):
+        summary["drivers"] = drivers
     with bar("measuring"):
         summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
         if trips is not None:

@@ -48,9 +48,7 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
         trust=draw(st.sampled_from(SAFE)),
     )
     dim = Dim(order=draw(st.sampled_from(ORDERS)), gate=draw(st.sampled_from(GATES)))
-    return scenario, Mixed(
-        dim, draw(st.sampled_from(SHARES)), humans, draw(st.sampled_from(SAFE))
-    )
+    return scenario, Mixed(dim, draw(st.sampled_from(SHARES)), humans, draw(st.sampled_from(SAFE)))
 
 
 def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
@@ -60,7 +58,7 @@ def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
     assert unserved == [], f"vehicles {unserved} under {mixed}"
 
 
-@share(0.8)
+@share(0.5)
 @given(traffic())
 def test_safe_and_alive(given_traffic: tuple[Scenario, Mixed]) -> None:
     check(*given_traffic)
@@ -83,7 +81,7 @@ def seed_of(kinds: tuple[bool, ...], silent: tuple[bool, ...]) -> int:
 #: Every other movement beside each of lane a, up to the rotation of the junction.
 PAIRS = [((0, m), (lane, k)) for m in (1, 2, 3) for lane in (1, 2, 3) for k in (1, 2, 3)]
 #: The second comes so much later [s]: they meet at the line, in its yellow zone, or inside.
-DELAYS = (0.0, 0.4, 1.0, 1.7, 2.5, 3.4, 4.5, 6.0)
+DELAYS = (0.0, 0.6, 1.7, 3.4)
 
 
 @pytest.mark.parametrize("gate", GATES)

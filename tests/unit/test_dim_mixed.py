@@ -235,7 +235,7 @@ def test_with_humans() -> None:
     assert with_humans(dim, 1) == Mixed(dim, 1.0)
     stop = AllWayStop()
     assert with_humans(stop, 0.0) is stop
-    with pytest.raises(InputError, match="among vehicles of DIM .* not with 'all-way-stop'"):
+    with pytest.raises(InputError, match=r"among vehicles of DIM .* not with 'all-way-stop'"):
         with_humans(stop, 0.5)
 
 
