@@ -12,13 +12,19 @@ from matplotlib.lines import Line2D
 
 from figures import lines, style
 from minisim.geometry import ARM_NAMES
-from scenarios.archive import Archive, missing_note, smoke_test
-from scenarios.capacity import CASES
-from scenarios.crossing import METRICS, Crossing, crossing, paired_differences, with_total_delay
-from scenarios.fairness import LANE_WAIT, lane_waits
 from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
-from scenarios.studies import FAIR_DENSITIES, PRIORITIES, RIVALS
+from scenarios.studies.archive import Archive, missing_note, smoke_test
+from scenarios.studies.capacity import CASES
+from scenarios.studies.crossing import (
+    METRICS,
+    Crossing,
+    crossing,
+    paired_differences,
+    with_total_delay,
+)
+from scenarios.studies.fairness import LANE_WAIT, lane_waits
+from scenarios.studies.study import FAIR_DENSITIES, PRIORITIES, RIVALS
 
 #: The two gates whose losses are asked for, and whom they may lose to.
 GATES = ("dim", "dim-harmonious")

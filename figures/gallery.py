@@ -14,7 +14,7 @@ from figures import beyond, mixing, paper_results, paper_tables, schematic
 from figures.style import FORMATS, save
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import choice
-from scenarios.archive import Archive
+from scenarios.studies.archive import Archive
 
 #: What is drawn: a picture, or a table to read.
 Drawing = Figure | Table

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from figures import style
-from scenarios.cells import saturated
 from scenarios.statistics import mean_interval
+from scenarios.studies.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,7 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
 
     Args:
         axes: to draw on.
-        rows: of a study (`scenarios.results.Results.good`).
+        rows: of a study (`scenarios.studies.results.Results.good`).
         metric: a column.
         series: in the order of the legend; one without rows is left out.
     """

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from figures import lines, style
 from scenarios import paper
-from scenarios.archive import Archive, missing_note
-from scenarios.comparison import published
 from scenarios.paper import DENSITIES
+from scenarios.studies.archive import Archive, missing_note
+from scenarios.studies.comparison import published
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,10 +14,10 @@ from figures import style
 from figures.beyond import crossing_rows, losses
 from figures.tables import Table
 from minisim.geometry import ARM_NAMES
-from scenarios.archive import Archive
-from scenarios.comparison import causes, compare, score
 from scenarios.library import MAKERS
 from scenarios.statistics import Interval
+from scenarios.studies.archive import Archive
+from scenarios.studies.comparison import causes, compare, score
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,13 +15,13 @@ from figures.tables import Table
 from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.version import __version__
-from scenarios.archive import Archive, MissingRunsError, make_command
-from scenarios.cells import saturated
-from scenarios.comparison import SHOWN, compare, discrepancies, score
-from scenarios.crossing import METRICS
-from scenarios.reproduction import Made
-from scenarios.results import Results
-from scenarios.studies import STUDIES, Case
+from scenarios.studies.archive import Archive, MissingRunsError, make_command
+from scenarios.studies.cells import saturated
+from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
+from scenarios.studies.crossing import METRICS
+from scenarios.studies.reproduction import Made
+from scenarios.studies.results import Results
+from scenarios.studies.study import STUDIES, Case
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -50,7 +50,7 @@ class Look(NamedTuple):
 
 BROWN, GREY = "#7A4A1E", "#5C6470"
 
-#: Series (`scenarios.studies.Case`) -> look.
+#: Series (`scenarios.studies.study.Case`) -> look.
 LOOKS: Mapping[str, Look] = MappingProxyType({
     "dim": Look("DIM", BLUE, "o", "-"),
     "dim-harmonious": Look("DIM, harmonious gate", SKY, "p", "-"),

@@ -193,7 +193,8 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
                 lanes.append(lane)
                 manoeuvres.append(manoeuvre)
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        raise FileError(f"cannot read arrivals from {path}: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"cannot read arrivals from {path}: {reason}") from error
     return Arrivals(
         np.array(times, dtype=np.float64), np.array(lanes, dtype=np.int64),
         np.array(manoeuvres, dtype=np.int64),
@@ -214,7 +215,8 @@ def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
             ):
                 writer.writerow([time, ARM_NAMES[lane], manoeuvre])
     except (OSError, ValueError) as error:
-        raise FileError(f"cannot write arrivals to {path}: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"cannot write arrivals to {path}: {reason}") from error
 
 
 def _parse_row(

@@ -1,4 +1,4 @@
-"""What is simulated: scenarios, profiles, experiments and the command line."""
+"""What is simulated: scenarios and profiles here; sweeps, studies and the command line within."""
 
 from scenarios.library import five_way, four_way, from_bearings, regular, three_way
 from scenarios.scenario import AS_RUN, FAIR, PAPER, PROFILES, Profile, Scenario

@@ -16,8 +16,10 @@ from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.pool import workers
 from scenarios.statistics import Interval, mean_interval
-from scenarios.sweep import Experiment, sweep, workers
+from scenarios.sweep import sweep
+from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd

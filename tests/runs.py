@@ -94,3 +94,12 @@ class Deadly:
 def as_run(scenario: SmallScenario) -> SmallScenario:
     """The same with the vehicle of the published runs, inserted at rest, and steps of 0.02 s."""
     return dataclasses.replace(scenario, vehicle=AS_RUN.vehicle, dt=0.02, depart_speed=0.0)
+
+
+def killing(once: str) -> int:
+    """A task that kills its process as `Deadly` does: "always", never (""), or where no file is."""
+    if once and not Path(once).exists():
+        if once != "always":
+            Path(once).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 7

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from minisim.geometry import ARM_NAMES
-from scenarios.experiment import Experiment
+from scenarios.sweep.experiment import Experiment
 
 #: Label -> waiting at low demand [s] and capacity on four arms [veh/h/lane].
 CURVES = {

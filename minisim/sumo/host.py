@@ -43,7 +43,6 @@ from minisim.state import build_engine, build_law, build_road, build_vehicles, f
 from minisim.sumo.files import (
     CONFIGURATION,
     FCD,
-    TRIPS,
     read_trips,
     top_speed,
     write_configuration,
@@ -109,9 +108,11 @@ def simulate(
             "teleport" is what SUMO does by default, and did in the published runs: whoever runs
             into a vehicle ahead, or waits for 300 s, is put on the next road, or has arrived where
             there is none; touching inside the junction does not count.
-        keep_files: folder for the network, the routes, the configuration, SUMO's log and its
-            trips; by default they are temporary.
-        fcd: file for the floating-car data of every step that SUMO itself writes.
+        keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
+            and its trips; by default they are temporary. They stay also when the run fails, and
+            what is raised has a note that names the folder.
+        fcd: file for the floating-car data of every step that SUMO itself writes, made when the
+            run has ended well.
         gui: show it in sumo-gui.
         progress: called at every wake-up, with the steps done and the steps up to the horizon.
 
@@ -228,11 +229,18 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
     folder = Path(keep).absolute()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / TRIPS).unlink(missing_ok=True)  # of an earlier run
+        used = any(folder.iterdir())
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot write to folder {keep}: {reason}") from error
-    yield folder
+    if used:
+        raise FileError(f"folder {keep} is not empty: give SUMO's files a new or an empty one")
+    try:
+        yield folder
+    except BaseException as error:
+        if any(folder.iterdir()):
+            error.add_note(f"SUMO's files up to there are in {keep}")
+        raise
 
 
 def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) -> Job:
@@ -255,6 +263,7 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
     job = Job(
         command=_command(request.gui),
         folder=str(folder),
+        temporary=request.keep_files is None,
         model=model,
         plan=plan,
         road=build_road(site, plan),
@@ -280,7 +289,7 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
         fitting = [name for name, models in MODELS.items() if vehicle.model in models]
         raise InputError(
             f"SUMO's model {model} does not drive vehicles of the model {vehicle.model!r}; "
-            f"choose {' or '.join(fitting)}, or another vehicle"
+            f"choose {' or '.join(fitting)}, or {_vehicle_for(model)}"
         )
     if isinstance(vehicle, EngineVehicle) and (vehicle.spacing, vehicle.radar) != CC_FIXED:
         spacing, radar = CC_FIXED
@@ -289,6 +298,13 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
             f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
     return model
+
+
+def _vehicle_for(model: str) -> str:
+    """What to change about the vehicle for one of SUMO's models to drive it."""
+    if model == "CC":
+        return "an EngineVehicle: use --profile as_run"
+    return f"a vehicle of the model {' or '.join(map(repr, MODELS[model]))}"
 
 
 def _command(gui: bool) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ class Job(NamedTuple):
     Attributes:
         command: that starts SUMO.
         folder: to start it in.
+        temporary: whether the process removes the folder when its caller has gone.
         model: car-following model, one of `minisim.sumo.MODELS`.
         plan: of the session.
         road, law: of the run, with its limits, marks and lines.
@@ -33,6 +34,7 @@ class Job(NamedTuple):
 
     command: tuple[str, ...]
     folder: str
+    temporary: bool
     model: str
     plan: Plan
     road: Road

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import shutil
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
@@ -346,3 +347,6 @@ def main() -> None:
             caller.send(ended)
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             caller.send(Failed(str(error)))
+        except (EOFError, BrokenPipeError):
+            if job.temporary:  # the caller was killed, and cannot do it
+                shutil.rmtree(job.folder, ignore_errors=True)

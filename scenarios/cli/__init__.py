@@ -15,6 +15,7 @@ import typer
 from minisim.errors import CollisionError, MinisimError
 from scenarios.cli.app import app
 from scenarios.cli.terminal import drop_output, prepare_streams
+from scenarios.termination import Terminated, terminable
 
 __all__ = ["COMMANDS", "app", "main"]
 
@@ -35,17 +36,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input is one line on stderr and 2, a collision that stops a run or a stdout that cannot be
-    written is 1, Ctrl-C is 130. Nothing on purpose is a traceback.
+    written is 1, Ctrl-C is 130, SIGTERM is 143. Nothing on purpose is a traceback.
     """
     prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
+        with terminable():
+            code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
     except CollisionError as error:
-        return _fail(str(error), 1)
+        return _fail(_told(error), 1)
     except MinisimError as error:
-        return _fail(str(error))
+        return _fail(_told(error))
     except _USAGE_ERROR as error:
         message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
         help_of = [name for name in given[:1] if name in COMMANDS]
@@ -53,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"{message} (typed: {shlex.join(given)}; see {see})")
     except (KeyboardInterrupt, typer.Abort):
         code = 130
+    except Terminated as end:
+        return _fail("terminated", int(end.code or 0))
     except BrokenPipeError:
         # The reader of our output has gone (as `head` does): no more to say, and no complaint.
         drop_output()
@@ -65,6 +69,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == 130:
         typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
+
+
+def _told(error: MinisimError) -> str:
+    """What it says, with what was added on its way."""
+    return "; ".join([str(error), *getattr(error, "__notes__", ())])
 
 
 def _fail(message: str, code: int = 2) -> int:

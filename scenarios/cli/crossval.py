@@ -21,6 +21,9 @@ DENSITIES = (150.0, 250.0, 350.0)
 QUICK_DENSITIES = (150.0, 350.0)
 QUICK_HORIZON = 300.0
 
+#: Failed runs that are told on stderr; the report has all.
+TOLD = 10
+
 
 class Wanted(NamedTuple):
     """What the command line asks for; None and empty where it says nothing."""
@@ -38,8 +41,9 @@ class Wanted(NamedTuple):
 
 @app.command(
     epilog="Writes crossval.md (the report), crossval.csv (one row a cell, lane and metric) and "
-    "the figures. A run that fails is a row with its error. SUMO's runs are kept in the folder "
-    "sumo beside them and used again by the same version; remove it to run them anew.\n\n"
+    "the figures. A cell whose controller cannot serve its scenario is refused before anything "
+    "runs; a run that fails is a row with its error. SUMO's runs are kept in the folder sumo "
+    "beside them and used again by the same version; remove it to run them anew.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim crossval --quick\n\n"
     "minisim crossval four-way five-way -c dim -c dim-harmonious -d 250 --seeds 5\n\n"
@@ -86,8 +90,8 @@ def crossval(
         str | None,
         typer.Option(
             "--profile", "-p", metavar="NAME", show_default=False,
-            help="Vehicle and speeds: fair (the default), paper or as_run; with --replay those of "
-            "the published runs by default.",
+            help="Vehicle and speeds: fair (the default), paper, as_run or as_run_signals; with "
+            "--replay those of the published runs by default.",
         ),
     ] = None,
     seeds: Annotated[
@@ -134,6 +138,7 @@ def crossval(
     numbers = _seeds(wanted)
     processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     sumo_home()
+    _check(cases)
     failed = _compare(cases, numbers, processes, make_folder(out), _command(wanted))
     if failed:
         raise typer.Exit(1)
@@ -163,6 +168,17 @@ def _cases(wanted: Wanted) -> list[Case]:
     )
 
 
+def _check(cases: list[Case]) -> None:
+    """Raise `InputError` for a cell that cannot run, before any does."""
+    from scenarios.sweep.experiment import Experiment
+    from scenarios.sweep.file import check_can_run
+
+    with bar("checking"):
+        check_can_run(
+            Experiment(case.scenario, case.decider(), label=case.controller) for case in cases
+        )
+
+
 def _seeds(wanted: Wanted) -> range:
     if wanted.replay and wanted.seeds is not None:
         raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
@@ -174,13 +190,11 @@ def _compare(cases: list[Case], seeds: range, processes: int, folder: Path, comm
     """Run, write, and tell; whether a run failed."""
     from scenarios.crossval import crossvalidate, film, write_report
     from scenarios.crossval.report import CSV, REPORT, summary
-    from scenarios.sweep import workers
 
-    with workers(processes) as executor:
-        with bar("simulating in both hosts") as progress:
-            results = crossvalidate(cases, seeds, executor, progress, folder)
-        with bar("recording where they part") as progress:
-            results = film(results, executor, progress)
+    with bar("simulating in both hosts") as progress:
+        results = crossvalidate(cases, seeds, None, progress, folder, jobs=processes)
+    with bar("recording where they part") as progress:
+        results = film(results, None, progress, jobs=processes)
     from figures.crossval import crossval_figures
     from figures.style import save
 
@@ -194,7 +208,12 @@ def _compare(cases: list[Case], seeds: range, processes: int, folder: Path, comm
     typer.echo(summary(results))
     for name in (REPORT, CSV):
         typer.echo(f"  wrote {folder / name}")
-    return any(result.failures for result in results)
+    failures = [(result.case.name, failure) for result in results for failure in result.failures]
+    for cell, (host, seed, error) in failures[:TOLD]:
+        typer.echo(f"minisim: {cell} in {host}, seed {seed}: {error}", err=True)
+    if len(failures) > TOLD:
+        typer.echo(f"minisim: {len(failures) - TOLD} more in {folder / REPORT}", err=True)
+    return bool(failures)
 
 
 def _command(wanted: Wanted) -> str:

@@ -48,11 +48,11 @@ def figures(
 ) -> None:  # fmt: skip
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
-    from scenarios.archive import MissingRunsError
     from scenarios.cli.files import make_folder
     from scenarios.cli.report import gallery_table
-    from scenarios.reproduction import Plan, find_in
-    from scenarios.store import Store
+    from scenarios.studies.archive import MissingRunsError
+    from scenarios.studies.reproduction import Plan, find_in
+    from scenarios.sweep.store import Store
 
     if as_list:
         show(gallery_table(GALLERY.values()))

@@ -67,6 +67,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder, with its parents, that files can be written to; raises `FileError`."""
     folder = Path(path)
     try:
+        if folder.exists() and not folder.is_dir():
+            raise FileError(f"cannot write to folder {folder}: it is a file")
         folder.mkdir(parents=True, exist_ok=True)
         _probe(folder)
     except (OSError, ValueError) as error:

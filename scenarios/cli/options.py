@@ -121,7 +121,10 @@ SumoModel = Annotated[
 Gui = Annotated[bool, typer.Option("--gui", help="Show the run in sumo-gui.")]
 KeepFiles = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Keep SUMO's network, routes, log and trips there."),
+    typer.Option(
+        metavar="DIR",
+        help="Keep SUMO's network, routes, log and trips there, in a new or empty folder.",
+    ),
 ]
 Order = Annotated[
     str,

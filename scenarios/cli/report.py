@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dim import Explanation, HarmonyMatrix
     from figures.gallery import Item
-    from scenarios.experiment import Experiment
+    from scenarios.sweep.experiment import Experiment
 
 #: Metric of a summary -> heading.
 HEADINGS = {

@@ -59,9 +59,9 @@ def reproduce(
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.report import write_report
     from scenarios.cli.files import make_folder
-    from scenarios.reproduction import Plan, find_in
-    from scenarios.reproduction import reproduce as run_all
-    from scenarios.store import Store
+    from scenarios.studies.reproduction import Plan, find_in
+    from scenarios.studies.reproduction import reproduce as run_all
+    from scenarios.sweep.store import Store
 
     plan = Plan.of(quick=quick, seeds=seeds, parts=only)
     processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from minisim.errors import InputError, choice
+from minisim.errors import CollisionError, InputError, choice
 from scenarios.cli.app import app
 from scenarios.cli.options import (
     Arrivals,
@@ -52,7 +53,8 @@ HOSTS = ("minisim", "sumo")
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
     "[bold]Exit codes[/bold]\n\n"
-    "0 done; 1 a collision stopped the run, or stdout cannot be written; 2 bad input."
+    "0 done; 1 a collision stopped the run (no file is written then), or stdout cannot be written; "
+    "2 bad input."
 )
 def run(
     scenario: ScenarioName,
@@ -129,14 +131,17 @@ def run(
         "record": "all" if everything else "junction" if safety else None,
         "on_collision": on_collision,
     }
-    sumo = {"model": sumo_model, "gui": gui or None, "keep_files": keep_files, "fcd": sumo_fcd}
-    asked = {name: value for name, value in sumo.items() if value is not None}
-    if choice("host", host, HOSTS) == "sumo":
-        result = simulate_in_sumo(what, who, seed, **options, **asked)
-    elif asked:
-        raise InputError("--sumo-model, --gui, --keep-files and --sumo-fcd need --host sumo")
-    else:
-        result = simulate(what, who, seed, **options)
+    sumo = {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
+    files = [path for path in (trips, trajectories, fcd, sumo_fcd) if path is not None]
+    try:
+        if choice("host", host, HOSTS) == "sumo":
+            result = simulate_in_sumo(what, who, seed, **options, **sumo)
+        else:
+            _check_minisim_can(on_collision, **sumo)
+            result = simulate(what, who, seed, **options)
+    except CollisionError as error:
+        error.add_note(_unwritten(files))
+        raise
     summary = result.summary()
     if drivers := driver_means(result):
         summary["drivers"] = drivers
@@ -156,9 +161,29 @@ def run(
     show(run_title(summary), run_table(summary), safety_line(summary))
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
-    for path in (trips, trajectories, fcd, sumo_fcd):
-        if path is not None:
-            typer.echo(f"  wrote {path}")
+    for path in files:
+        typer.echo(f"  wrote {path}")
+    if keep_files is not None:
+        typer.echo(f"  SUMO's files are in {keep_files}")
+
+
+def _check_minisim_can(on_collision: str, **sumo: object) -> None:
+    """Raise `InputError` where an option asks for what only SUMO can do."""
+    names = {
+        "model": "--sumo-model", "gui": "--gui", "keep_files": "--keep-files", "fcd": "--sumo-fcd",
+    }  # fmt: skip
+    asked = [option for name, option in names.items() if sumo[name]]
+    if on_collision == "teleport":
+        asked.append("--on-collision teleport")
+    if asked:
+        need = "needs" if len(asked) == 1 else "need"
+        raise InputError(f"{' and '.join(asked)} {need} --host sumo")
+
+
+def _unwritten(files: Sequence[Path]) -> str:
+    """What is not there after a collision has stopped the run, and how to get it."""
+    wrote = f"{', '.join(map(str, files))} not written; " if files else ""
+    return f"{wrote}--on-collision record notes collisions and goes on"
 
 
 def _near_junction(run: Run) -> pd.DataFrame:

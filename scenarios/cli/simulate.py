@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from scenarios.cli.terminal import bar
 
 if TYPE_CHECKING:
@@ -28,5 +30,10 @@ def simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: 
     """The same in SUMO."""
     from minisim.sumo import simulate as sumo_simulate
 
-    with bar("simulating in SUMO") as progress:
-        return sumo_simulate(scenario, controller, seed, progress=progress, **options)
+    try:
+        with bar("simulating in SUMO") as progress:
+            return sumo_simulate(scenario, controller, seed, progress=progress, **options)
+    except (KeyboardInterrupt, SystemExit) as end:
+        for note in getattr(end, "__notes__", ()):
+            typer.echo(f"minisim: {note}", err=True)
+        raise

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from scenarios.experiment import Experiment
-    from scenarios.store import Store
+    from scenarios.sweep.experiment import Experiment
+    from scenarios.sweep.store import Store
 
 #: The study that is the paper's grid as its text prescribes it.
 PAPER = {"paper": "text"}
@@ -90,10 +90,10 @@ def sweep(
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.recording import write_table
-    from scenarios.cells import cells
     from scenarios.cli.files import check_apart, check_table
     from scenarios.cli.report import sweep_notes, sweep_table
-    from scenarios.store import Store
+    from scenarios.studies.cells import cells
+    from scenarios.sweep.store import Store
 
     if seeds is not None:
         integer("--seeds", seeds, low=1, high=100_000)
@@ -120,8 +120,8 @@ def sweep(
 
 def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Experiment]:
     """A study's, or those of a file; a word that is neither is taken for a study's name."""
-    from scenarios.experiment_file import check_can_run, read_experiments
-    from scenarios.studies import STUDIES
+    from scenarios.studies.study import STUDIES
+    from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = (*PAPER, *STUDIES)
     if what in studies or not (Path(what).suffix or Path(what).exists()):
@@ -137,7 +137,7 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Ex
 
 @contextmanager
 def _executor(scheduler: str | None) -> Iterator[Executor | None]:
-    from scenarios.cluster import cluster
+    from scenarios.sweep.cluster import cluster
 
     with nullcontext() if scheduler is None else cluster(scheduler) as executor:
         yield executor
@@ -149,7 +149,7 @@ def _run(
     """The rows in the order of the experiments, with a bar that tells of failures."""
     import pandas as pd
 
-    from scenarios.sweep import finished
+    from scenarios.sweep.runner import finished
 
     rows: dict[int, dict[str, object]] = {}
     lost = 0

@@ -12,7 +12,7 @@ from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.trips import Trips
 from scenarios.crossval.cases import Case
-from scenarios.experiment import Experiment, key_of, results_version
+from scenarios.sweep.experiment import Experiment, key_of, results_version
 
 #: Folder of the kept runs, inside that of the report.
 KEPT = "sumo"

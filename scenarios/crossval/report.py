@@ -12,7 +12,7 @@ from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
 from scenarios.crossval.comparison import APART, CLOSE, Divergence, Row
-from scenarios.crossval.results import HOST_SHARE, HOST_TOLERANCES, Film, Result
+from scenarios.crossval.results import FEW, HOST_SHARE, HOST_TOLERANCES, Film, Result
 from scenarios.statistics import Interval
 
 if TYPE_CHECKING:
@@ -97,14 +97,21 @@ def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]
 
 def summary(results: Sequence[Result]) -> str:
     """How many cells agree, in one line."""
-    agree = sum(result.hosts_agree for result in results)
-    failed = sum(len(result.failures) for result in results)
-    text = f"{agree} of {len(results)} cells: both hosts agree within the tolerances"
+    verdicts = [result.hosts_agree for result in results if result.hosts_agree is not None]
+    text = f"{sum(verdicts)} of {len(verdicts)} cells: both hosts agree within the tolerances"
+    if not verdicts:
+        text = "no cell could be compared"
     for host, name in (("minisim", "minisim"), ("sumo", "SUMO")):
         judged = [met for result in results if (met := result.meets_paper(host)) is not None]
         if judged:
             text += f"; {name} meets the paper in {sum(judged)} of {len(judged)}"
-    return text + (f"; {failed} runs failed" if failed else "")
+    uncompared = len(results) - len(verdicts)
+    if verdicts and uncompared:
+        text += f"; {_counted(uncompared, 'cell')} could not be compared"
+    if few := sum(result.few for result in results):
+        text += f"; {_counted(few, 'verdict')} over fewer than {FEW} trips"
+    failed = sum(len(result.failures) for result in results)
+    return text + (f"; {_counted(failed, 'run')} failed" if failed else "")
 
 
 def _rows(result: Result) -> Iterator[dict[str, Any]]:
@@ -164,8 +171,11 @@ def _tolerances() -> list[str]:
         f"The hosts agree when, each with its own car following, they differ by at most: {hosts}; "
         f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
-        "the paper when mean waiting is within 10 % and mean travel within 0.5 s of the published "
-        "number, at 350 veh/h within 3 s.",
+        "the paper when mean waiting is within 10 % of the published number, and mean travel "
+        "within 0.5 s (DIM; at 350 veh/h within 3 s), 1 s (V2I-C) or 2 s (signals).",
+        "",
+        f"{NOTHING} is no verdict: no run of the cell ended well in both hosts, or no trip did. "
+        f"Verdicts over fewer than {FEW} trips are marked: one trip may decide them.",
     ]
 
 
@@ -177,10 +187,10 @@ def _verdicts(results: Sequence[Result]) -> list[str]:
             (
                 result.case.name,
                 str(len(result.pairs)),
-                " / ".join(map(str, result.row("travel_time_s").trips)) if result.rows else NOTHING,
+                " / ".join(map(str, result.trips)) if result.rows else NOTHING,
                 _share(result.agreement),
                 " / ".join(map(str, result.collisions)),
-                _yes(result.hosts_agree),
+                _yes(result.hosts_agree) + (", few trips" if result.few else ""),
                 _yes(result.meets_paper("minisim")),
                 _yes(result.meets_paper("sumo")),
             )
@@ -323,6 +333,10 @@ def _number(value: float | None, digits: int = 2) -> str:
 
 def _share(value: float) -> str:
     return NOTHING if math.isnan(value) else f"{100 * value:.1f} %"
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def _yes(value: bool | None) -> str:

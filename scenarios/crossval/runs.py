@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib.metadata
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -25,6 +26,7 @@ from scenarios.crossval.comparison import (
 )
 from scenarios.crossval.outcome import Outcome, kept_file, read_outcome, write_outcome
 from scenarios.crossval.results import Failure, Film, Result
+from scenarios.pool import given, pooled, processes
 from scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -45,9 +47,11 @@ Answer = TypeVar("Answer")
 def crossvalidate(
     cases: Sequence[Case],
     seeds: Sequence[int],
-    executor: Executor,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     folder: Path | None = None,
+    *,
+    jobs: int = 1,
 ) -> list[Result]:
     """Run every case with every seed in both hosts, and compare.
 
@@ -56,9 +60,11 @@ def crossvalidate(
 
     Args:
         cases, seeds: what to run.
-        executor: runs it.
+        executor: runs it; None is a pool of processes, in which a run whose process dies is tried
+            once more.
         progress: called with the number of runs done and of all.
         folder: where SUMO's runs are kept and found again; None runs them all.
+        jobs: processes of the pool.
     """
     runs = [
         [
@@ -69,7 +75,7 @@ def crossvalidate(
         for case in cases
     ]
     tasks = [run for of_case in runs for run in of_case]
-    outcomes = iter(_gather(executor, _run, tasks, progress))
+    outcomes = iter(_gather(_run, tasks, executor, jobs, progress))
     return [
         _result(case, {run[1:3]: next(outcomes) for run in of_case})
         for case, of_case in zip(cases, runs, strict=True)
@@ -77,7 +83,11 @@ def crossvalidate(
 
 
 def film(
-    results: Sequence[Result], executor: Executor, progress: Progress | None = None
+    results: Sequence[Result],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    *,
+    jobs: int = 1,
 ) -> list[Result]:
     """Add the trajectories around the first trip that differs, from a second, shorter run."""
     tasks = [
@@ -86,7 +96,7 @@ def film(
         if result.divergence is not None
         for host in HOSTS
     ]
-    frames = iter(_gather(executor, _record, tasks, progress))
+    frames = iter(_gather(_record, tasks, executor, jobs, progress))
     return [
         result if result.divergence is None else _filmed(result, next(frames), next(frames))
         for result in results
@@ -170,22 +180,26 @@ def _simulate(
 
 
 def _gather(
-    executor: Executor,
     function: Callable[[Task], Answer],
     tasks: Sequence[Task],
+    executor: Executor | None,
+    jobs: int,
     progress: Progress | None,
 ) -> list[Answer | BaseException]:
     """The function's answers in the order of the tasks; in place of one, what was raised."""
-    futures: list[Future[Answer]] = [executor.submit(function, task) for task in tasks]
-    try:
-        for done, _ in enumerate(as_completed(futures), start=1):
+    todo = dict(enumerate(tasks))
+    if executor is None:
+        # A process also where there is one: a thread could not be ended amid an hour in SUMO.
+        results = pooled(function, todo, jobs, pool_of=processes)
+    else:
+        results = given(function, todo, executor)
+    answers: dict[int, Answer | BaseException] = {}
+    with closing(results):
+        for k, answer in results:
+            answers[k] = answer
             if progress is not None:
-                progress(done, len(futures))
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
-    return [future.exception() or future.result() for future in futures]
+                progress(len(answers), len(tasks))
+    return [answers[k] for k in range(len(tasks))]
 
 
 def _result(case: Case, outcomes: dict[tuple[str, int], Outcome | BaseException]) -> Result:

@@ -12,8 +12,9 @@ from pathlib import Path
 
 from scenarios import four_way
 from scenarios.controllers import controller_named
-from scenarios.store import Store
-from scenarios.sweep import Experiment, sweep, workers
+from scenarios.pool import workers
+from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.store import Store
 
 #: Enough work that the start of the processes (a second or two) does not decide.
 RUNS, HOURS = 40, 4

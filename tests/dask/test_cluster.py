@@ -19,10 +19,10 @@ from dim import Dim
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.cluster import cluster
-from scenarios.experiment import MEASURED
-from scenarios.store import Store
 from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.cluster import cluster
+from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.store import Store
 
 pytest.importorskip("distributed", reason="needs the extra `dask`")
 

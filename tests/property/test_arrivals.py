@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
 from minisim.errors import FileError
 from minisim.streams import stream
-from tests.strategies import demands, floats
+from scenarios.strategies import demands, floats
 
 N = 4
 

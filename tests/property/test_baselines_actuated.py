@@ -10,7 +10,8 @@ from baselines import Actuated, Adaptive, AllWayStop, LongestQueue
 from minisim.control import Controller
 from minisim.safety import encroachments
 from scenarios.scenario import Scenario
-from tests.strategies import emptying, floats, share
+from scenarios.strategies import emptying, floats
+from tests.examples import share
 
 
 @st.composite

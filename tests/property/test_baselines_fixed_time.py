@@ -9,7 +9,7 @@ import minisim
 from baselines import FixedTime
 from minisim.safety import encroachments
 from scenarios.scenario import Scenario
-from tests.strategies import emptying, floats
+from scenarios.strategies import emptying, floats
 
 
 @st.composite

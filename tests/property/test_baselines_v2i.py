@@ -16,7 +16,8 @@ from minisim.control import CLEARANCE, Controller, Site
 from minisim.geometry import Intersection
 from minisim.vehicle import VehicleType
 from scenarios.scenario import FAIR, Profile, Scenario
-from tests.strategies import demands, floats, intersections, share, vehicles
+from scenarios.strategies import demands, floats, intersections, vehicles
+from tests.examples import share
 
 #: Demand for a minute, then time for any rule to serve it [s].
 DEMAND_TIME, HORIZON = 60.0, 3600.0

@@ -14,7 +14,7 @@ from baselines.fixed_time import FixedTime
 from baselines.signals import Colour, Phase, Program
 from baselines.webster import MIN_GREEN, webster, webster_delay
 from minisim.errors import MinisimError
-from tests.strategies import floats
+from scenarios.strategies import floats
 
 RATES = st.lists(floats(0.0, 3600.0), min_size=3, max_size=12)
 JUNK = (

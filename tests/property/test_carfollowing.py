@@ -17,7 +17,7 @@ from minisim.carfollowing import (
     speed_towards,
 )
 from minisim.vehicle import VehicleType
-from tests.strategies import floats, vehicles
+from scenarios.strategies import floats, vehicles
 
 #: Desired speeds from a side road to a main road [m/s].
 SPEEDS = floats(5.0, 20.0)

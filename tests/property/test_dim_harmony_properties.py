@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dim import HarmonyMatrix
 from minisim.geometry import Intersection, Movement
 from minisim.vehicle import VehicleType
-from tests.strategies import intersections, vehicles
+from scenarios.strategies import intersections, vehicles
 
 
 def mirrored(intersection: Intersection) -> tuple[Intersection, list[Movement]]:

@@ -14,7 +14,8 @@ from minisim.control import Site
 from minisim.errors import InputError
 from minisim.geometry import MIN_PATH_RADIUS, Intersection, Movement
 from minisim.vehicle import VehicleType
-from tests.strategies import bearings, floats, intersections, share, vehicles
+from scenarios.strategies import bearings, floats, intersections, vehicles
+from tests.examples import share
 
 
 def fits(intersection: Intersection, vehicle: VehicleType) -> bool:

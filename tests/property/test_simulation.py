@@ -16,8 +16,8 @@ from minisim.control import Controller, Plan, Unregulated
 from minisim.run import Run
 from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
+from scenarios.strategies import scenarios, vehicles
 from tests.runs import Fixed, digest, drained, replayed
-from tests.strategies import scenarios, vehicles
 
 #: Time to serve the arrivals of two minutes; far more than any fair share of the junction needs.
 PATIENCE = 3000.0

@@ -189,7 +189,11 @@ def test_teleport_takes_who_runs_into_another_off_the_road() -> None:
 @pytest.mark.parametrize(
     ("profile", "model", "message"),
     [
-        (FAIR, "CC", "model CC does not drive vehicles of the model 'idm'; choose IDM or Krauss"),
+        (
+            FAIR,
+            "CC",
+            "CC does not .* 'idm'; choose IDM or Krauss, or an Eng.*: use --profile as_run",
+        ),
         (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
         (
             replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)),

@@ -28,7 +28,7 @@ from minisim.control import CLEARANCE
 from minisim.geometry import ARM_NAMES, Intersection, Movement
 from minisim.sumo import host, network
 from minisim.vehicle import VehicleType
-from tests.strategies import intersections
+from scenarios.strategies import intersections
 
 #: The classes of pairs on which the two agree, and on which they do not.
 FREE = "agree: harmony, no foes"

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -52,9 +53,11 @@ from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.cli import main
 from scenarios.scenario import FAIR, Scenario
+from scenarios.strategies import intersections
+from tests.examples import share
 from tests.runs import Fixed, replayed
-from tests.strategies import intersections, share
 
+ROOT = Path(__file__).parents[2]
 FAIR_FOUR = four_way(100, profile="fair")
 
 
@@ -392,6 +395,9 @@ def test_what_netconvert_says_is_passed_on_and_its_files_kept(
     monkeypatch.setattr(network, "_outline", lambda intersection: "here and there")
     with pytest.raises(SumoError, match=r"netconvert failed \(exit code 1\): .*shape.*node 'C'"):
         simulate(single(), Unregulated(), keep_files=tmp_path / "new" / "folder")
+    with pytest.raises(SumoError) as caught:
+        simulate(single(), Unregulated(), keep_files=tmp_path / "other")
+    assert caught.value.__notes__ == [f"SUMO's files up to there are in {tmp_path / 'other'}"]
     kept = {file.name for file in (tmp_path / "new" / "folder").iterdir()}
     assert kept == {"minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"}
 
@@ -542,6 +548,54 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
         simulate(single(), Unregulated(), keep_files=tmp_path / "file" / "folder")
 
 
+def test_a_folder_in_use_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FileError, match="is not empty: give SUMO's files a new or an empty one"):
+        simulate(single(), Unregulated(), keep_files=tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM is POSIX's")
+@pytest.mark.parametrize(
+    ("command", "death"),
+    [
+        (("run", "four-way"), signal.SIGTERM),
+        (("run", "four-way"), signal.SIGKILL),
+        (("crossval", "four-way", "-c", "fixed-time", "-d", "900", "--seeds", "3", "--jobs", "1"),
+         signal.SIGTERM),
+    ],
+    ids=["run, terminated", "run, killed", "crossval, terminated"],
+)  # fmt: skip
+def test_who_is_ended_leaves_nothing_behind(
+    tmp_path: Path, command: tuple[str, ...], death: signal.Signals
+) -> None:
+    """SUMO's process removes the files of a caller that was killed."""
+    files = tmp_path / "files"
+    files.mkdir()
+    options = ("--out", str(tmp_path / "out"))
+    if command[0] == "run":
+        options = ("--host", "sumo", "-c", "all-way-stop", "-d", "900")
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
+         *command, "-p", "fair", *options],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(files)},
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while not list(files.glob("minisim-sumo-*/sumo.log")):  # SUMO has started
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.send_signal(death)
+    _, said = process.communicate(timeout=30)
+    if death == signal.SIGTERM:
+        assert process.returncode == 143
+        assert said == "minisim: terminated\n"
+    while list(files.glob("minisim-sumo-*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
 def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SUMO_HOME", raising=False)
     before = dict(os.environ)
@@ -572,19 +626,33 @@ def test_the_command_line_prints_a_table_of_sumos_run(
 ) -> None:
     trips = tmp_path / "trips.csv"
     options = ("-c", "fixed-time", "--host", "sumo", "--sumo-model", "Krauss")
+    options += ("--keep-files", str(tmp_path / "kept"))
     assert main([*RUN, *options, "--trips", str(trips)]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     assert "host sumo" in captured.out
+    assert f"  SUMO's files are in {tmp_path / 'kept'}\n" in captured.out
     assert len(trips.read_text().splitlines()) > 10
+
+
+def test_a_collision_names_what_is_there_and_what_is_not(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    fcd, kept = tmp_path / "fcd.xml", tmp_path / "kept"
+    options = ("-c", "unregulated", "--host", "sumo", "--sumo-fcd", str(fcd))
+    assert main([*RUN, *options, "--keep-files", str(kept)]) == 1
+    said = capsys.readouterr().err
+    assert f"SUMO's files up to there are in {kept}; {fcd} not written; --on-collision" in said
+    assert not fcd.exists()
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (("--host", "vissim"), "unknown host 'vissim'; allowed: minisim, sumo"),
-        (("--gui",), "--gui, --keep-files and --sumo-fcd need --host sumo"),
-        (("--sumo-model", "IDM"), "need --host sumo"),
+        (("--gui",), "minisim: --gui needs --host sumo"),
+        (("--on-collision", "teleport"), "minisim: --on-collision teleport needs --host sumo"),
+        (("--sumo-model", "IDM", "--gui"), "minisim: --sumo-model and --gui need --host sumo"),
         (("--host", "sumo", "--sumo-model", "CACC"), "unknown SUMO model 'CACC'"),
     ],
 )

@@ -317,6 +317,8 @@ def test_unreadable_files_are_reported(tmp_path: Path) -> None:
     for path in (tmp_path / "none.csv", tmp_path, binary, "a\0b"):
         with pytest.raises(FileError, match="cannot read arrivals from"):
             read_arrivals(path)
+    with pytest.raises(FileError, match=r"arrivals from \S*none.csv: No such file or directory$"):
+        read_arrivals(tmp_path / "none.csv")
     with pytest.raises(InputError, match="arrivals file must be"):
         read_arrivals(3)  # type: ignore[arg-type]  # wrong on purpose
 

@@ -12,16 +12,16 @@ import pytest
 from dim import Dim
 from minisim.errors import InputError
 from scenarios import Scenario, five_way, four_way, three_way
-from scenarios.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.controllers import controller_named
-from scenarios.experiment import RESULTS, Experiment, canonical, run_experiment
 from scenarios.statistics import (
     growing,
     mean_interval,
     prediction_interval,
     queue_growth,
 )
+from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.sweep import sweep
+from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
 
 Floats = npt.NDArray[np.float64]
 
@@ -260,5 +260,5 @@ def test_whoever_changes_results_raises_their_version(
         "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
     )  # fmt: skip
     found = [row[column] for column in columns]
-    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.experiment.RESULTS"
+    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.experiment.RESULTS"
     assert RESULTS == 2

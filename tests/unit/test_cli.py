@@ -183,7 +183,9 @@ def test_collision_stops_the_run_and_writes_nothing(
 ) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
-    assert "touched" in fails(capsys, *arguments, code=1)
+    said = fails(capsys, *arguments, code=1)
+    assert "touched" in said
+    assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
     assert list(tmp_path.iterdir()) == []
     out = ok(capsys, *arguments, "--on-collision", "record")
     assert " touched" in out

@@ -9,13 +9,13 @@ import pytest
 from figures.gallery import GALLERY
 from figures.tables import WRITERS
 from minisim.errors import InputError
-from scenarios import reproduction
-from scenarios.archive import MissingRunsError
-from scenarios.capacity import CASES, Search
 from scenarios.cli import main
-from scenarios.reproduction import PARTS, Plan, find_in, reproduce
-from scenarios.results import Effort
-from scenarios.store import Store
+from scenarios.studies import reproduction
+from scenarios.studies.archive import MissingRunsError
+from scenarios.studies.capacity import CASES, Search
+from scenarios.studies.reproduction import PARTS, Plan, find_in, reproduce
+from scenarios.studies.results import Effort
+from scenarios.sweep.store import Store
 
 
 def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:

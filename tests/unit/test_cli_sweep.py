@@ -13,12 +13,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from scenarios import studies
 from scenarios.cli import main
-from scenarios.reproduction import find_in
-from scenarios.results import Effort, collect
-from scenarios.store import Store
-from scenarios.studies import STUDIES
+from scenarios.studies import study as studies
+from scenarios.studies.reproduction import find_in
+from scenarios.studies.results import Effort, collect
+from scenarios.studies.study import STUDIES
+from scenarios.sweep.store import Store
 
 ROOT = Path(__file__).parents[2]
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'

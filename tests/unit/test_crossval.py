@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -321,7 +322,7 @@ def test_replays_are_judged_by_the_papers_means() -> None:
     assert judged.meets_paper("sumo") is False
     assert summary([judged]) == (
         "0 of 1 cells: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
-        "SUMO meets the paper in 0 of 1"
+        "SUMO meets the paper in 0 of 1; 1 verdict over fewer than 30 trips"
     )
     text = markdown([judged], "x", {})
     row = "| dim | 4 | balanced | 150 | 0.75 | 0.75 | 0.71 | 66.40 | 66.60 | 65.94 | 0.0 % | yes |"
@@ -349,12 +350,32 @@ def test_a_run_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     with ThreadPoolExecutor(1) as executor:
         (failed,) = film(crossvalidate([case], [1, 2], executor), executor)
     assert [(f.host, f.seed) for f in failed.failures] == [("sumo", 1), ("sumo", 2)]
-    assert not failed.hosts_agree
+    assert failed.hosts_agree is None, "what never ran is no disagreement"
     frame = table([failed])
     assert frame["error"].tolist() == ["SUMO's process died | after 3.0 s"] * 2
     text = markdown([failed], "minisim crossval", {})
     assert "| four-way balanced 150 dim | sumo | 1 | SUMO's process died \\| after 3.0 s |" in text
-    assert summary([failed]).endswith("; 2 runs failed")
+    assert "| four-way balanced 150 dim | 0 | – | – | 0 / 0 | – | – | – |" in text
+    assert summary([failed]) == "no cell could be compared; 2 runs failed"
+    good = result(Case(four_way(150), "dim"), pair())
+    once = replace(failed, failures=failed.failures[:1])
+    assert summary([good, once]).endswith(
+        "; 1 cell could not be compared; 1 verdict over fewer than 30 trips; 1 run failed"
+    )
+
+
+def test_verdicts_over_few_trips_are_marked() -> None:
+    case = Case(four_way(150, profile="fair"), "dim")
+    few, many = result(case, pair()), result(case, *(pair(seed) for seed in range(10)))
+    assert (few.trips, many.trips) == ((4, 3), (40, 30))
+    assert (few.few, many.few) == (True, False)
+    assert "| yes, few trips |" in markdown([few], "x", {})
+    assert "few trips |" not in markdown([many], "x", {})
+
+
+def test_without_a_finished_trip_there_is_no_verdict() -> None:
+    none = trips([0.0] * 4, [50.0] * 4, [False] * 4)
+    assert result(Case(four_way(150), "dim"), Pair(1, none, none)).hosts_agree is None
 
 
 def test_runs_of_sumo_are_kept_and_used_again(
@@ -478,6 +499,8 @@ BAD = [
     (("--replay", "-d", "400"), "no dim run of 400"),
     (("--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
     (("--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
+    (("three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
+    (("-p", "as_run", "-c", "reservation"), "reservation cannot serve four-way at 150"),
 ]
 
 
@@ -490,6 +513,14 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert (code, captured.out, captured.err.count("\n")) == (2, "", 1)
     assert named in captured.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_place_of_the_folder_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "afile").write_text("")
+    assert main(["crossval", "--quick", "--out", str(tmp_path / "afile")]) == 2
+    assert "afile: it is a file" in capsys.readouterr().err
 
 
 def test_without_sumo_the_install_command_is_told(

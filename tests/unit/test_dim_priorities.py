@@ -23,8 +23,8 @@ from dim.priorities import (
 from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError
 from scenarios import four_way
+from scenarios.strategies import scenarios
 from tests.runs import digest, drained
-from tests.strategies import scenarios
 
 
 def car(vehicle: int, lane: int, distance: float, manoeuvre: int = 2) -> Observed:

@@ -12,8 +12,8 @@ from minisim.arrivals import write_arrivals
 from minisim.errors import FileError, InputError, MinisimError
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.cli import main
-from scenarios.experiment import Experiment
-from scenarios.experiment_file import check_can_run, read_experiments
+from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.file import check_can_run, read_experiments
 
 
 def read(tmp_path: Path, text: str) -> list[Experiment]:

@@ -20,14 +20,14 @@ from figures.gallery import GALLERY, item_named, write
 from figures.paper_tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
-from scenarios.archive import Archive, MissingRunsError
-from scenarios.capacity import Search
-from scenarios.cells import saturated
-from scenarios.experiment import Experiment
 from scenarios.paper import SERIES, Cell, reference_value
-from scenarios.reproduction import CAPACITY, PARTS, Made
-from scenarios.results import Effort
-from scenarios.studies import RIVALS, STUDIES
+from scenarios.studies.archive import Archive, MissingRunsError
+from scenarios.studies.capacity import Search
+from scenarios.studies.cells import saturated
+from scenarios.studies.reproduction import CAPACITY, PARTS, Made
+from scenarios.studies.results import Effort
+from scenarios.studies.study import RIVALS, STUDIES
+from scenarios.sweep.experiment import Experiment
 from tests.synthetic import capacity_of, synthetic_find, synthetic_row
 
 EFFORT, SEARCH = Effort(seeds=2), Search(step=20.0, steps=64, seeds=2)

@@ -15,12 +15,12 @@ import pytest
 
 from dim import Dim
 from minisim.errors import FileError, InputError
-from scenarios import experiment as experiment_module
 from scenarios import four_way, three_way
 from scenarios.cli import main
-from scenarios.experiment import Experiment, Outcome, failed, run_experiment
-from scenarios.store import APPLICATION, SCHEMA, Store
+from scenarios.sweep import experiment as experiment_module
 from scenarios.sweep import sweep
+from scenarios.sweep.experiment import Experiment, Outcome, failed, run_experiment
+from scenarios.sweep.store import APPLICATION, SCHEMA, Store
 
 ROOT = Path(__file__).parents[2]
 
@@ -66,7 +66,7 @@ def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
             ran.append(wanted.seed)
         return original(wanted)
 
-    monkeypatch.setattr("scenarios.sweep.run_experiment", watched)
+    monkeypatch.setattr("scenarios.sweep.runner.run_experiment", watched)
     with Store(tmp_path / "s.db") as store:
         first = sweep([experiment(1), experiment(2)], jobs=1, store=store)
         again = sweep([experiment(1), experiment(2)], jobs=1, store=store)
@@ -203,7 +203,7 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
 def test_another_writer_is_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome
 ) -> None:
-    monkeypatch.setattr("scenarios.store.PATIENCE", 0.2)
+    monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
     with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
         ours.put(experiment(1), outcome)
         theirs.put(experiment(2), outcome)
@@ -222,8 +222,8 @@ import resource, sys
 from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
-from scenarios.experiment import Experiment
-from scenarios.store import Store
+from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.store import Store
 from scenarios.sweep import sweep
 from minisim.simulation import simulate
 

@@ -17,15 +17,15 @@ from baselines import FixedTime
 from dim import Dim, Mixed
 from minisim.errors import InputError
 from scenarios import four_way
-from scenarios.capacity import Search, capacities, grows
-from scenarios.cells import saturated
-from scenarios.comparison import causes, compare, discrepancies, published, score
-from scenarios.crossing import METRICS, crossing, paired_differences, with_total_delay
-from scenarios.experiment import Experiment, run_experiment
-from scenarios.fairness import gini, lane_waits
-from scenarios.results import Effort, collect
 from scenarios.statistics import GROWTH_SCORE
-from scenarios.studies import RIVALS, STUDIES, Case, study_named
+from scenarios.studies.capacity import Search, capacities, grows
+from scenarios.studies.cells import saturated
+from scenarios.studies.comparison import causes, compare, discrepancies, published, score
+from scenarios.studies.crossing import METRICS, crossing, paired_differences, with_total_delay
+from scenarios.studies.fairness import gini, lane_waits
+from scenarios.studies.results import Effort, collect
+from scenarios.studies.study import RIVALS, STUDIES, Case, study_named
+from scenarios.sweep.experiment import Experiment, run_experiment
 from tests.synthetic import capacity_of, synthetic_find, synthetic_row
 
 # --- studies ---------------------------------------------------------------------------------

@@ -23,9 +23,10 @@ from minisim.control import Command, Plan, Site, Unregulated, View
 from minisim.errors import InputError, MinisimError
 from scenarios import four_way, three_way
 from scenarios.demo import METRICS, Tour, average, run_tour
-from scenarios.experiment import MEASURED
+from scenarios.pool import workers
 from scenarios.statistics import mean_interval, student_quantile
-from scenarios.sweep import Experiment, sweep, workers
+from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.experiment import MEASURED
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pandas as pd
@@ -16,11 +17,12 @@ import pytest
 from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
-from scenarios.experiment import MEASURED
-from scenarios.experiment_file import read_experiments
-from scenarios.store import Store
+from scenarios.pool import pooled, processes
 from scenarios.sweep import Experiment, sweep
-from tests.runs import Deadly
+from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.file import read_experiments
+from scenarios.sweep.store import Store
+from tests.runs import Deadly, killing
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
@@ -55,9 +57,30 @@ def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
     assert rows["controller"][2] == "deadly"
 
 
+def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
+    """Whose process dies is tried alone; what dies every time is lost, and nothing else."""
+    once = {k: str(tmp_path / "killed") if k == 1 else "" for k in range(3)}
+    answers = dict(pooled(killing, once, 2, pool_of=processes))
+    assert answers == {0: 7, 1: 7, 2: 7}
+    assert (tmp_path / "killed").exists()
+    always = {0: "", 1: "always", 2: ""}
+    answers = dict(pooled(killing, always, 2, pool_of=processes))
+    assert (answers[0], answers[2]) == (7, 7)
+    assert isinstance(answers[1], BrokenExecutor)
+
+
+def test_giving_up_ends_what_runs() -> None:
+    results = pooled(time.sleep, {0: 0.0, **dict.fromkeys(range(1, 6), 600.0)}, 1,
+                     pool_of=processes)  # fmt: skip
+    assert next(results) == (0, None)
+    began = time.monotonic()
+    results.close()
+    assert time.monotonic() - began < 20.0
+
+
 PARENT = """
 import os, time
-from scenarios.sweep import workers
+from scenarios.pool import workers
 if __name__ == "__main__":
     pool = workers(2)
     held = [pool.submit(time.sleep, 0.5) for _ in range(2)]

@@ -22,8 +22,8 @@ from minisim.control import Go, Hold, Site, View
 from minisim.errors import InputError
 from scenarios import Scenario, four_way, three_way
 from scenarios.counterexample import colliding_arrivals
+from scenarios.strategies import scenarios
 from tests.runs import digest, drained
-from tests.strategies import scenarios
 
 
 @cache

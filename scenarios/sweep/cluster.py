@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from minisim.errors import InputError, MissingExtraError, instance
-from scenarios.experiment import results_version
+from scenarios.sweep.experiment import results_version
 
 #: How long a scheduler, and then its first worker, is waited for [s].
 PATIENCE = 5.0

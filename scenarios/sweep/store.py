@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from minisim.errors import FileError, instance
-from scenarios.experiment import Experiment, Outcome, Row, key_of, results_version
+from scenarios.sweep.experiment import Experiment, Outcome, Row, key_of, results_version
 
 if TYPE_CHECKING:
     import pandas as pd

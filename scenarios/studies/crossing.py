@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, items, numbers
-from scenarios.cells import pairs
 from scenarios.statistics import Interval, mean_interval
+from scenarios.studies.cells import pairs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,7 +114,7 @@ def paired_differences(
     """Differences of `metric`, ours minus theirs, at each density, one a common seed.
 
     Args:
-        rows: of a study (`scenarios.results`), with the metric.
+        rows: of a study (`scenarios.studies.results`), with the metric.
         ours, theirs: series.
         metric: a column.
 

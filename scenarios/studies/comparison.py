@@ -12,9 +12,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
-from scenarios.cells import saturated
 from scenarios.paper import SERIES, SPLITS, reference
 from scenarios.statistics import prediction_interval
+from scenarios.studies.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
     """Every published value beside ours.
 
     Args:
-        rows: of a study of the paper's grid (`scenarios.results.collect`).
+        rows: of a study of the paper's grid (`scenarios.studies.results.collect`).
 
     Returns:
         One row a published value, columns `COMPARED`: `low` and `high` are the bounds of the 95 %

@@ -1,4 +1,16 @@
-"""Hypothesis strategies for geometries, vehicles, demands and scenarios, for all tests."""
+"""Hypothesis strategies for geometries, vehicles, demands, whole scenarios and controllers.
+
+    from hypothesis import given
+    from minisim import simulate
+    from scenarios.strategies import controllers, scenarios
+
+
+    @given(scenarios(), controllers())
+    def test_nothing_collides(scenario, controller):
+        simulate(scenario, controller)  # a collision raises
+
+The tests of minisim use them, and so may yours: `pip install 'minisim[testing]'`.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +19,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
-from hypothesis import settings
-from hypothesis import strategies as st
-
 from minisim.arrivals import Demand
+from minisim.control import Controller
+from minisim.errors import MissingExtraError
 from minisim.geometry import MIN_ANGLE, Intersection, Movement
 from minisim.vehicle import VehicleType
+from scenarios.controllers import controller_named
 from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario
 
+try:
+    from hypothesis import strategies as st
+except ImportError as error:
+    raise MissingExtraError("strategies need hypothesis: pip install 'minisim[testing]'") from error
+
 SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
-
-
-def share(part: float) -> settings:
-    """Decorator: only this share of the profile's examples, for costly properties."""
-    return settings(max_examples=max(1, round(part * settings().max_examples)))
 
 
 def floats(low: float, high: float) -> st.SearchStrategy[float]:
@@ -137,3 +149,15 @@ def emptying(draw: st.DrawFn) -> Scenario:
         horizon=3600.0,
         recorded=arrivals,
     )
+
+
+#: Controllers by name that never collide and serve any number of arms.
+SAFE = (
+    "dim", "dim-harmonious", "dim-lanes", "dim-lanes-waiting", "fixed-time", "adaptive",
+    "actuated", "longest-queue", "all-way-stop", "v2ic", "reservation",
+)  # fmt: skip
+
+
+def controllers() -> st.SearchStrategy[Controller]:
+    """Every safe controller, as its command-line name makes it for the profile `paper`."""
+    return st.sampled_from(SAFE).map(controller_named)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from minisim.errors import integer, number, numbers
-from scenarios.experiment import Experiment
-from scenarios.studies import Case, Study
+from scenarios.studies.study import Case, Study
+from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd

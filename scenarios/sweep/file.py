@@ -43,10 +43,10 @@ from minisim.errors import (
     show,
 )
 from scenarios.controllers import controller_named
-from scenarios.experiment import Experiment
 from scenarios.library import scenario_named
 from scenarios.mixing import with_humans
 from scenarios.scenario import Scenario, parse_split, profile_named
+from scenarios.sweep.experiment import Experiment
 
 #: More is surely a typing error.
 MAX_EXPERIMENTS = 1_000_000
@@ -137,7 +137,8 @@ def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
     except (OSError, ValueError, RecursionError) as error:
-        raise FileError(f"cannot read experiments from {os.fspath(path)}: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"cannot read experiments from {os.fspath(path)}: {reason}") from error
 
 
 def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:

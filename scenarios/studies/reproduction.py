@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from minisim.errors import choice
-from scenarios.archive import Archive
-from scenarios.capacity import CASES, Search, capacities
-from scenarios.experiment import Experiment, Row
-from scenarios.results import Effort, Find
-from scenarios.store import Store
-from scenarios.studies import STUDIES
-from scenarios.sweep import finished, workers
+from scenarios.pool import workers
+from scenarios.studies.archive import Archive
+from scenarios.studies.capacity import CASES, Search, capacities
+from scenarios.studies.results import Effort, Find
+from scenarios.studies.study import STUDIES
+from scenarios.sweep.experiment import Experiment, Row
+from scenarios.sweep.runner import finished
+from scenarios.sweep.store import Store
 
 #: The search for capacities, which is no study: what it runs depends on what it finds.
 CAPACITY = "capacity"

@@ -12,12 +12,12 @@ from typing import NamedTuple
 from minisim.control import Controller
 from minisim.errors import choice
 from scenarios.controllers import controller_named
-from scenarios.experiment import Experiment
 from scenarios.library import MAKERS, regular
 from scenarios.mixing import with_humans
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
+from scenarios.sweep.experiment import Experiment
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
 AS_RUN = "as-run"

@@ -7,9 +7,9 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from minisim.errors import MinisimError
-from scenarios.capacity import CASES, Capacity, Search, capacities
-from scenarios.results import Effort, Find, Results, collect
-from scenarios.studies import Case, study_named
+from scenarios.studies.capacity import CASES, Capacity, Search, capacities
+from scenarios.studies.results import Effort, Find, Results, collect
+from scenarios.studies.study import Case, study_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

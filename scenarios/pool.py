@@ -1,0 +1,235 @@
+"""Many runs at once: over processes of our own or a caller's executor, whatever dies meanwhile."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterator, Mapping
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
+from contextlib import contextmanager
+from functools import partial
+from itertools import islice
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
+from queue import SimpleQueue
+from typing import TypeVar
+
+from minisim.errors import integer
+from scenarios.termination import Terminated, raise_terminated
+
+#: Runs that a pool of ours has in hand, per worker: one that runs and one that is next.
+IN_HAND = 2
+
+#: How often a worker that must end is told so, once a second, before it is ended by force.
+PATIENCE = 10
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+#: Number of a task, and its answer or, in place of one, what was raised.
+Results = Generator[tuple[int, Answer | BaseException]]
+
+
+def workers(jobs: int) -> Executor:
+    """An executor of `jobs` processes; with one job, a thread of this process."""
+    integer("jobs", jobs, low=1, high=1024)
+    return ThreadPoolExecutor(1) if jobs == 1 else processes(jobs)
+
+
+def processes(jobs: int) -> Executor:
+    """An executor of `jobs` processes, also where that is one: `pooled` can end them at once."""
+    return _Processes(integer("jobs", jobs, low=1, high=1024))
+
+
+def given(
+    function: Callable[[Task], Answer], todo: Mapping[int, Task], executor: Executor
+) -> Results[Answer]:
+    """Run in a caller's executor: everything is handed over at once."""
+    left = set(todo)
+    reason: BaseException = BrokenExecutor("the executor takes no runs")
+    running: dict[int, Future[Answer]] = {}
+    try:
+        for k, result in _results(function, todo, executor, len(todo), running):
+            left.discard(k)
+            if isinstance(result, BaseException):
+                reason = result
+            yield k, result
+    finally:
+        for future in running.values():
+            future.cancel()
+    for k in sorted(left):
+        yield k, reason
+
+
+def pooled(
+    function: Callable[[Task], Answer],
+    todo: Mapping[int, Task],
+    jobs: int,
+    *,
+    pool_of: Callable[[int], Executor] = workers,
+    begin: Callable[[Executor], None] | None = None,
+) -> Results[Answer]:
+    """Run in pools of our own; close the generator to give up.
+
+    When a worker dies, its pool is lost with all runs in hand, and nobody can tell which of them
+    it was. They are then tried once more, one at a time, which tells; the others go on in a fresh
+    pool.
+
+    Args:
+        function: runs a task; both go to another process.
+        todo: the tasks.
+        jobs: processes.
+        pool_of: makes a pool of that many.
+        begin: called with the first pool before it gets anything to do.
+    """
+    left = dict(todo)
+    while left:
+        suspects: dict[int, Task] = {}
+        with _until_given_up(pool_of(min(jobs, len(left)))) as pool:
+            if begin is not None:
+                begin(pool)
+                begin = None
+            for k, result in _results(function, left, pool, IN_HAND * jobs, {}):
+                if isinstance(result, BrokenExecutor):
+                    suspects[k] = left[k]
+                else:
+                    del left[k]
+                    yield k, result
+        while suspects:
+            with _until_given_up(processes(1)) as alone:
+                for k, result in _results(function, suspects, alone, 1, {}):
+                    del suspects[k], left[k]
+                    yield k, result
+
+
+@contextmanager
+def _until_given_up(pool: Executor) -> Iterator[Executor]:
+    """A pool for the block; an exception ends what it has in hand, where processes have it."""
+    with pool:
+        try:
+            yield pool
+        except BaseException:
+            if isinstance(pool, _Processes):
+                pool.let_go()
+            else:
+                pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+    """Hand one task over; raises `BrokenExecutor`."""
+    with _uninterrupted():
+        return executor.submit(partial(_ending, function), task)
+
+
+class _Processes(ProcessPoolExecutor):
+    """Spawned processes: forking beside the threads of a progress bar can hang.
+
+    They end when their parent has gone or lets go of them.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        leash, self._hand = Pipe(duplex=False)
+        super().__init__(jobs, get_context("spawn"), initializer=_begin_worker, initargs=(leash,))
+
+    def let_go(self) -> None:
+        """End all processes at once, with what they run."""
+        self._hand.close()
+
+
+def _begin_worker(leash: Connection) -> None:
+    # Ctrl-C reaches every process of the terminal; the answer of the parent is enough.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
+    signal.signal(signal.SIGTERM, raise_terminated)
+
+
+def _end_with(leash: Connection) -> None:
+    """End when the parent does not hold the other end any more: a killed one tells nothing."""
+    try:
+        leash.recv_bytes()
+    except (EOFError, OSError):
+        main = threading.main_thread()
+        if main.ident is not None and hasattr(signal, "pthread_kill"):  # not on Windows
+            for _ in range(PATIENCE):
+                signal.pthread_kill(main.ident, signal.SIGTERM)
+                main.join(1.0)
+        os._exit(1)
+
+
+def _ending(function: Callable[[Task], Answer], task: Task) -> Answer:
+    """Run a task. A pool would take `Terminated` for its result, and the worker go on."""
+    try:
+        return function(task)
+    except Terminated as end:
+        os._exit(int(end.code or 0))
+
+
+def _results(
+    function: Callable[[Task], Answer],
+    todo: Mapping[int, Task],
+    executor: Executor,
+    in_hand: int,
+    running: dict[int, Future[Answer]],
+) -> Iterator[tuple[int, Answer | BaseException]]:
+    """Results as they come, with at most `in_hand` runs handed over at a time.
+
+    Ends early when the executor breaks: with at least one `BrokenExecutor`, and one for each run
+    that it had. `running` is empty at first and always holds what is handed over.
+    """
+    done: SimpleQueue[int] = SimpleQueue()
+    # Since what is done leaves `todo` of the caller.
+    waiting = iter(list(todo.items()))
+    broken = False
+
+    def hand_over(count: int) -> Iterator[tuple[int, BaseException]]:
+        for k, task in islice(waiting, count):
+            try:
+                running[k] = handed(executor, function, task)
+            except BrokenExecutor as error:
+                yield k, error
+                return
+            # k=k keeps this k, not the loop's last; mypy cannot infer such a default.
+            running[k].add_done_callback(lambda _, k=k: done.put(k))  # type: ignore[misc]
+
+    for refused in hand_over(in_hand):
+        broken = True
+        yield refused
+    while running:
+        k = done.get()
+        result = _result(running.pop(k))
+        broken = broken or isinstance(result, BrokenExecutor)
+        if not broken:
+            # Before the row is stored, so that no worker waits for the disk.
+            for refused in hand_over(1):
+                broken = True
+                yield refused
+        yield k, result
+
+
+def _result(future: Future[Answer]) -> Answer | BaseException:
+    """What a finished run left, whatever ended it."""
+    if future.cancelled():
+        return CancelledError("the executor gave the run up")
+    return future.exception() or future.result()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Put Ctrl-C off, and keep it from processes that are started meanwhile."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

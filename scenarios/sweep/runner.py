@@ -1,0 +1,121 @@
+"""Many runs at once: experiments over processes or a caller's executor, one row each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import BrokenExecutor, Executor
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from minisim.errors import instance, integer
+from scenarios.pool import given, handed, pooled
+from scenarios.sweep.experiment import Experiment, Row, failed, run_experiment
+from scenarios.sweep.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Progress = Callable[[int, int], None]
+
+
+def sweep(
+    experiments: Iterable[Experiment],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    *,
+    jobs: int | None = None,
+    store: Store | None = None,
+) -> pd.DataFrame:
+    """Run all experiments and return one row each, in their order.
+
+    The rows do not depend on the executor, nor on the number of its workers, but for the columns
+    `MEASURED`.
+
+    Args:
+        experiments: what to run.
+        executor: any `concurrent.futures.Executor`, which stays open, such as
+            `dask.distributed.Client.get_executor()`; None is a pool of processes, as short-lived
+            as the call. They are spawned, so a script that sweeps needs the usual
+            `if __name__ == "__main__":`.
+        progress: called with the runs done and their number, in this process.
+        jobs: processes of the pool, one a core unless told; 1 runs in this process.
+        store: rows go there as they come, and those that it holds are not computed again.
+
+    Returns:
+        What was run (`Experiment.identity`), the keys of `Run.summary()`, nested ones joined by
+        "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth` and `growing`
+        (`scenarios.statistics`), `arrivals` (alike for common arrivals), `cpu_s`, `version`, and
+        `error`: why a run failed, missing where it did not.
+
+    Raises:
+        InputError: something other than an `Experiment`, or jobs beside an executor.
+        FileError: the store cannot be written; what it has stays.
+    """
+    import pandas as pd
+
+    todo = list(experiments)
+    rows: dict[int, Row] = {}
+    with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
+        for k, row in results:
+            rows[k] = row
+            if progress is not None:
+                progress(len(rows), len(todo))
+    return pd.DataFrame([rows[k] for k in range(len(todo))])
+
+
+def finished(
+    experiments: Iterable[Experiment],
+    executor: Executor | None = None,
+    *,
+    jobs: int | None = None,
+    store: Store | None = None,
+) -> Generator[tuple[int, Row]]:
+    """Position and row of each experiment as it is done; what the store has comes first.
+
+    Arguments and errors are those of `sweep`. Close it to give up.
+    """
+    todo = list(experiments)
+    for experiment in todo:
+        instance("experiment", experiment, Experiment)
+    if jobs is None:
+        jobs = os.cpu_count() or 1
+    integer("jobs", jobs, low=1, high=1024)
+    missing = dict(enumerate(todo))
+    if store is not None:
+        keys = [experiment.key for experiment in todo]
+        valid = store.valid(keys)
+        for k, key in enumerate(keys):
+            if key in valid:
+                del missing[k]
+                yield k, valid[key]
+    if executor is None:
+        results = pooled(
+            run_experiment, missing, jobs, begin=partial(_warm, list(missing.values()))
+        )
+    else:
+        results = given(run_experiment, missing, executor)
+    with closing(results):
+        for k, result in results:
+            outcome = failed(todo[k], result) if isinstance(result, BaseException) else result
+            if store is not None:
+                store.put(todo[k], outcome)
+            yield k, outcome.row
+
+
+def _warm(experiments: Iterable[Experiment], pool: Executor) -> None:
+    """Compile once for all processes: one of them compiles to disk before the others start.
+
+    Without it, every process of a fresh installation would compile for itself, at the same time.
+    What is compiled depends on the vehicle. A run that fails here will tell why when its turn
+    comes.
+    """
+    for experiment in {type(e.scenario.profile.vehicle): e for e in experiments}.values():
+        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt)
+        try:
+            tried = handed(pool, run_experiment, replace(experiment, scenario=scenario))
+        except BrokenExecutor:
+            return
+        tried.exception()

@@ -1,0 +1,39 @@
+"""SIGTERM as an exception, so that whoever is told to end cleans up first."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+
+class Terminated(SystemExit):
+    """SIGTERM came; its code is what a shell reports of a process that it ended."""
+
+    def __init__(self) -> None:
+        super().__init__(128 + signal.SIGTERM)
+
+
+def raise_terminated(_number: int, _frame: FrameType | None) -> NoReturn:
+    """A handler of SIGTERM. Once more raises once more: in a callback from C the first is lost."""
+    raise Terminated
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Raise `Terminated` on SIGTERM in the block.
+
+    It does nothing outside the main thread, nor where the signal is handled or ignored already.
+    """
+    before = signal.getsignal(signal.SIGTERM)
+    if threading.current_thread() is not threading.main_thread() or before != signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, raise_terminated)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

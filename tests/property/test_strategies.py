@@ -1,0 +1,34 @@
+"""The strategies that users get: all that they draw can be simulated, safely."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from hypothesis import given
+
+from minisim import simulate
+from minisim.control import Controller
+from scenarios import Scenario
+from scenarios.strategies import controllers, scenarios
+from tests.examples import share
+
+
+@share(0.5)
+@given(scenarios(horizon=90.0), controllers())
+def test_nothing_collides(scenario: Scenario, controller: Controller) -> None:
+    run = simulate(scenario, controller)
+    assert not run.collisions
+
+
+def test_without_hypothesis_the_error_says_what_to_install() -> None:
+    code = (
+        "import sys; sys.modules['hypothesis'] = None\n"
+        "from minisim.errors import MissingExtraError\n"
+        "try:\n"
+        "    import scenarios.strategies\n"
+        "except MissingExtraError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "strategies need hypothesis: pip install 'minisim[testing]'\n"
