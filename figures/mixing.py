@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from figures import lines, style
-from scenarios.archive import Archive, missing_note
-from scenarios.cells import saturated
 from scenarios.statistics import mean_interval
-from scenarios.studies import HUMAN_DENSITIES, HUMAN_GATES, HUMAN_SHARES, STOP
+from scenarios.studies.archive import Archive, missing_note
+from scenarios.studies.cells import saturated
+from scenarios.studies.study import HUMAN_DENSITIES, HUMAN_GATES, HUMAN_SHARES, STOP
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,8 +17,8 @@ from dim.agent import GATES
 from minisim.control import Command, Go, Hold, Observed, View, Wake
 from minisim.errors import InputError
 from scenarios import four_way
-from scenarios.experiment import Experiment, run_experiment
 from scenarios.mixing import driver_means, with_humans
+from scenarios.sweep.experiment import Experiment, run_experiment
 from tests.runs import digest, replayed
 
 SITE = four_way(profile="fair").site()
