@@ -6,6 +6,7 @@ from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
 from dim.humans import Humans
 from dim.mixed import Mixed
+from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
 
@@ -18,6 +19,7 @@ __all__ = [
     "HarmonyMatrix",
     "Humans",
     "Mixed",
+    "NoisyPerception",
     "Perception",
     "Zones",
     "decide",

@@ -24,7 +24,7 @@ driving intend (SAE J3134); otherwise each would let the other go first.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from dim.controller import Dim, DimSession
@@ -122,19 +122,34 @@ class _Cautious:
     perception: Perception
     mixed: Mixed
 
+    @property
+    def name(self) -> str:
+        """That of what they see at all."""
+        return self.perception.name
+
+    @property
+    def period(self) -> float | None:
+        """That of what they see at all; the humans ask for more views while they are there."""
+        return self.perception.period
+
     def start(self, site: Site) -> See:
         """Begin a run."""
         mixed = self.mixed
         drivers = Drivers(mixed.humans, mixed.share, site.seed)
         readings = Readings(mixed.humans, site, drivers)
-        see_all = self.perception.start(site)
+        see_all, per_lane = self.perception.start(site), site.intersection.n - 1
         start = mixed.dim.zones.yellow_start + ROUNDING
         latest: list[View] = []  # what was seen last, and what it was taken for
 
         def see(view: View, ego: Observed) -> View:
             seen = see_all(view, ego)
             if not latest or latest[0] is not seen:
-                taken = tuple(_taken(seen, drivers, readings, start, mixed.trust))
+                ways = {
+                    v.id: readings.possible(v, mixed.trust)
+                    for v in view.vehicles
+                    if v.distance <= start and drivers[v.id].human
+                }
+                taken = tuple(_taken(seen, ways, drivers, start, per_lane))
                 latest[:] = [seen, View(seen.time, taken)]
             return latest[1]
 
@@ -142,12 +157,12 @@ class _Cautious:
 
 
 def _taken(
-    view: View, drivers: Drivers, readings: Readings, start: float, trust: str
+    view: View, ways: Mapping[int, list[int]], drivers: Drivers, start: float, per_lane: int
 ) -> Iterable[Observed]:
     """The vehicles of a view as DIM takes them.
 
     The first human of a lane, from the yellow zone on, is taken for one that cannot stop before
-    the junction any more.
+    the junction any more. `ways` are the movements that those may take who are there.
     """
     lane = -1
     for vehicle in view.vehicles:
@@ -155,9 +170,8 @@ def _taken(
         if first:
             lane = vehicle.lane
         if vehicle.distance <= start and drivers[vehicle.id].human:
-            ways = readings.possible(vehicle, trust)
-            per_lane = readings.manoeuvres
-            manoeuvre = ways[0] % per_lane + 1 if len(ways) == 1 else UNKNOWN
+            possible = ways.get(vehicle.id, ())
+            manoeuvre = possible[0] % per_lane + 1 if len(possible) == 1 else UNKNOWN
             vehicle = vehicle._replace(manoeuvre=manoeuvre)
             if first:
                 vehicle = vehicle._replace(distance=0.0, speed=1.0)

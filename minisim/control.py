@@ -9,7 +9,7 @@ has a period.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -268,6 +268,15 @@ class Session(Protocol):
 
         Called once at time 0, then at every wake-up.
         """
+
+
+@runtime_checkable
+class Counting(Session, Protocol):
+    """A session that counts something for the summary of its run."""
+
+    @property
+    def counts(self) -> Mapping[str, float]:
+        """Name -> count so far; the names are none of a summary's own."""
 
 
 @runtime_checkable

@@ -13,6 +13,7 @@ from minisim.control import (
     Close,
     Command,
     Controller,
+    Counting,
     Go,
     Hold,
     Open,
@@ -92,6 +93,11 @@ def ask(
             f"controller {controller.name!r} at {view.time:.1f} s: {error}"
         ) from error
     return commands
+
+
+def counts_of(session: Session) -> dict[str, float]:
+    """What a session has counted; empty where it counts nothing."""
+    return dict(session.counts) if isinstance(session, Counting) else {}
 
 
 def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:

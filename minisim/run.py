@@ -72,6 +72,7 @@ class Run:
         columns: the trips as arrays.
         record: what was recorded of the trajectories.
         trace, rows: the recording, and each row's vehicle id and path.
+        counts: what the controller's session counted.
         host: what moved the vehicles, for the provenance: `host` and what else to name.
     """
 
@@ -85,6 +86,7 @@ class Run:
     record: str | None
     trace: Records
     rows: Records
+    counts: Mapping[str, float] = field(default_factory=dict)
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
 
     @cached_property
@@ -104,6 +106,7 @@ class Run:
             "host": self.host["host"],
             **summarise(self.columns, self.site.intersection.n),
             "collisions": len(self.collisions),
+            **self.counts,
         }
 
     @property

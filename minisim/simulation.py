@@ -34,6 +34,7 @@ from minisim.hosting import (
     begin,
     checked_window,
     collision_error,
+    counts_of,
 )
 from minisim.run import Run, ScenarioLike
 from minisim.state import (
@@ -198,6 +199,7 @@ class Simulation:
             record=self.record,
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path"]].copy(),
+            counts=counts_of(self._session),
         )
 
     def _decide(self) -> None:

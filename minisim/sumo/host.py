@@ -36,6 +36,7 @@ from minisim.hosting import (
     begin,
     checked_window,
     collision_error,
+    counts_of,
 )
 from minisim.recording import replacing
 from minisim.run import Run, ScenarioLike
@@ -193,6 +194,7 @@ def _run(request: _Request) -> Run:
         record=request.record,
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
+        counts=counts_of(beginning.session),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 
