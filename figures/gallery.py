@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
-from figures import beyond, mixing, paper_results, paper_tables, schematic
+from figures import beyond, misreading, mixing, paper_results, paper_tables, schematic
 from figures.style import FORMATS, save
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import choice
@@ -102,6 +102,18 @@ def _beyond() -> Iterable[Item]:
         ("fairness",),
     )  # fmt: skip
     yield Item("humans", "delay over the share of human drivers", mixing.human_figure, ("humans",))
+    yield Item(
+        "perception", "collisions, false grants and delay over intent errors",
+        misreading.perception_figure, ("perception",),
+    )  # fmt: skip
+    yield Item(
+        "perception-table", "outcomes of 15 % misread intents", misreading.perception_table,
+        ("perception",),
+    )  # fmt: skip
+    yield Item(
+        "confidence", "collisions, false grants and delay over the confidence that is believed",
+        misreading.confidence_figure, ("confidence",),
+    )  # fmt: skip
     yield Item("capacity", "largest demand served", beyond.capacity_figure, ("capacity",))
     yield Item(
         "capacity-table",

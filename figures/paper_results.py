@@ -58,7 +58,7 @@ def split_figure(archive: Archive, metric: str, split: str) -> Figure:
         _dress(axes, PANELS[found.study.name], metric)
     name = "equal inflow" if split == "balanced" else f"inflow {split}"
     _head(figure, f"Mean {METRICS[metric]}, 4 arms, {name}", SERIES)
-    lines.footnote(figure, missing_note(results, lambda c: c.arms == 4 and c.split == split))
+    lines.footnote(figure, missing_note(results, lambda c: c.where == f"4 arms, {split}"))
     return figure
 
 
@@ -77,7 +77,8 @@ def arms_figure(archive: Archive, metric: str) -> Figure:
         _dress(axes, PANELS[found.study.name], metric)
     _head(figure, f"Mean {METRICS[metric]} under DIM by number of arms", names)
     lines.footnote(
-        figure, missing_note(results, lambda c: c.series == "dim" and c.split == "balanced")
+        figure,
+        missing_note(results, lambda c: c.series == "dim" and c.where.endswith(", balanced")),
     )
     return figure
 

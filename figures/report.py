@@ -21,13 +21,16 @@ from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
 from scenarios.studies.crossing import METRICS
 from scenarios.studies.reproduction import Made
 from scenarios.studies.results import Results
-from scenarios.studies.study import STUDIES, Case
+from scenarios.studies.study import STUDIES, AnyCase
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: Studies of the paper's grid.
 PAPER = ("as-run", "text")
+
+#: Studies in which vehicles misread each other, and collide: their collisions have a figure.
+MISREAD = ("perception", "confidence")
 
 #: Section -> names of figures and tables, in their order; the rest stays in the folder.
 SECTIONS = {
@@ -42,6 +45,7 @@ SECTIONS = {
     "Capacity": ("capacity", "capacity-table"),
     "Fairness": ("fairness",),
     "Human drivers": ("humans",),
+    "Wrong perception": ("perception", "perception-table", "confidence"),
     "Schematic figures": ("maps", "decision-4way", "worst-case"),
 }  # fmt: skip
 
@@ -130,7 +134,7 @@ def _report(
     yield "## Causes of the differences"
     yield _causes(archive)
     yield "## Collisions"
-    yield _collisions(studies)
+    yield _collisions(results for results in studies if results.study.name not in MISREAD)
     yield "## Over-saturated cells"
     yield _saturated(studies)
     yield "## Failed runs"
@@ -160,10 +164,9 @@ def _made_table(made: Sequence[Made]) -> Table:
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
             "clique first) and says what the paper's rules give; `as-run` are the profiles "
             "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
-            "the published numbers must be compared with; `fair`, `gate`, `fairness`, "
-            "`humans` and `capacity` are the profile `fair`: one vehicle, one limit for all. Wall "
-            "is of what was computed now, drawing not counted; CPU is of all runs, whenever made, "
-            "and a run that two studies share counts in both.",
+            "the published numbers must be compared with; all others are the profile `fair`: one "
+            "vehicle, one limit for all. Wall is of what was computed now, drawing not counted; "
+            "CPU is of all runs, whenever made, and a run that two studies share counts in both.",
         ),
     )  # fmt: skip
 
@@ -278,7 +281,7 @@ def _causes(archive: Archive) -> str:
     )
 
 
-def _cells(results: Results) -> Iterator[tuple[Case, pd.DataFrame]]:
+def _cells(results: Results) -> Iterator[tuple[AnyCase, pd.DataFrame]]:
     for case in results.effort.cases(results.study):
         rows = results.good
         for key, value in case._asdict().items():
@@ -306,7 +309,7 @@ def _saturated(studies: Iterable[Results]) -> str:
         grown: dict[str, list[str]] = {}
         for case, rows in _cells(results):
             if saturated(rows):
-                where = f"{style.look(case.series).label}, {case.arms} arms, {case.split}"
+                where = f"{style.look(case.series).label}, {case.where}"
                 grown.setdefault(where, []).append(f"{case.density:g}")
         lines += [
             f"- {results.study.name}: {where}: {', '.join(densities)} veh/h/lane"

@@ -68,6 +68,35 @@ def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> In
     return Interval(mean, t * math.sqrt(variance * (1.0 + 1.0 / count)), count)
 
 
+def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Confidence interval of the mean of a Poisson variable of which one value is known.
+
+    Exact: the means for which so few or so many events are just likely enough (Garwood 1936). Of
+    0 events the mean is below −ln((1−confidence)/2), 3.7.
+
+    Raises:
+        InputError: no count, or a confidence outside (0, 1).
+    """
+    integer("count", count, low=0)
+    number("confidence", confidence, above=0, below=1)
+    tail = (1.0 - confidence) / 2.0
+    high = _poisson_mean(count, tail)
+    return (_poisson_mean(count - 1, 1.0 - tail) if count else 0.0), high
+
+
+def _poisson_mean(count: int, probability: float) -> float:
+    """The mean for which a Poisson variable is at most `count` with this probability."""
+    low, high = 0.0, count + 10.0 * math.sqrt(count + 1.0) + 20.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        logs = (k * math.log(middle) - middle - math.lgamma(k + 1.0) for k in range(count + 1))
+        if math.fsum(map(math.exp, logs)) > probability:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2.0
+
+
 def queue_growth(
     demand_time: npt.NDArray[np.float64], leave: npt.NDArray[np.float64], end: float
 ) -> float:

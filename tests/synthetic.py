@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dim import NoisyPerception
+from dim.tally import Tallied
 from minisim.geometry import ARM_NAMES
 from scenarios.sweep.experiment import Experiment
 
@@ -28,7 +30,8 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
-    label, _, share = experiment.label.partition("-humans-")
+    # The studies of perception name what errs, not a series; that of humans their share.
+    label, _, share = (experiment.label or "dim").partition("-humans-")
     base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
@@ -60,8 +63,22 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
         },
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
-        **lanes, "queue_growth": excess, "growing": excess > 0.0,
+        **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
         "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
+    }  # fmt: skip
+
+
+def tally(experiment: Experiment, trips: int) -> dict[str, float]:
+    """Counts of `dim.tally`, in proportion to the intent errors; nothing where nobody errs."""
+    controller = experiment.controller
+    if not isinstance(controller, Tallied):
+        return {}
+    perception = controller.dim.perception
+    assert isinstance(perception, NoisyPerception)
+    errors = max(perception.intent_error, *perception.unsignalled)
+    return {
+        "collisions": int(errors * 40), "crossings": trips - 9, "false_grants": int(errors * 300),
+        "disagreement_s": 400.0 * errors, "deadlock_s": 0.0 if perception.shared else 50.0,
     }  # fmt: skip
 
 

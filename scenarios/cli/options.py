@@ -32,7 +32,9 @@ ControllerName = Annotated[
         help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
         "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
         "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
-        "dim-paper-commit, dim-as-run, dim-as-run-size, dim-as-run-exit-14, fixed-time, "
+        "dim-paper-commit, dim-misread (15 % of intents misread), dim-unsignalled (turns without "
+        "signal at published rates), dim-occluded (bodies block the view), dim-as-run, "
+        "dim-as-run-size, dim-as-run-exit-14, fixed-time, "
         "fixed-time-equal, adaptive, all-way-stop, longest-queue, "
         "v2ic (serving list and speed advice; the published run's under the profile as_run), "
         "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
@@ -45,6 +47,22 @@ Humans = Annotated[
         metavar="SHARE",
         help="Share of human drivers among the vehicles, 0 … 1: they stop, look, and accept gaps. "
         "With the controllers of DIM.",
+    ),
+]
+IntentError = Annotated[
+    float,
+    typer.Option(
+        metavar="P",
+        help="Probability that vehicles of DIM misread another's intent, 0 … 1. Collisions are "
+        "then likely: see --on-collision.",
+    ),
+]
+ErrorKind = Annotated[
+    str,
+    typer.Option(
+        metavar="missed|symmetric",
+        help="What --intent-error does: miss the signal of a turn, or take any manoeuvre for each "
+        "other one alike. Everybody errs alike, for as long as they meet.",
     ),
 ]
 Density = Annotated[

@@ -69,6 +69,16 @@ def safety_line(summary: Mapping[str, Any]) -> Text:
     )
 
 
+def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
+    """What wrong perception did, where it was counted (`dim.tally`)."""
+    if counts:
+        yield Text(
+            f"  crossings {counts['crossings']:g}   false grants {counts['false_grants']:g}   "
+            f"disagreement {counts['disagreement_s']:.1f} s   "
+            f"deadlock {counts['deadlock_s']:.1f} s"
+        )
+
+
 def harmony_table(matrix: HarmonyMatrix) -> Table:
     """The matrix with one column a lane: ● harmony, · conflict."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)

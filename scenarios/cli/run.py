@@ -17,9 +17,11 @@ from scenarios.cli.options import (
     Bearings,
     ControllerName,
     Density,
+    ErrorKind,
     Gui,
     Host,
     Humans,
+    IntentError,
     KeepFiles,
     ProfileName,
     ScenarioName,
@@ -50,6 +52,7 @@ HOSTS = ("minisim", "sumo")
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
     "minisim run four-way -c dim-harmonious -d 200 --profile fair --humans 0.3\n\n"
+    "minisim run four-way -d 250 --intent-error 0.15 --on-collision record\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
     "[bold]Exit codes[/bold]\n\n"
@@ -60,6 +63,8 @@ def run(
     scenario: ScenarioName,
     controller: ControllerName = "dim",
     humans: Humans = 0.0,
+    intent_error: IntentError = 0.0,
+    error_kind: ErrorKind = "missed",
     density: Density = None,
     split: Split = None,
     turns: Turns = None,
@@ -105,10 +110,12 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
+    from dim import NoisyPerception
     from minisim.recording import write_fcd, write_trajectories, write_trips
     from minisim.safety import safety_summary
     from scenarios.cli.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
+    from scenarios.misreading import counted, with_perception
     from scenarios.mixing import driver_means, with_humans
 
     check_apart({
@@ -125,7 +132,9 @@ def run(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    who = with_humans(controller_named(controller, profile), humans)
+    senses = NoisyPerception(intent_error, error_kind)
+    dim = with_perception(controller_named(controller, profile), senses)
+    who = counted(with_humans(dim, humans))
     everything = fcd is not None or trajectories is not None
     options = {
         "record": "all" if everything else "junction" if safety else None,
@@ -156,9 +165,9 @@ def run(
     if as_json:
         show_json(summary)
         return
-    from scenarios.cli.report import run_table, run_title, safety_line
+    from scenarios.cli.report import run_table, run_title, safety_line, tally_line
 
-    show(run_title(summary), run_table(summary), safety_line(summary))
+    show(run_title(summary), run_table(summary), safety_line(summary), *tally_line(result.counts))
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
     for path in files:

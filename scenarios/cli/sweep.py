@@ -50,7 +50,8 @@ def sweep(
             metavar="FILE.toml|paper|STUDY", show_default=False,
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            "study of minisim reproduce: as-run, fair, gate, fairness or humans.",
+            "study of minisim reproduce: as-run, fair, gate, fairness, humans, perception or "
+            "confidence.",
         ),
     ],
     out: Annotated[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from minisim.errors import MinisimError
 from scenarios.studies.capacity import CASES, Capacity, Search, capacities
 from scenarios.studies.results import Effort, Find, Results, collect
-from scenarios.studies.study import Case, study_named
+from scenarios.studies.study import AnyCase, Case, study_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -80,7 +80,7 @@ def smoke_test(effort: Effort) -> str:
     return "" if effort.densities is None else "Smoke test, which means nothing: "
 
 
-def missing_note(results: Iterable[Results], wanted: Callable[[Case], bool]) -> str:
+def missing_note(results: Iterable[Results], wanted: Callable[[AnyCase], bool]) -> str:
     """What a figure shows and what it lacks, in small print.
 
     Args:
@@ -91,7 +91,7 @@ def missing_note(results: Iterable[Results], wanted: Callable[[Case], bool]) -> 
     effort = found[0].effort
     text = f"{smoke_test(effort)}{effort.seeds} seeds, {effort.horizon:g} s each."
     lacking = [
-        f"{case.series} ({results.study.name}, {case.arms} arms, {case.density:g})"
+        f"{case.series} ({results.study.name}, {case.where}, {case.density:g})"
         for results in found
         for case in results.missing
         if wanted(case)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from minisim.errors import integer, number, numbers
-from scenarios.studies.study import Case, Study
+from scenarios.studies.study import AnyCase, Study
 from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ class Effort:
     Attributes:
         seeds: runs a case, the seeds 1 … `seeds`.
         horizon: of each run [s].
-        densities: only cases with these demands [veh/h/lane]; None is all.
+        densities: only cases with these demands [veh/h/lane], in studies that have such; None
+            is all.
     """
 
     seeds: int = 10
@@ -42,12 +43,13 @@ class Effort:
         """A smoke test: the same cases at two demands, some minutes each."""
         return cls(seeds=seeds, horizon=150.0, densities=(150.0, 350.0))
 
-    def cases(self, study: Study) -> tuple[Case, ...]:
-        """The cases of a study that are run."""
+    def cases(self, study: Study) -> tuple[AnyCase, ...]:
+        """The cases of a study that are run: all where none has one of the demands."""
         chosen = self.densities
-        return tuple(case for case in study.cases if chosen is None or case.density in chosen)
+        found = tuple(case for case in study.cases if chosen is None or case.density in chosen)
+        return found or study.cases
 
-    def runs(self, study: Study) -> list[tuple[Case, Experiment]]:
+    def runs(self, study: Study) -> list[tuple[AnyCase, Experiment]]:
         """The runs of a study, seed by seed within each case."""
         return study.runs(self.seeds, self.horizon, self.cases(study))
 
@@ -59,14 +61,14 @@ class Results:
     Attributes:
         study: what was asked.
         effort: how much of it was.
-        rows: one a run found: the columns of a sweep, with those of its `Case`.
+        rows: one a run found: the columns of a sweep, with those of its case.
         missing: cases without a successful run.
     """
 
     study: Study
     effort: Effort
     rows: pd.DataFrame
-    missing: tuple[Case, ...]
+    missing: tuple[AnyCase, ...]
 
     @property
     def good(self) -> pd.DataFrame:
@@ -96,9 +98,10 @@ def collect(study: Study, effort: Effort, find: Find) -> Results:
         for (case, _), row in zip(runs, found, strict=True)
         if row is not None
     ]
-    done = {tuple(row[key] for key in Case._fields) for row in rows if not row["error"]}
-    columns = None if rows else [*Case._fields, "seed", "error"]
+    names = tuple(study.cases[0]._asdict())
+    done = {tuple(row[key] for key in names) for row in rows if not row["error"]}
+    columns = None if rows else [*names, "seed", "error"]
     return Results(
         study, effort, pd.DataFrame(rows, columns=columns),
-        tuple(case for case in effort.cases(study) if case not in done),
+        tuple(case for case in effort.cases(study) if tuple(case._asdict().values()) not in done),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from minisim.control import Controller
 from minisim.errors import choice
@@ -17,6 +17,7 @@ from scenarios.mixing import with_humans
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
+from scenarios.studies.misreading import ERRORS, MISREADERS, THRESHOLD_CASES
 from scenarios.sweep.experiment import Experiment
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
@@ -74,9 +75,40 @@ class Case(NamedTuple):
         cell = Cell(self.split, int(self.density), self.arms, name)
         return replace(published_scenario(*cell), horizon=horizon), controller_of(*cell)
 
+    @property
+    def where(self) -> str:
+        """What tells it from other cases of its series, but for the demand."""
+        humans = f"{self.humans:.0%} humans, " if self.humans else ""
+        return f"{humans}{self.arms} arms, {self.split}"
+
     def __str__(self) -> str:
-        humans = f", {self.humans:.0%} humans" if self.humans else ""
-        return f"{self.series}{humans}, {self.arms} arms, {self.split}, {self.density:g} veh/h/lane"
+        return f"{self.series}, {self.where}, {self.density:g} veh/h/lane"
+
+
+class AnyCase(Protocol):
+    """A point of a figure: a `Case`, or one with other axes. A named tuple of plain values."""
+
+    @property
+    def series(self) -> str:
+        """The line of the figure that it lies on."""
+
+    @property
+    def arms(self) -> int:
+        """Of the junction."""
+
+    @property
+    def density(self) -> float:
+        """Mean inflow a lane [veh/h]."""
+
+    @property
+    def where(self) -> str:
+        """What tells it from other cases of its series, but for the demand."""
+
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+        """The run of one seed."""
+
+    def _asdict(self) -> dict[str, Any]:
+        """Its columns."""
 
 
 @dataclass(frozen=True)
@@ -92,12 +124,12 @@ class Study:
 
     name: str
     question: str
-    cases: tuple[Case, ...]
+    cases: tuple[AnyCase, ...]
     few: Mapping[str, int] = field(default_factory=dict)
 
     def runs(
-        self, seeds: int, horizon: float = 3600.0, cases: Iterable[Case] | None = None
-    ) -> list[tuple[Case, Experiment]]:
+        self, seeds: int, horizon: float = 3600.0, cases: Iterable[AnyCase] | None = None
+    ) -> list[tuple[AnyCase, Experiment]]:
         """The seeds 1 … `seeds` of all cases or some, seed by seed within each case."""
         return [
             (case, case.experiment(seed, horizon))
@@ -127,6 +159,9 @@ def _as_run(cell: Cell) -> Case:
 #: The published V2I-C decides every 0.01 s and costs some 20 s of CPU a simulated hour, a hundred
 #: times a signal; its runs differ little.
 _FEW = {"v2ic": 3}
+
+#: Vehicles that misread each other look around every 0.1 s, which costs 3 s of CPU an hour.
+_FEW_MISREAD = dict.fromkeys(MISREADERS, 5)
 
 #: Everything that is compared on equal terms; the paper's four first.
 RIVALS = (
@@ -186,6 +221,10 @@ STUDIES: MappingProxyType[str, Study] = MappingProxyType({
         Study("fairness", "Who waits under which rule of priority?",
               _cases(PRIORITIES, (4,), DENSITIES)),
         Study("humans", "What do human drivers cost, and whom?", _human_cases()),
+        Study("perception", "What happens when vehicles misread each other's intent?", ERRORS,
+              _FEW_MISREAD),
+        Study("confidence", "What does it cost to believe only readings that are sure?",
+              THRESHOLD_CASES, _FEW_MISREAD),
     )
 })  # fmt: skip
 

@@ -21,7 +21,7 @@ from dim.noise import UNSIGNALLED
 from minisim.geometry import Intersection
 from minisim.streams import Draws
 from minisim.testing import small_scenario
-from tests.strategies import bearings
+from scenarios.strategies import bearings
 
 DRAWS = Draws(1, "perception")
 COUNT = 4000

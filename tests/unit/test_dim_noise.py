@@ -19,7 +19,7 @@ from minisim.control import Observed, View
 from minisim.errors import InputError
 from minisim.streams import Draws
 from minisim.testing import check_controller, drained, small_scenario
-from tests.strategies import floats
+from scenarios.strategies import floats
 from tests.views import seen
 
 SITE = small_scenario(4).site(3)

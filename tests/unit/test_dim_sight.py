@@ -14,7 +14,8 @@ from minisim.control import Observed, Site
 from minisim.geometry import Intersection
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
-from tests.strategies import floats, intersections, share
+from scenarios.strategies import floats, intersections
+from tests.examples import share
 
 SITE = small_scenario(4).site(0)
 BODIES = Bodies(SITE)

@@ -121,7 +121,7 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
     assert isinstance(figure, Figure)
     notes = [t.get_text() for t in figure.texts if "no run" in t.get_text()]
     assert len(notes) == 1
-    assert "adaptive (fair, 4 arms, 50)" in notes[0]
+    assert "adaptive (fair, 4 arms, balanced, 50)" in notes[0]
     assert "9 more" in notes[0]
 
 
