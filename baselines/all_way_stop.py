@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from baselines.clearing import clearing_distances
+from minisim.clearing import clearing_distances
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.errors import instance, number
 

@@ -4,6 +4,8 @@ from dim.as_run import AsRunDim
 from dim.controller import Dim
 from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
+from dim.humans import Humans
+from dim.mixed import Mixed
 from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
@@ -15,6 +17,8 @@ __all__ = [
     "ExactPerception",
     "Explanation",
     "HarmonyMatrix",
+    "Humans",
+    "Mixed",
     "NoisyPerception",
     "Perception",
     "Zones",

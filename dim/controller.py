@@ -158,9 +158,15 @@ class DimSession:
         reader: how they read what they see.
         see: what each of them sees.
         plan: what the host has to provide.
+
+    Args:
+        dim, site: whose run it is, and where.
+        follows: whether the vehicle of an id follows DIM; others are seen, but not hosted.
     """
 
-    def __init__(self, dim: Dim, site: Site) -> None:
+    def __init__(
+        self, dim: Dim, site: Site, follows: Callable[[int], bool] = lambda _: True
+    ) -> None:
         instance("dim", dim, Dim)
         instance("site", site, Site)
         zones = dim.zones
@@ -182,6 +188,7 @@ class DimSession:
         self._ranks = _ranking(dim, site)
         self.see = dim.perception.start(site)
         self._dt = site.dt
+        self._follows = follows
         self._agents: dict[int, Agent] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -193,9 +200,9 @@ class DimSession:
         table, until = self.table(view)
         seen = percept = None
         for ego in view.vehicles:
-            if ego.distance > start:
-                continue
             vehicle = ego.id
+            if ego.distance > start or not self._follows(vehicle):
+                continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
             sight = self.see(view, ego)

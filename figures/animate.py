@@ -159,11 +159,13 @@ class Picture:
             f"{scenario.density:.0f} veh/h/lane · profile {scenario.profile_name} · "
             f"seed {self.run.seed}"
         )
-        vehicles = (
+        vehicles = [
             (style.RIGHT_OF_WAY, "has the right of way"),
             (style.WAITING, "waits"),
             (style.FREE, "drives"),
-        )
+        ]
+        if self._film.human.any():
+            vehicles.append((style.INK, "outline: human"))
         names = dict.fromkeys(marking.name for marking in self.run.plan.markings)
         zones = [(style.ZONES.get(name, style.SKY), MEANINGS.get(name, name)) for name in names]
         middle = FOOT / 2.0
@@ -202,6 +204,10 @@ class Picture:
         colours = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])[film.state[near]]
         self._bodies.set_verts(list(junction.place(body, x, y, angle)))
         self._bodies.set_facecolor(colours.tolist())
+        self._bodies.set_edgecolor(
+            [style.INK if human else style.PAPER for human in film.human[near]]
+        )
+        self._bodies.set_linewidth([1.6 if human else 0.7 for human in film.human[near]])
         self._glass.set_verts(list(junction.place(glass, x, y, angle)))
         self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
         self._ways.set_segments(film.ways(near))

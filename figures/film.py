@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from dim import Mixed
 from figures import junction
 from minisim.errors import InputError
 from minisim.geometry import Floats, Intersection, Movement
@@ -50,6 +51,7 @@ class Film:
         still = self.speed <= WAITING_SPEED
         self.state = np.where(released, RELEASED, np.where(still, STANDING, DRIVING))
         self.still = still
+        self.human = _human(run)[frame["vehicle"].to_numpy()]
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
         self.ticks, first = np.unique(ticks, return_index=True)
         self.bounds = np.append(first, len(ticks))
@@ -143,6 +145,14 @@ class Film:
             ]
             found.append(ring + np.mean(centres, axis=0))
         return found
+
+
+def _human(run: Run) -> npt.NDArray[np.bool_]:
+    """Which vehicles of a run are driven by humans, by id."""
+    count = len(run.columns.lane)
+    if isinstance(run.controller, Mixed):
+        return run.controller.human(run.seed, count)
+    return np.zeros(count, dtype=bool)
 
 
 def _turn(intersection: Intersection, movement: Movement) -> int:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
-from figures import beyond, misreading, paper_results, paper_tables, schematic
+from figures import beyond, misreading, mixing, paper_results, paper_tables, schematic
 from figures.style import FORMATS, save
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import choice
@@ -101,6 +101,7 @@ def _beyond() -> Iterable[Item]:
         "fairness", "fixed, rotating and longest-waiting priority", beyond.fairness_figure,
         ("fairness",),
     )  # fmt: skip
+    yield Item("humans", "delay over the share of human drivers", mixing.human_figure, ("humans",))
     yield Item(
         "perception", "collisions, false grants and delay over intent errors",
         misreading.perception_figure, ("perception",),

@@ -59,11 +59,16 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
         )  # fmt: skip
         grown = [(a, b) for a, b, (_, _, saturated) in zip(x, y, points, strict=True) if saturated]
         for a, b in grown:
-            axes.annotate(
-                "", (a, b), xytext=(0, 13), textcoords="offset points", zorder=4,
-                arrowprops={"arrowstyle": "<-", "color": look.colour, "linewidth": 1.1,
-                            "shrinkA": 0, "shrinkB": 3.5},
-            )  # fmt: skip
+            growth_arrow(axes, a, b, look.colour)
+
+
+def growth_arrow(axes: Axes, x: float, y: float, colour: str) -> None:
+    """An arrow up from a point: the queue was still growing there."""
+    axes.annotate(
+        "", (x, y), xytext=(0, 13), textcoords="offset points", zorder=4,
+        arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 1.1, "shrinkA": 0,
+                    "shrinkB": 3.5},
+    )  # fmt: skip
 
 
 def draw_published(

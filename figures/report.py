@@ -44,6 +44,7 @@ SECTIONS = {
     ),
     "Capacity": ("capacity", "capacity-table"),
     "Fairness": ("fairness",),
+    "Human drivers": ("humans",),
     "Wrong perception": ("perception", "perception-table", "confidence"),
     "Schematic figures": ("maps", "decision-4way", "worst-case"),
 }  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 from minisim.errors import choice, integer
 
 #: Order matters: it is the spawn key. Append only.
-STREAMS = ("arrivals", "manoeuvres", "perception", "drivers")
+STREAMS = ("arrivals", "manoeuvres", "perception", "drivers", "humans")
 
 
 def stream(seed: int, name: str) -> np.random.Generator:

@@ -140,6 +140,16 @@ def summarise(trips: Trips, n: int) -> dict[str, Any]:
     }
 
 
+def group_means(trips: Trips, chosen: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    """Means of some trips of a run in both forms, as `summarise` gives them of all.
+
+    Args:
+        trips: of the run.
+        chosen: which, shape (k,); only those demanded before the end count.
+    """
+    return _lane(trips, chosen & (trips.demand_time <= trips.end))
+
+
 def _lane(trips: Trips, chosen: npt.NDArray[np.bool_]) -> dict[str, Any]:
     return {
         "trips": int(chosen.sum()),

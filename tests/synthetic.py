@@ -30,8 +30,9 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
-    label = experiment.label or "dim"  # the studies of perception name what errs, not a series
-    base = CURVES[label][0]
+    # The studies of perception name what errs, not a series; that of humans their share.
+    label, _, share = (experiment.label or "dim").partition("-humans-")
+    base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
     waiting = wobble * base / max(1.0 - load, 0.02)
@@ -53,7 +54,13 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
         "time_loss_s": 3.0 + 1.5 * waiting,
         "depart_delay_s": 10.0 * max(load - 1.0, 0.0),
     }
+    groups = ("human", "automated") if share else ()
     return {
+        **{
+            f"{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+            for k, group in enumerate(groups)
+            for key, value in times.items()
+        },
         **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,

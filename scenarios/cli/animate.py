@@ -14,6 +14,7 @@ from scenarios.cli.options import (
     Bearings,
     ControllerName,
     Density,
+    Humans,
     ProfileName,
     ScenarioName,
     Seed,
@@ -41,6 +42,7 @@ def animate(
         ),
     ],
     controller: ControllerName = "dim",
+    humans: Humans = 0.0,
     start: Annotated[float, typer.Option(metavar="S", help="Simulated time to begin at.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
     fps: Annotated[float, typer.Option(help="Frames a second; at most one a step.")] = 10.0,
@@ -58,6 +60,7 @@ def animate(
     from figures.encode import animation_format
     from scenarios.cli.files import check_apart, check_file
     from scenarios.controllers import controller_named
+    from scenarios.mixing import with_humans
     from scenarios.scenario import profile_named
 
     check_apart({"--arrivals": arrivals, "--out": out})
@@ -71,7 +74,7 @@ def animate(
         profile=profile, side=side, horizon=start + seconds,
     )  # fmt: skip
     result = simulate(
-        what, controller_named(controller, profile), seed,
+        what, with_humans(controller_named(controller, profile), humans), seed,
         record="all", record_window=(start, start + seconds), on_collision="record",
     )  # fmt: skip
     with bar("drawing") as progress:

@@ -41,6 +41,14 @@ ControllerName = Annotated[
         "unregulated.",
     ),
 ]  # fmt: skip
+Humans = Annotated[
+    float,
+    typer.Option(
+        metavar="SHARE",
+        help="Share of human drivers among the vehicles, 0 … 1: they stop, look, and accept gaps. "
+        "With the controllers of DIM.",
+    ),
+]
 IntentError = Annotated[
     float,
     typer.Option(

@@ -47,6 +47,8 @@ def run_table(summary: Mapping[str, Any]) -> Table:
         table.add_row(lane, *_counts(means), *_means(means), end_section=k == len(lanes))
     table.add_row("all", *_counts(summary), *_means(summary), style="bold")
     table.add_row("with unfinished", "", "", *_means(summary["complete"]), style="dim")
+    for name, means in summary.get("drivers", {}).items():
+        table.add_row(name, *_counts(means), *_means(means))
     return table
 
 

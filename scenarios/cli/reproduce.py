@@ -48,7 +48,7 @@ def reproduce(
         typer.Option(
             metavar="STUDY", show_default=False,
             help="Only this one, and only what it needs is drawn: text, as-run, fair, gate, "
-            "fairness, perception, confidence or capacity; may be repeated.",
+            "fairness, humans, perception, confidence or capacity; may be repeated.",
         ),
     ] = None,
     quick: Annotated[

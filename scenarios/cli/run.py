@@ -20,6 +20,7 @@ from scenarios.cli.options import (
     ErrorKind,
     Gui,
     Host,
+    Humans,
     IntentError,
     KeepFiles,
     ProfileName,
@@ -50,6 +51,7 @@ HOSTS = ("minisim", "sumo")
     "minisim run four-way --controller dim --density 300\n\n"
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
+    "minisim run four-way -c dim-harmonious -d 200 --profile fair --humans 0.3\n\n"
     "minisim run four-way -d 250 --intent-error 0.15 --on-collision record\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
@@ -60,6 +62,7 @@ HOSTS = ("minisim", "sumo")
 def run(
     scenario: ScenarioName,
     controller: ControllerName = "dim",
+    humans: Humans = 0.0,
     intent_error: IntentError = 0.0,
     error_kind: ErrorKind = "missed",
     density: Density = None,
@@ -113,6 +116,7 @@ def run(
     from scenarios.cli.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
     from scenarios.misreading import counted, with_perception
+    from scenarios.mixing import driver_means, with_humans
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -129,7 +133,8 @@ def run(
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     senses = NoisyPerception(intent_error, error_kind)
-    who = counted(with_perception(controller_named(controller, profile), senses))
+    dim = with_perception(controller_named(controller, profile), senses)
+    who = counted(with_humans(dim, humans))
     everything = fcd is not None or trajectories is not None
     options = {
         "record": "all" if everything else "junction" if safety else None,
@@ -147,6 +152,8 @@ def run(
         error.add_note(_unwritten(files))
         raise
     summary = result.summary()
+    if drivers := driver_means(result):
+        summary["drivers"] = drivers
     with bar("measuring"):
         summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
         if trips is not None:

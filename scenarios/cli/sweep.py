@@ -31,7 +31,7 @@ PAPER = {"paper": "text"}
     '  scenario = \\["four-way", "five-way"]\n\n'
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
-    "and also profile, side, split, turns, model, arrivals, seeds, horizon, on_collision; "
+    "and also humans, profile, side, split, turns, model, arrivals, seeds, horizon, on_collision; "
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
     "reproduce[/bold] asked for it.\n\n"
@@ -50,7 +50,8 @@ def sweep(
             metavar="FILE.toml|paper|STUDY", show_default=False,
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            "study of minisim reproduce: as-run, fair, gate, fairness, perception or confidence.",
+            "study of minisim reproduce: as-run, fair, gate, fairness, humans, perception or "
+            "confidence.",
         ),
     ],
     out: Annotated[

@@ -13,6 +13,7 @@ from minisim.control import Controller
 from minisim.errors import choice
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
+from scenarios.mixing import with_humans
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.scenario import Scenario, parse_split
@@ -37,6 +38,7 @@ class Case(NamedTuple):
         arms: of the junction.
         split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
         density: mean inflow a lane [veh/h].
+        humans: share of human drivers.
     """
 
     profile: str
@@ -45,6 +47,7 @@ class Case(NamedTuple):
     arms: int
     split: str
     density: float
+    humans: float = 0.0
 
     def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
         """The run of one seed; collisions are counted, for some published rules have them."""
@@ -53,7 +56,13 @@ class Case(NamedTuple):
         else:
             scenario = self._drawn(horizon)
             controller = controller_named(self.controller, self.profile)
-        return Experiment(scenario, controller, seed, label=self.series, on_collision="record")
+            controller = with_humans(controller, self.humans)
+        return Experiment(scenario, controller, seed, label=self.label, on_collision="record")
+
+    @property
+    def label(self) -> str:
+        """What rows call the controller."""
+        return f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
 
     def _drawn(self, horizon: float) -> Scenario:
         shares = None if self.split == "balanced" else parse_split(self.split)
@@ -69,7 +78,8 @@ class Case(NamedTuple):
     @property
     def where(self) -> str:
         """What tells it from other cases of its series, but for the demand."""
-        return f"{self.arms} arms, {self.split}"
+        humans = f"{self.humans:.0%} humans, " if self.humans else ""
+        return f"{humans}{self.arms} arms, {self.split}"
 
     def __str__(self) -> str:
         return f"{self.series}, {self.where}, {self.density:g} veh/h/lane"
@@ -166,6 +176,28 @@ FAIR_DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
 PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
 
 
+#: Shares of human drivers, from none to all.
+HUMAN_SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+#: Demands at which they are compared [veh/h/lane]: moderate, and near what all humans can do.
+HUMAN_DENSITIES = (150.0, 250.0)
+
+
+#: Who drives among humans, and what humans alone are compared with.
+HUMAN_GATES = ("dim", "dim-harmonious")
+STOP = "all-way-stop"
+
+
+def _human_cases() -> tuple[Case, ...]:
+    return (
+        *(
+            Case("fair", name, name, 4, "balanced", density, share)
+            for density, name, share in product(HUMAN_DENSITIES, HUMAN_GATES, HUMAN_SHARES)
+        ),
+        *(Case("fair", STOP, STOP, 4, "balanced", density) for density in HUMAN_DENSITIES),
+    )
+
+
 def _cases(
     controllers: Iterable[str], arms: Iterable[int], densities: Iterable[float]
 ) -> tuple[Case, ...]:
@@ -188,6 +220,7 @@ STUDIES: MappingProxyType[str, Study] = MappingProxyType({
               _cases(("dim", "dim-harmonious"), (3, 4, 5), DENSITIES)),
         Study("fairness", "Who waits under which rule of priority?",
               _cases(PRIORITIES, (4,), DENSITIES)),
+        Study("humans", "What do human drivers cost, and whom?", _human_cases()),
         Study("perception", "What happens when vehicles misread each other's intent?", ERRORS,
               _FEW_MISREAD),
         Study("confidence", "What does it cost to believe only readings that are sure?",

@@ -20,6 +20,7 @@ from minisim.geometry import ARM_NAMES
 from minisim.hosting import ON_COLLISION
 from minisim.trips import Trips
 from minisim.version import __version__
+from scenarios.mixing import driver_means
 from scenarios.scenario import Scenario
 from scenarios.statistics import growing, queue_growth
 
@@ -169,6 +170,7 @@ def run_experiment(experiment: Experiment) -> Outcome:
     row = {
         **identity,
         **summary,
+        **dict(_flat(driver_means(run))),
         **_growth(run.columns, scenario.intersection.n),
         "arrivals": _fingerprint(run.columns),
         "cpu_s": cpu,

@@ -5,6 +5,7 @@
     density = [150, 250, 350]
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
+    # humans = [0, 0.2]                 # with controllers of DIM only
 
     [[experiment]]                      # what is above holds here too
     scenario = "four-way"
@@ -43,6 +44,7 @@ from minisim.errors import (
 )
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
+from scenarios.mixing import with_humans
 from scenarios.scenario import Scenario, parse_split, profile_named
 from scenarios.sweep.experiment import Experiment
 
@@ -60,6 +62,7 @@ AXES: dict[str, Any] = {
     "density": 350.0,
     "arrivals": None,
     "controller": "dim",
+    "humans": 0.0,
     "seeds": 10,
 }
 #: What holds for a whole block.
@@ -151,13 +154,15 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
     if count > MAX_EXPERIMENTS:
         raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
-    seeds, controllers = axes.pop("seeds"), axes.pop("controller")
+    seeds, controllers, shares = (axes.pop(key) for key in ("seeds", "controller", "humans"))
     for values in product(*axes.values()):
         chosen = dict(zip(axes, values, strict=True))
         scenario = _scenario(chosen, single, folder)
-        for given in controllers:
+        for given, share in product(controllers, shares):
             with _at("controller"):
                 controller, label = _controller(given, scenario.profile.name)
+            with _at("humans"):
+                controller = with_humans(controller, share)
             for seed in seeds:
                 yield Experiment(scenario, controller, seed, label, single["on_collision"])
 

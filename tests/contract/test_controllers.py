@@ -12,7 +12,7 @@ import pytest
 
 import minisim
 from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import AsRunDim, Dim
+from dim import AsRunDim, Dim, Mixed
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -52,6 +52,9 @@ CONTROLLERS: tuple[Controller, ...] = (
     Dim(priorities="rotating"),
     Dim(order="lanes", priorities="waiting"),
     Dim(gate="harmonious", priorities="waiting"),
+    Mixed(share=0.3),
+    Mixed(Dim(gate="harmonious"), 0.6, trust="signals"),
+    Mixed(share=1.0),
     FixedTime(),
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),

@@ -22,7 +22,7 @@ from hypothesis import given
 
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import Dim
+from dim import Dim, Mixed
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -93,7 +93,7 @@ def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Ru
 
 CONTROLLERS: tuple[Controller, ...] = (
     Dim(), Dim(gate="harmonious"), FixedTime(), Adaptive(), AllWayStop(), LongestQueue(),
-    V2IC(), Reservation(),
+    V2IC(), Reservation(), Mixed(share=0.5), Mixed(Dim(gate="harmonious"), 1.0),
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import shapely
 
 import minisim
 from baselines import AllWayStop
-from baselines.clearing import clearing_distances
+from minisim.clearing import clearing_distances
 from minisim.control import CLEARANCE, Command, Observed, Plan, Session, Site, View, Wake
 from minisim.errors import InputError
 from minisim.geometry import Movement

@@ -123,6 +123,18 @@ def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str])
         assert word in out
 
 
+def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
+    printed = json.loads(ok(capsys, *arguments, "--json"))
+    assert printed["controller"] == "dim-humans-0.4"
+    groups = printed["drivers"]
+    assert groups["human"]["trips"] + groups["automated"]["trips"] == printed["trips"]
+    rows = {words[0]: words[1:] for line in ok(capsys, *arguments).splitlines()
+            if (words := line.split())}  # fmt: skip
+    for name in ("human", "automated"):
+        assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
+
+
 def test_run_without_vehicles(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
     assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None
@@ -345,6 +357,13 @@ BAD = [
     (("run", "four-way", "-d", "99999"), "99999"),
     (("run", "four-way", "-d", "many"), "many"),
     (("run", "four-way", "-d", "nan"), "nan"),
+    (("run", "four-way", "--humans", "1.5"), "at least 0 and at most 1, got 1.5"),
+    (("run", "four-way", "--humans", "-0.1"), "share of humans"),
+    (("run", "four-way", "--humans", "nan"), "got nan"),
+    (("run", "four-way", "--humans", "some"), "some"),
+    (("run", "four-way", "-c", "adaptive", "--humans", "0.1"), "not with 'adaptive'"),
+    (("run", "four-way", "-p", "as_run", "--humans", "0.1"), "among vehicles of DIM"),
+    (("animate", "four-way", "-o", "no.gif", "--humans", "2"), "at most 1, got 2"),
     (("run", "four-way", "--split", "4:3"), "2 shares for 4 lanes"),
     (("run", "four-way", "--split", "4;3"), "4;3"),
     (("run", "four-way", "--turns", "1:1"), "2 shares for 3 manoeuvres"),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from baselines import FixedTime
-from dim import Dim
+from dim import Dim, Mixed
 from minisim.arrivals import write_arrivals
 from minisim.errors import FileError, InputError, MinisimError
 from scenarios import five_way, four_way, from_bearings, three_way
@@ -40,6 +40,13 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
         for controller in (Dim(), FixedTime())
         for seed in (7, 3)
     ]
+
+
+def test_shares_of_humans(tmp_path: Path) -> None:
+    found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim-harmonious"\n')
+    dim = Dim(gate="harmonious")
+    assert [e.controller for e in found] == [dim, Mixed(dim, 0.25)]
+    assert [e.name for e in found] == ["dim-harmonious", "dim-harmonious-humans-0.25"]
 
 
 def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
@@ -135,6 +142,9 @@ WRONG = [
     ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 experiments are more than"),
     ("horizon = 0", r"horizon"),
     ("horizon = [1]", r"horizon"),
+    ('humans = 1.5', r"humans: share of humans must be at least 0 and at most 1, got 1.5"),
+    ('humans = "all"', r"humans: share of humans must be a number, got 'all'"),
+    ('humans = 0.1\ncontroller = "fixed-time"', r"humans: .*not with 'fixed-time'"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),

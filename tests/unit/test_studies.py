@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines import FixedTime
-from dim import Dim
+from dim import Dim, Mixed
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.statistics import GROWTH_SCORE
@@ -77,6 +77,17 @@ def test_all_controllers_of_a_study_share_their_arrivals() -> None:
     for one, other in pairwise(runs):
         assert (one.scenario, one.seed) == (other.scenario, other.seed)
         assert one.key != other.key
+
+
+def test_the_humans_study_tells_its_shares_apart() -> None:
+    study = STUDIES["humans"]
+    assert len(study.cases) == len(set(study.cases)) == 2 * (2 * 7 + 1)
+    runs = study.runs(2)
+    assert len({(e.name, e.scenario.density, e.seed) for _, e in runs}) == len(runs)
+    shares = {c.humans: c.experiment(1).controller for c in study.cases if c.series == "dim"}
+    assert shares[0.0] == Dim()
+    assert shares[0.4] == Mixed(Dim(), 0.4)
+    assert str(Case("fair", "dim", "dim", 4, "balanced", 150.0, 0.4)).startswith("dim, 40% humans,")
 
 
 def test_unknown_study_names_the_nearest() -> None:

@@ -1,0 +1,117 @@
+"""No two bodies touch and everybody is served, whoever drives."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import minisim
+from dim import Dim, Humans, Mixed
+from dim.agent import GATES
+from dim.decision import ORDERS
+from dim.humans import Drivers
+from scenarios import four_way
+from scenarios.scenario import FAIR, PAPER, Scenario
+from scenarios.strategies import demands, intersections
+from tests.examples import share
+from tests.runs import replayed
+
+SHARES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
+#: What may be believed without believing in silence, which is unsafe.
+SAFE = ("motion", "signals")
+#: Demand lasts so long, and then an hour is left to serve it [s].
+DEMANDED, DRAINED = 240.0, 3600.0
+
+
+@st.composite
+def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
+    """Any junction of 3 … 5 arms, side, demand, gate, and way to drive."""
+    roads = draw(st.sampled_from([120.0, 200.0]))
+    intersection = replace(draw(intersections(3, 5)), arm_length=roads)
+    demand = draw(demands(intersection.n, max_density=250.0))
+    scenario = Scenario(
+        name="random",
+        intersection=intersection,
+        demand=demand,
+        profile=draw(st.sampled_from([PAPER, FAIR])),
+        horizon=DEMANDED + DRAINED,
+        recorded=demand.draw(intersection.n, DEMANDED, seed=draw(st.integers(0, 1000))),
+    )
+    humans = Humans(
+        critical_gaps=draw(st.sampled_from([(6.2, 6.5, 7.1), (0.0, 0.0, 0.0)])),
+        deviation=draw(st.sampled_from([0.0, 0.3])),
+        reaction=draw(st.sampled_from([0.5, 1.9])),
+        trust=draw(st.sampled_from(SAFE)),
+    )
+    dim = Dim(order=draw(st.sampled_from(ORDERS)), gate=draw(st.sampled_from(GATES)))
+    return scenario, Mixed(dim, draw(st.sampled_from(SHARES)), humans, draw(st.sampled_from(SAFE)))
+
+
+def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
+    """A collision raises; whoever was not served is a failure."""
+    run = minisim.simulate(scenario, mixed, seed)
+    unserved = (~run.columns.arrived).nonzero()[0].tolist()
+    assert unserved == [], f"vehicles {unserved} under {mixed}"
+
+
+@share(0.5)
+@given(traffic())
+def test_safe_and_alive(given_traffic: tuple[Scenario, Mixed]) -> None:
+    check(*given_traffic)
+
+
+@cache
+def seed_of(kinds: tuple[bool, ...], silent: tuple[bool, ...]) -> int:
+    """A seed whose first vehicles are human or not, and announce their turns or not, as asked."""
+    for seed in itertools.count():
+        drivers = Drivers(Humans(), 0.5, seed)
+        found = [drivers[i] for i in range(len(kinds))]
+        if tuple(d.human for d in found) == kinds and all(
+            not d.human or (d.careless < 0.25) == quiet
+            for d, quiet in zip(found, silent, strict=True)
+        ):
+            return seed
+    raise AssertionError("seeds do not end")
+
+
+#: Every other movement beside each of lane a, up to the rotation of the junction.
+PAIRS = [((0, m), (lane, k)) for m in (1, 2, 3) for lane in (1, 2, 3) for k in (1, 2, 3)]
+#: The second comes so much later [s]: they meet at the line, in its yellow zone, or inside.
+DELAYS = (0.0, 0.6, 1.7, 3.4)
+
+
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("kinds", [(True, False), (False, True), (True, True)])
+def test_every_pair_passes_without_waiting_for_ever(gate: str, kinds: tuple[bool, bool]) -> None:
+    """Every two movements on four arms, whoever comes first, announced or not."""
+    road = four_way(profile="fair", arm_length=120.0)
+    mixed = Mixed(Dim(gate=gate), 0.5)
+    for (first, second), delay, quiet in itertools.product(PAIRS, DELAYS, (False, True)):
+        scenario = replayed(road, (0.0, *first), (delay, *second), horizon=90.0)
+        check(scenario, mixed, seed_of(kinds, (quiet, quiet)))
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_nobody_waits_in_a_circle(gate: str) -> None:
+    """Four at once, one a lane, straight or to the far side, humans and others in every mixture."""
+    road = four_way(profile="fair", arm_length=120.0)
+    mixed = Mixed(Dim(gate=gate), 0.5)
+    for kinds in itertools.product((True, False), repeat=4):
+        for ways in itertools.product((2, 3), repeat=4):
+            trips = [(0.1 * lane, lane, way) for lane, way in enumerate(ways)]
+            scenario = replayed(road, *trips, horizon=150.0)
+            check(scenario, mixed, seed_of(kinds, (False,) * 4))
+
+
+@share(0.2)
+@given(seed=st.integers(0, 1000))
+def test_who_is_human_depends_on_nothing_but_seed_and_share(seed: int) -> None:
+    fewer = Mixed(Dim(gate="harmonious"), 0.2, Humans(trust="motion")).human(seed, 500)
+    more = Mixed(share=0.7).human(seed, 500)
+    assert not (fewer & ~more).any()
+    assert (Mixed(share=0.2).human(seed, 100) == fewer[:100]).all()
