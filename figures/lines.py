@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 #: the range.
 DODGE = 0.028
 DENSITY_LABEL = "demand [veh/h/lane]"
+#: Of small print [pt].
+FOOTNOTE_SIZE = 7.5
 
 
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
@@ -178,5 +181,10 @@ def _legend(
 
 
 def footnote(figure: Figure, text: str) -> None:
-    """Small print along the lower edge."""
-    figure.text(0.012, 0.012, text, fontsize=7.5, color=style.MUTED, va="bottom", wrap=False)
+    """Small print along the lower edge, in as many lines as it takes."""
+    # Sans serif is half as wide as high, in points of which there are 72 an inch; with a margin.
+    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
+    figure.text(
+        0.012, 0.012, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        va="bottom", linespacing=1.05,
+    )  # fmt: skip

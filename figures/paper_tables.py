@@ -16,8 +16,9 @@ from figures.tables import Table
 from minisim.geometry import ARM_NAMES
 from scenarios.library import MAKERS
 from scenarios.statistics import Interval
-from scenarios.studies.archive import Archive
+from scenarios.studies.archive import Archive, missing_note
 from scenarios.studies.comparison import causes, compare, score
+from scenarios.studies.study import AnyCase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +85,8 @@ def lane_table(archive: Archive) -> Table:
     Raises:
         MissingRunsError: nothing was run.
     """
-    tables = {results.study.name: compare(results.good) for results in archive.need(*HEADINGS)}
+    both = archive.need(*HEADINGS)
+    tables = {results.study.name: compare(results.good) for results in both}
     rows = []
     for arms in (3, 4, 5):
         for lane in ARM_NAMES[:arms]:
@@ -101,7 +103,7 @@ def lane_table(archive: Archive) -> Table:
         "Mean waiting time by lane under DIM at 350 veh/h/lane [s]",
         ("junction", "lane", "paper",
          *(t for name in HEADINGS.values() for t in (name, "paper inside"))),
-        tuple(rows), labels=2, notes=(_EXPLAINED,),
+        tuple(rows), labels=2, notes=(f"{missing_note(both, _in_lanes)}  {_EXPLAINED}",),
     )  # fmt: skip
 
 
@@ -124,7 +126,7 @@ def comparison_table(archive: Archive, study: str) -> Table:
          "95 % prediction", "paper inside", "causes"),
         tuple(rows), labels=4,
         notes=(
-            f"Inside: {score(table)} comparable values, "
+            f"{missing_note([results], lambda _: True)}  Inside: {score(table)} comparable values, "
             f"{score(table, comparable=False)} of the others. {_EXPLAINED}",
         ),
     )  # fmt: skip
@@ -132,11 +134,13 @@ def comparison_table(archive: Archive, study: str) -> Table:
 
 def loss_table(archive: Archive) -> Table:
     """From which demand on DIM does worse than each rival; errors as `losses`."""
+    (results,) = archive.need("fair")
     return Table(
         "Demand from which on DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
         tuple(crossing_rows(losses(archive))), labels=2,
         notes=(
+            f"{missing_note([results], lambda _: True)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
             "linear between the demands tried, 50 to 800. “a to b”: worse between a and b only, "
             "for beyond the capacity of both their order may turn again. “never”: at no demand in "
@@ -167,6 +171,11 @@ def capacity_table(archive: Archive) -> Table:
             f"{archive.search.horizon:g} s; the queue grows by less than 2 % of the arrivals.",
         ),
     )  # fmt: skip
+
+
+def _in_lanes(case: AnyCase) -> bool:
+    """Whether a case belongs to the table of lanes."""
+    return case.series == "dim" and case.density == 350.0 and case.where.endswith("balanced")
 
 
 _EXPLAINED = (

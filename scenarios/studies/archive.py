@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from minisim.errors import MinisimError
 from scenarios.studies.capacity import CASES, Capacity, Search, capacities
-from scenarios.studies.results import Effort, Find, Results, collect
+from scenarios.studies.results import Effort, Find, Results, Runs, collect
 from scenarios.studies.study import AnyCase, Case, study_named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 
 class MissingRunsError(MinisimError):
@@ -89,14 +89,36 @@ def missing_note(results: Iterable[Results], wanted: Callable[[AnyCase], bool]) 
     """
     found = tuple(results)
     effort = found[0].effort
-    text = f"{smoke_test(effort)}{effort.seeds} seeds, {effort.horizon:g} s each."
-    lacking = [
-        f"{case.series} ({results.study.name}, {case.where}, {case.density:g})"
+    runs = {
+        (results.study.name, case): count
         for results in found
-        for case in results.missing
+        for case, count in results.runs.items()
         if wanted(case)
+    }
+    fewer = {key: count for key, count in runs.items() if 0 < count.found < count.wanted}
+    missing = [key for key, count in runs.items() if not count.found]
+    text = f"{smoke_test(effort)}{_extent(runs.values())}, {effort.horizon:g} s each."
+    for seeds in sorted({count.found for count in fewer.values()}):
+        listed = [key for key, count in fewer.items() if count.found == seeds]
+        text += f"  With {'one run' if seeds == 1 else f'{seeds} runs'} only: {_listed(listed)}."
+    if missing:
+        text += f"  Not drawn, for there is no run: {_listed(missing)}."
+    return text
+
+
+def _extent(runs: Iterable[Runs]) -> str:
+    """How many runs there are: seeds a case, or runs of those wanted where some are missing."""
+    known = list(runs)
+    seeds = sorted({count.wanted for count in known})
+    span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else f"{seeds[0]} seeds"
+    there, asked = sum(count.found for count in known), sum(count.wanted for count in known)
+    return span if there == asked else f"{there} of {asked} runs ({span} a case)"
+
+
+def _listed(cases: Sequence[tuple[str, AnyCase]]) -> str:
+    """The first cases by name, and how many more there are."""
+    named = [
+        f"{case.series} ({study}, {case.where}, {case.density:g})" for study, case in cases[:3]
     ]
-    if not lacking:
-        return text
-    more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
-    return f"{text}  Not drawn, for there is no run: {'; '.join(lacking[:3])}{more}."
+    more = f" and {len(cases) - 3} more" if len(cases) > 3 else ""
+    return f"{'; '.join(named)}{more}"

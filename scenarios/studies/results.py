@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import integer, number, numbers
 from scenarios.studies.study import AnyCase, Study
@@ -54,6 +55,18 @@ class Effort:
         return study.runs(self.seeds, self.horizon, self.cases(study))
 
 
+class Runs(NamedTuple):
+    """How many of a case's runs there are.
+
+    Attributes:
+        found: that did not fail.
+        wanted: by the effort.
+    """
+
+    found: int
+    wanted: int
+
+
 @dataclass(frozen=True, eq=False)
 class Results:
     """What is known about a study.
@@ -62,13 +75,18 @@ class Results:
         study: what was asked.
         effort: how much of it was.
         rows: one a run found: the columns of a sweep, with those of its case.
-        missing: cases without a successful run.
+        runs: of each case, in their order.
     """
 
     study: Study
     effort: Effort
     rows: pd.DataFrame
-    missing: tuple[AnyCase, ...]
+    runs: Mapping[AnyCase, Runs]
+
+    @property
+    def missing(self) -> tuple[AnyCase, ...]:
+        """Cases without a successful run."""
+        return tuple(case for case, runs in self.runs.items() if not runs.found)
 
     @property
     def good(self) -> pd.DataFrame:
@@ -98,10 +116,16 @@ def collect(study: Study, effort: Effort, find: Find) -> Results:
         for (case, _), row in zip(runs, found, strict=True)
         if row is not None
     ]
-    names = tuple(study.cases[0]._asdict())
-    done = {tuple(row[key] for key in names) for row in rows if not row["error"]}
-    columns = None if rows else [*names, "seed", "error"]
+    columns = None if rows else [*study.cases[0]._asdict(), "seed", "error"]
+    wanted = Counter(case for case, _ in runs)
+    good = Counter(
+        case
+        for (case, _), row in zip(runs, found, strict=True)
+        if row is not None and not row["error"]
+    )
     return Results(
-        study, effort, pd.DataFrame(rows, columns=columns),
-        tuple(case for case in effort.cases(study) if tuple(case._asdict().values()) not in done),
-    )  # fmt: skip
+        study,
+        effort,
+        pd.DataFrame(rows, columns=columns),
+        {case: Runs(good[case], count) for case, count in wanted.items()},
+    )

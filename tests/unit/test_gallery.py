@@ -21,7 +21,7 @@ from figures.paper_tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
 from scenarios.paper import SERIES, Cell, reference_value
-from scenarios.studies.archive import Archive, MissingRunsError
+from scenarios.studies.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.capacity import Search
 from scenarios.studies.cells import saturated
 from scenarios.studies.reproduction import CAPACITY, PARTS, Made
@@ -119,10 +119,27 @@ def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
 def test_what_is_missing_is_said_in_the_picture() -> None:
     figure = GALLERY["fair"].build(Archive(partial_find, EFFORT, SEARCH))
     assert isinstance(figure, Figure)
-    notes = [t.get_text() for t in figure.texts if "no run" in t.get_text()]
+    notes = [" ".join(t.get_text().split()) for t in figure.texts if "no run" in t.get_text()]
     assert len(notes) == 1
     assert "adaptive (fair, 4 arms, balanced, 50)" in notes[0]
     assert "9 more" in notes[0]
+
+
+def test_small_print_counts_the_runs_that_there_are() -> None:
+    """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
+
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        lost = ("all-way-stop", 2)
+        return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
+
+    figure = GALLERY["fair"].build(Archive(find, EFFORT, SEARCH))
+    assert isinstance(figure, Figure)
+    (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
+    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. With one run only: all")
+    assert "all-way-stop (fair, 4 arms, balanced, 150) and 9 more." in note
+    assert "no run" not in note
+    archive = Archive(synthetic_find, Effort(seeds=5), SEARCH)
+    assert missing_note([archive.study("as-run")], lambda _: True).startswith("3 to 5 seeds, 3600")
 
 
 # --- what the pictures say -------------------------------------------------------------------
