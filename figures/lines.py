@@ -185,6 +185,6 @@ def footnote(figure: Figure, text: str) -> None:
     # Sans serif is half as wide as high, in points of which there are 72 an inch; with a margin.
     columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
     figure.text(
-        0.012, 0.012, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        0.012, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
         va="bottom", linespacing=1.05,
     )  # fmt: skip

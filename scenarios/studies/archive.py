@@ -95,14 +95,18 @@ def missing_note(results: Iterable[Results], wanted: Callable[[AnyCase], bool]) 
         for case, count in results.runs.items()
         if wanted(case)
     }
-    fewer = {key: count for key, count in runs.items() if 0 < count.found < count.wanted}
-    missing = [key for key, count in runs.items() if not count.found]
+    fewer = [
+        f"{_named(*key)} has {count.found}"
+        for key, count in runs.items()
+        if 0 < count.found < count.wanted
+    ]
+    missing = [_named(*key) for key, count in runs.items() if not count.found]
+    shown = 1 if fewer and missing else 3  # there is room for two lines
     text = f"{smoke_test(effort)}{_extent(runs.values())}, {effort.horizon:g} s each."
-    for seeds in sorted({count.found for count in fewer.values()}):
-        listed = [key for key, count in fewer.items() if count.found == seeds]
-        text += f"  With {'one run' if seeds == 1 else f'{seeds} runs'} only: {_listed(listed)}."
+    if fewer:
+        text += f"  Fewer runs: {_listed(fewer, shown)}."
     if missing:
-        text += f"  Not drawn, for there is no run: {_listed(missing)}."
+        text += f"  Not drawn, for there is no run: {_listed(missing, shown)}."
     return text
 
 
@@ -115,10 +119,11 @@ def _extent(runs: Iterable[Runs]) -> str:
     return span if there == asked else f"{there} of {asked} runs ({span} a case)"
 
 
-def _listed(cases: Sequence[tuple[str, AnyCase]]) -> str:
-    """The first cases by name, and how many more there are."""
-    named = [
-        f"{case.series} ({study}, {case.where}, {case.density:g})" for study, case in cases[:3]
-    ]
-    more = f" and {len(cases) - 3} more" if len(cases) > 3 else ""
-    return f"{'; '.join(named)}{more}"
+def _named(study: str, case: AnyCase) -> str:
+    return f"{case.series} ({study}, {case.where}, {case.density:g})"
+
+
+def _listed(texts: Sequence[str], shown: int) -> str:
+    """The first ones, and how many more there are."""
+    more = f" and {len(texts) - shown} more" if len(texts) > shown else ""
+    return f"{'; '.join(texts[:shown])}{more}"

@@ -135,8 +135,8 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
     figure = GALLERY["fair"].build(Archive(find, EFFORT, SEARCH))
     assert isinstance(figure, Figure)
     (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
-    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. With one run only: all")
-    assert "all-way-stop (fair, 4 arms, balanced, 150) and 9 more." in note
+    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
+    assert "all-way-stop (fair, 4 arms, balanced, 150) has 1 and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5), SEARCH)
     assert missing_note([archive.study("as-run")], lambda _: True).startswith("3 to 5 seeds, 3600")
