@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import math
 import platform
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from numbers import Integral, Real
 from typing import Any, NamedTuple
 
@@ -30,6 +33,9 @@ RESULTS = 2
 
 #: Columns that a repetition of the same run measures anew.
 MEASURED = ("cpu_s",)
+
+#: Packages whose code `RESULTS` speaks for.
+OURS = ("minisim", "dim", "baselines", "scenarios")
 
 Row = dict[str, Any]
 
@@ -116,7 +122,8 @@ def key_of(description: str) -> str:
 def canonical(value: object) -> Any:
     """The parameters of a recipe as JSON values, alike for equal recipes.
 
-    Dataclasses become their class and fields, numbers floats (350 and 350.0 are the same density),
+    Dataclasses become their class and fields, those of others also what tells versions of their
+    code apart (`_code`), numbers floats (350 and 350.0 are the same density),
     arrays their type, shape and SHA-256.
 
     Raises:
@@ -134,6 +141,7 @@ def canonical(value: object) -> Any:
         kind = type(value)
         return {
             "class": f"{kind.__module__}.{kind.__qualname__}",
+            **_code(kind),
             **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
         }
     if isinstance(value, tuple | list):
@@ -147,6 +155,36 @@ def canonical(value: object) -> Any:
         f"{show(value)} cannot be stored: experiments are made of dataclasses, numbers, texts, "
         "arrays and collections of them"
     )
+
+
+@cache
+def _code(kind: type) -> dict[str, Any]:
+    """What tells versions of a class apart: its `version`, or else the text of its modules.
+
+    Nothing for our own classes, whose rows have the version of the results. A recipe's rules are
+    in its session as a rule, so the whole file counts; what that imports does not.
+
+    Raises:
+        InputError: no version, and no file, as in an interactive session.
+    """
+    modules = sorted({
+        parent.__module__
+        for parent in kind.__mro__
+        if parent.__module__.partition(".")[0] not in sys.stdlib_module_names | {*OURS}
+    })  # fmt: skip
+    if not modules:
+        return {}
+    version = getattr(kind, "version", None)
+    if isinstance(version, str | int):
+        return {"version": canonical(version)}
+    try:
+        texts = "".join(inspect.getsource(sys.modules[name]) for name in modules)
+    except (OSError, TypeError, KeyError) as error:
+        raise InputError(
+            f"{kind.__qualname__} cannot be stored, for its code is in no file by which a changed "
+            "one could be told: give the class a text or an integer `version`"
+        ) from error
+    return {"code": hashlib.sha256(texts.encode()).hexdigest()}
 
 
 def _canonical_number(value: Real | Integral) -> float | str:

@@ -6,16 +6,20 @@ import importlib.util
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 import minisim
+from dim import Dim
 from minisim.control import Controller
 from minisim.errors import InputError
 from minisim.geometry import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
+from scenarios import four_way
+from scenarios.sweep import Experiment
 
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
@@ -25,19 +29,24 @@ def example() -> str:
     return str(block)
 
 
-@pytest.fixture(scope="module")
-def module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
-    """The example as a module that pickle can find."""
-    path = tmp_path_factory.mktemp("guide") / "one_at_a_time.py"
-    path.write_text(example(), encoding="utf-8")
+def loaded(text: str, folder: Path) -> ModuleType:
+    """A text as a module that pickle can find."""
+    path = folder / "one_at_a_time.py"
+    path.write_text(text, encoding="utf-8")
     spec = importlib.util.spec_from_file_location("one_at_a_time", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def module(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    module = loaded(example(), tmp_path_factory.mktemp("guide"))
     yield module
-    del sys.modules[spec.name]
+    del sys.modules[module.__name__]
 
 
 def test_it_takes_fifty_lines() -> None:
@@ -55,6 +64,33 @@ def test_it_checks_its_values(module: ModuleType) -> None:
         module.OneAtATime(sight=0)
     with pytest.raises(InputError, match=r"sight .* at most 52\.8, got 60"):
         module.OneAtATime(sight=60).start(small_scenario(4, arm_length=60.0).site(1))
+
+
+def key(controller: Controller) -> str:
+    return Experiment(four_way(), controller, 1).key
+
+
+def test_a_changed_rule_is_another_experiment(
+    module: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = key(module.OneAtATime())
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    other = loaded(example().replace("nearest = min(", "nearest = max("), tmp_path)
+    assert key(module.OneAtATime()) == before != key(other.OneAtATime())
+    assert key(Dim()) == key(replace(Dim()))
+    assert "code" not in Experiment(four_way(), Dim(), 1).description, "RESULTS says it"
+
+
+def test_a_version_of_ones_own_tells_rules_apart(module: ModuleType) -> None:
+    def named(**own: object) -> Controller:
+        """A class of a notebook, which is in no file."""
+        kind = type("OneAtATime", (module.OneAtATime,), {"__module__": "notebook", **own})
+        made: Controller = kind()
+        return made
+
+    assert key(named(version=1)) == key(named(version=1)) != key(named(version=2))
+    with pytest.raises(InputError, match="give the class a text or an integer `version`"):
+        key(named())
 
 
 def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
