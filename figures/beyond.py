@@ -14,7 +14,13 @@ from figures import lines, style
 from minisim.geometry import ARM_NAMES
 from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
-from scenarios.studies.archive import Archive, missing_note, smoke_test
+from scenarios.studies.archive import (
+    Archive,
+    MissingRunsError,
+    make_command,
+    missing_note,
+    smoke_test,
+)
 from scenarios.studies.capacity import CASES
 from scenarios.studies.crossing import (
     METRICS,
@@ -24,7 +30,7 @@ from scenarios.studies.crossing import (
     with_total_delay,
 )
 from scenarios.studies.fairness import LANE_WAIT, lane_waits
-from scenarios.studies.study import FAIR_DENSITIES, PRIORITIES, RIVALS
+from scenarios.studies.study import PRIORITIES, RIVALS
 
 #: The two gates whose losses are asked for, and whom they may lose to.
 GATES = ("dim", "dim-harmonious")
@@ -52,8 +58,7 @@ def fair_figure(archive: Archive) -> Figure:
         lines.draw_means(axes, rows, metric, RIVALS)
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
         lines.log_time(axes, 0.0, 4000.0, linear=0.1)
-        axes.set_xticks(FAIR_DENSITIES[1::2], minor=False)
-        axes.set_xlim(20, 830)
+        lines.density_axis(axes, rows["density"])
     panels[0].set_ylabel("mean of all vehicles [s], logarithmic", fontsize=9.5, color=style.INK)
     _title(figure, "Every controller on four arms, profile fair")
     lines.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
@@ -71,7 +76,7 @@ def losses(archive: Archive) -> dict[tuple[str, str, str], Crossing]:
     Pairs without two demands in common are left out.
 
     Raises:
-        MissingRunsError: nothing was run.
+        MissingRunsError: no pair has two demands in common.
     """
     (results,) = archive.need("fair")
     rows = with_total_delay(results.good)
@@ -82,25 +87,29 @@ def losses(archive: Archive) -> dict[tuple[str, str, str], Crossing]:
                 differences = paired_differences(rows, gate, rival, metric)
                 if len(differences) > 1:
                     found[name, gate, rival] = crossing(differences)
+    if not found:
+        raise MissingRunsError(
+            "the store has no two demands at which DIM and another controller ran with two common "
+            f"seeds; make them with: {make_command(archive.effort, 'fair')}"
+        )
     return found
 
 
 def crossing_figure(archive: Archive) -> Figure:
     """Demand from which on DIM loses to each rival, with both gates; errors as `losses`."""
     found = losses(archive)
-    low, high = FAIR_DENSITIES[0], FAIR_DENSITIES[-1]
+    (results,) = archive.need("fair")
     figure = style.new_figure(11.0, 4.7)
     panels = figure.subplots(1, len(METRICS), sharey=True)
-    figure.subplots_adjust(left=0.14, right=0.985, top=0.745, bottom=0.14, wspace=0.06)
+    figure.subplots_adjust(left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06)
     for axes, name in zip(panels, METRICS, strict=True):
         for place, rival in enumerate(OTHERS):
             for gate, aside in zip(GATES, (-0.16, 0.16), strict=True):
                 if (name, gate, rival) in found:
-                    _draw_crossing(axes, found[name, gate, rival], gate, place + aside, low, high)
+                    _draw_crossing(axes, found[name, gate, rival], gate, place + aside)
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
         axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
-        axes.set_xlim(low, high + 10)
-        axes.set_xticks(FAIR_DENSITIES[1::2])
+        lines.density_axis(axes, results.good["density"])
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
     _title(figure, "Demands at which DIM does worse than …")
@@ -109,15 +118,13 @@ def crossing_figure(archive: Archive) -> Figure:
         0.012, 0.845, "pale bar: demands at which DIM does worse     marker and line: where that "
         "begins, with its 95 % interval", fontsize=8.5, color=style.INK, va="center",
     )  # fmt: skip
-    (results,) = archive.need("fair")
     lines.footnote(figure, missing_note([results], lambda _: True))
     return figure
 
 
-def _draw_crossing(
-    axes: Axes, found: Crossing, gate: str, y: float, low: float, high: float
-) -> None:
+def _draw_crossing(axes: Axes, found: Crossing, gate: str, y: float) -> None:
     look = style.look(gate)
+    low, high = found.tried
 
     def shown(value: float) -> float:
         return min(max(value, low), high)

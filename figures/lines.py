@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -106,6 +107,15 @@ def offset(rows: pd.DataFrame, place: int, count: int) -> float:
         return 0.0
     span = float(rows["density"].max() - rows["density"].min())
     return DODGE * span * (place / (count - 1) - 0.5)
+
+
+def density_axis(axes: Axes, densities: Iterable[float]) -> None:
+    """The demands that were run as ticks, six at most, with a margin around them."""
+    shown = sorted(set(densities))
+    step = math.ceil(len(shown) / 6)
+    axes.set_xticks(shown[(len(shown) - 1) % step :: step], minor=False)
+    margin = 0.04 * (shown[-1] - shown[0]) or 14.0
+    axes.set_xlim(shown[0] - margin, shown[-1] + margin)
 
 
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:

@@ -18,6 +18,7 @@ from scenarios.library import MAKERS
 from scenarios.statistics import Interval
 from scenarios.studies.archive import Archive, missing_note
 from scenarios.studies.comparison import causes, compare, score
+from scenarios.studies.crossing import tried
 from scenarios.studies.study import AnyCase
 
 if TYPE_CHECKING:
@@ -134,17 +135,21 @@ def comparison_table(archive: Archive, study: str) -> Table:
 
 def loss_table(archive: Archive) -> Table:
     """From which demand on DIM does worse than each rival; errors as `losses`."""
+    found = losses(archive)
+    low, high = tried(found.values())
     (results,) = archive.need("fair")
     return Table(
         "Demand from which on DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
-        tuple(crossing_rows(losses(archive))), labels=2,
+        tuple(crossing_rows(found)), labels=2,
         notes=(
             f"{missing_note([results], lambda _: True)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
-            "linear between the demands tried, 50 to 800. “a to b”: worse between a and b only, "
-            "for beyond the capacity of both their order may turn again. “never”: at no demand in "
-            "the mean; an interval “from c” then says that from c on it may be.",
+            f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
+            "b only, for beyond the capacity of both their order may turn again. “all”: at every "
+            "demand tried, in the mean; “c at the latest” then says that only from c on it is "
+            "sure. “never”: at none in the mean; “c at the earliest” says that from c on it may "
+            "be.",
         ),
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ from minisim.version import __version__
 from scenarios.studies.archive import Archive, MissingRunsError, make_command
 from scenarios.studies.cells import saturated
 from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
-from scenarios.studies.crossing import METRICS
+from scenarios.studies.crossing import METRICS, tried
 from scenarios.studies.reproduction import Made
 from scenarios.studies.results import Results
 from scenarios.studies.study import STUDIES, AnyCase
@@ -225,10 +225,12 @@ def _gates(archive: Archive) -> str:
         found = losses(archive)
     except MissingRunsError as error:
         return f"From which demand on DIM loses is not known: {error}."
+    low, high = tried(found.values())
     return "\n".join([
         "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
-        "harmonious gate; from the first on, with its 95 % interval, to the highest tried (800) "
-        "unless an end is given; \"all\" from the lowest tried (50) on:\n",
+        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
+        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
+        "mean:\n",
         *(
             f"- {style.look(rival).label}: " + "; ".join(
                 f"{name} " + " → ".join(

@@ -125,5 +125,5 @@ def _named(study: str, case: AnyCase) -> str:
 
 def _listed(texts: Sequence[str], shown: int) -> str:
     """The first ones, and how many more there are."""
-    more = f" and {len(texts) - shown} more" if len(texts) > shown else ""
+    more = f"; and {len(texts) - shown} more" if len(texts) > shown else ""
     return f"{'; '.join(texts[:shown])}{more}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -33,12 +33,14 @@ class Crossing(NamedTuple):
         low, high: interval of it, open (±inf) where the demands tried do not bound it.
         until: where the mean difference falls back to 0 or less, +inf where it does not: beyond
             the capacity of both, nobody wins.
+        tried: lowest and highest demand of both; nothing is known beyond.
     """
 
     density: float
     low: float
     high: float
     until: float
+    tried: tuple[float, float]
 
     def __str__(self) -> str:
         bounded = math.isfinite(self.low) or math.isfinite(self.high)
@@ -56,11 +58,13 @@ class Crossing(NamedTuple):
 
     @property
     def interval(self) -> str:
-        """The interval in words."""
-        low, high = (f"{value:.0f}" if math.isfinite(value) else "" for value in self[1:3])
+        """The interval in words; where it is open, at which demand it begins or ends."""
+        low, high = (
+            f"{value:.0f}" if math.isfinite(value) else "" for value in (self.low, self.high)
+        )
         if low and high:
             return f"{low} to {high}"
-        return f"from {low}" if low else f"up to {high}" if high else "–"
+        return f"{low} at the earliest" if low else f"{high} at the latest" if high else "–"
 
 
 def crossing(differences: Mapping[float, Sequence[float]], confidence: float = 0.95) -> Crossing:
@@ -94,7 +98,16 @@ def crossing(differences: Mapping[float, Sequence[float]], confidence: float = 0
         _first_rise(densities, [band.mean + band.half_width for band in bands])[0],
         _first_rise(densities, [band.mean - band.half_width for band in bands])[0],
         until,
+        (densities[0], densities[-1]),
     )
+
+
+def tried(found: Iterable[Crossing]) -> tuple[float, float]:
+    """Lowest and highest demand of any; raises `InputError` where there is none."""
+    ends = [crossing.tried for crossing in found]
+    if not ends:
+        raise InputError("no crossing is known")
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def with_total_delay(rows: pd.DataFrame) -> pd.DataFrame:

@@ -136,10 +136,30 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
     assert isinstance(figure, Figure)
     (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
     assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
-    assert "all-way-stop (fair, 4 arms, balanced, 150) has 1 and 9 more." in note
+    assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5), SEARCH)
     assert missing_note([archive.study("as-run")], lambda _: True).startswith("3 to 5 seeds, 3600")
+
+
+def test_losses_end_where_the_runs_do() -> None:
+    archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)), SEARCH)
+    table = GALLERY["losses-table"].build(archive)
+    assert isinstance(table, Table)
+    assert "demands tried, 150 to 350." in table.notes[0]
+    figure = GALLERY["losses"].build(archive)
+    assert isinstance(figure, Figure)
+    for axes in figure.axes:
+        assert axes.get_xticks().tolist() == [150.0, 350.0]
+        bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
+        assert bars
+        assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
+
+    def alone(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if e.label == "dim" else None for e in asked]
+
+    with pytest.raises(MissingRunsError, match="DIM and another controller"):
+        GALLERY["losses"].build(Archive(alone, EFFORT, SEARCH))
 
 
 # --- what the pictures say -------------------------------------------------------------------

@@ -21,7 +21,13 @@ from scenarios.statistics import GROWTH_SCORE
 from scenarios.studies.capacity import Search, capacities, grows
 from scenarios.studies.cells import saturated
 from scenarios.studies.comparison import causes, compare, discrepancies, published, score
-from scenarios.studies.crossing import METRICS, crossing, paired_differences, with_total_delay
+from scenarios.studies.crossing import (
+    METRICS,
+    crossing,
+    paired_differences,
+    tried,
+    with_total_delay,
+)
 from scenarios.studies.fairness import gini, lane_waits
 from scenarios.studies.results import Effort, collect
 from scenarios.studies.study import RIVALS, STUDIES, Case, study_named
@@ -179,6 +185,17 @@ def test_crossing_at_the_ends() -> None:
     again = crossing({0.0: (-1.0, -1.0), 100.0: (1.0, 1.0), 200.0: (1.0, 1.0), 400.0: (-1.0, -1.0)})
     assert (again.density, again.until) == (50.0, 300.0)
     assert str(again) == "50 to 300 (50 to 50)"
+    assert tried([again, always]) == (0.0, 400.0)
+    with pytest.raises(InputError, match="no crossing"):
+        tried([])
+
+
+def test_an_open_interval_says_which_end_it_has() -> None:
+    """Means are positive throughout, 1 ± 12.7 and 20 ± 12.7: sure from 100 + 100·11.7/19 on."""
+    found = crossing({100.0: (0.0, 2.0), 200.0: (19.0, 21.0)})
+    assert str(found) == "all (162 at the latest)"
+    mirrored = crossing({100.0: (-21.0, -19.0), 200.0: (-2.0, 0.0)})
+    assert str(mirrored) == "never (138 at the earliest)"
 
 
 def test_crossing_interval_covers_the_root() -> None:
