@@ -21,7 +21,7 @@ from scenarios.studies.archive import (
     missing_note,
     smoke_test,
 )
-from scenarios.studies.capacity import CASES
+from scenarios.studies.capacity import CASES, Capacity
 from scenarios.studies.crossing import (
     METRICS,
     Crossing,
@@ -224,15 +224,10 @@ def capacity_figure(archive: Archive) -> Figure:
     found, missing = archive.capacities()
     figure = style.new_figure(9.2, 5.2)
     axes = figure.add_axes((0.2, 0.13, 0.78, 0.69))
+    ends = [end for c in found for bracket in c.brackets for end in bracket if end < math.inf]
+    highest = 100.0 * math.ceil(1.04 * max(ends) / 100.0)
     for capacity in found:
-        colour, marker = ARMS[capacity.case.arms]
-        place = RIVALS.index(capacity.case.series) + 0.17 * (capacity.case.arms - 4.5)
-        interval = capacity.interval
-        axes.errorbar(
-            [interval.mean], [place], xerr=[0.0 if interval.size < 2 else interval.half_width],
-            color=colour, marker=marker, linestyle="none", markersize=6.5, capsize=2.6,
-            elinewidth=1.2,
-        )  # fmt: skip
+        _draw_capacity(axes, capacity, highest)
     style.plot_axes(axes, "", "capacity [veh/h/lane]", "")
     axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
     axes.grid(axis="y", visible=False)
@@ -240,8 +235,7 @@ def capacity_figure(archive: Archive) -> Figure:
     axes.set_ylim(len(RIVALS) - 0.5, -0.5)
     for edge in range(1, len(RIVALS)):
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
-    highest = max(value for capacity in found for value in capacity.values)
-    axes.set_xlim(0.0, 100.0 * math.ceil(1.04 * highest / 100.0))
+    axes.set_xlim(0.0, highest)
     _title(figure, "Capacity: the largest demand served without a growing queue")
     handles = [
         Line2D([], [], color=colour, marker=marker, linestyle="none", markersize=6.5)
@@ -254,13 +248,30 @@ def capacity_figure(archive: Archive) -> Figure:
     )  # fmt: skip
     search = archive.search
     note = f"{smoke_test(archive.effort)}" + (
-        f"mean and 95 % interval over {search.seeds} seeds of {search.horizon:g} s; "
-        f"bisected to {search.step:g} veh/h/lane; profile fair."
+        f"Mean and 95 % interval over {search.seeds} seeds of {search.horizon:g} s, with the "
+        f"{search.step / 2.0:g} veh/h/lane by which the search rounds; profile fair.  Pale line: "
+        "a bound is all that is known."
     )
     if missing:
         note += f"  Not drawn, for there is no run: {len(missing)} of {len(CASES)} cases."
     lines.footnote(figure, note)
     return figure
+
+
+def _draw_capacity(axes: Axes, capacity: Capacity, highest: float) -> None:
+    """Mean and interval; a pale line where only a bound is known."""
+    colour, marker = ARMS[capacity.case.arms]
+    place = RIVALS.index(capacity.case.series) + 0.17 * (capacity.case.arms - 4.5)
+    low, high = capacity.above, capacity.below
+    if low is None and high is None:
+        mean, half, _ = capacity.interval
+        axes.errorbar(
+            [mean], [place], xerr=[0.0 if math.isnan(half) else half], color=colour, marker=marker,
+            linestyle="none", markersize=6.5, capsize=2.6, elinewidth=1.2,
+        )  # fmt: skip
+        return
+    ends = (0.0 if low is None else low, highest if high is None else high)
+    axes.plot(ends, [place, place], color=colour, alpha=0.35, linewidth=3.0)
 
 
 def _title(figure: Figure, text: str) -> None:

@@ -15,8 +15,7 @@ from figures.beyond import crossing_rows, losses
 from figures.tables import Table
 from minisim.geometry import ARM_NAMES
 from scenarios.library import MAKERS
-from scenarios.statistics import Interval
-from scenarios.studies.archive import Archive, missing_note
+from scenarios.studies.archive import Archive, missing_note, smoke_test
 from scenarios.studies.comparison import causes, compare, score
 from scenarios.studies.crossing import tried
 from scenarios.studies.study import AnyCase
@@ -161,19 +160,22 @@ def capacity_table(archive: Archive) -> Table:
         MissingRunsError: nothing was run.
     """
     found, _ = archive.capacities()
-    values = {(c.case.series, c.case.arms): c.interval for c in found}
+    search = archive.search
+    values = {(c.case.series, c.case.arms): str(c) for c in found}
     series = list(dict.fromkeys(c.case.series for c in found))
     arms = sorted({c.case.arms for c in found})
     return Table(
         "Capacity [veh/h/lane]",
         ("controller", *(f"{n} arms" for n in arms)),
         tuple(
-            (style.look(name).label, *(_whole(values.get((name, n))) for n in arms))
+            (style.look(name).label, *(values.get((name, n), "–") for n in arms))
             for name in series
         ),
         notes=(
-            f"Mean ± 95 % interval over {archive.search.seeds} seeds of "
-            f"{archive.search.horizon:g} s; the queue grows by less than 2 % of the arrivals.",
+            f"{smoke_test(archive.effort)}Mean ± 95 % interval over {search.seeds} seeds of "
+            f"{search.horizon:g} s, with the {search.step / 2.0:g} veh/h/lane by which the search "
+            "rounds; “<” and “>”: every demand tried was too much for a seed, or none was. Served "
+            "means that the queue grows by less than 2 % of the arrivals.",
         ),
     )  # fmt: skip
 
@@ -227,10 +229,3 @@ def _number(value: object) -> str:
 
 def _inside(row: Mapping[Any, Any]) -> str:
     return "–" if row["inside"] is None else "yes" if row["inside"] else "no"
-
-
-def _whole(interval: Interval | None) -> str:
-    if interval is None:
-        return "–"
-    half = "" if math.isnan(interval.half_width) else f" ± {interval.half_width:.0f}"
-    return f"{interval.mean:.0f}{half}"

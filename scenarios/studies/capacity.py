@@ -9,6 +9,7 @@ its 2 %.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -62,16 +63,48 @@ class Capacity(NamedTuple):
 
     Attributes:
         case: whose; its density means nothing.
-        values: of each seed, middle of the last bracket [veh/h/lane].
+        brackets: of each seed, the highest demand served and the lowest that was not
+            [veh/h/lane]; 0 where none was served, infinite where all were.
     """
 
     case: Case
-    values: tuple[float, ...]
+    brackets: tuple[tuple[float, float], ...]
+
+    @property
+    def below(self) -> float | None:
+        """What it is below, where the search found no demand that a seed's run serves."""
+        return max(high for _, high in self.brackets) if self._open(0.0) else None
+
+    @property
+    def above(self) -> float | None:
+        """What it is above, where the search found no demand that a seed's run does not serve."""
+        return min(low for low, _ in self.brackets) if self._open(math.inf) else None
 
     @property
     def interval(self) -> Interval:
-        """Mean over seeds and its 95 % interval."""
-        return mean_interval(self.values)
+        """Mean over seeds, each the middle of its bracket, and 95 % interval.
+
+        Half the bracket, within which a seed's value may be anywhere, is part of the half width.
+
+        Raises:
+            InputError: `below` or `above` is all that is known.
+        """
+        middles = mean_interval(sum(bracket) / 2.0 for bracket in self.brackets)
+        rounding = max(high - low for low, high in self.brackets) / 2.0
+        return middles._replace(half_width=middles.half_width + rounding)
+
+    def __str__(self) -> str:
+        if self.below is not None and self.above is not None:
+            return "–"
+        if self.below is not None:
+            return f"< {self.below:.0f}"
+        if self.above is not None:
+            return f"> {self.above:.0f}"
+        mean, half, _ = self.interval
+        return f"{mean:.0f}" if math.isnan(half) else f"{mean:.0f} ± {half:.0f}"
+
+    def _open(self, end: float) -> bool:
+        return any(end in bracket for bracket in self.brackets)
 
 
 def grows(row: Mapping[str, Any], tolerance: float = TOLERANCE) -> bool:
@@ -96,9 +129,8 @@ def capacities(
     Returns:
         The capacities, and the cases for which `find` had no row or a failed one.
     """
-    brackets = {
-        (case, seed): (0, search.steps) for case in cases for seed in range(1, search.seeds + 1)
-    }
+    seeds = range(1, search.seeds + 1)
+    brackets = {(case, seed): (0, search.steps) for case in cases for seed in seeds}
     lost: set[Case] = set()
     for _ in range(search.steps.bit_length() - 1):
         asked = [key for key in brackets if key[0] not in lost]
@@ -111,12 +143,17 @@ def capacities(
             middle = (low + high) // 2
             brackets[key] = (low, middle) if grows(row) else (middle, high)
     found = [
-        Capacity(case, tuple(
-            (sum(brackets[case, seed]) / 2.0) * search.step for seed in range(1, search.seeds + 1)
-        ))
-        for case in cases if case not in lost
-    ]  # fmt: skip
+        Capacity(case, tuple(_ends(brackets[case, seed], search) for seed in seeds))
+        for case in cases
+        if case not in lost
+    ]
     return found, [case for case in cases if case in lost]
+
+
+def _ends(bracket: tuple[int, int], search: Search) -> tuple[float, float]:
+    """A bracket as demands [veh/h/lane]; the highest step is never tried."""
+    low, high = bracket
+    return low * search.step, math.inf if high == search.steps else high * search.step
 
 
 def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Experiment:

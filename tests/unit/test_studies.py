@@ -18,7 +18,7 @@ from dim import Dim, Mixed
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.statistics import GROWTH_SCORE
-from scenarios.studies.capacity import Search, capacities, grows
+from scenarios.studies.capacity import Capacity, Search, capacities, grows
 from scenarios.studies.cells import saturated
 from scenarios.studies.comparison import causes, compare, discrepancies, published, score
 from scenarios.studies.crossing import (
@@ -276,6 +276,28 @@ def test_bisection_finds_the_capacity_of_the_rows(arms: int) -> None:
     assert missing == []
     # A row grows by more than 2 % of its arrivals from 1/0.98 of its capacity on.
     assert found.interval.mean == pytest.approx(capacity_of("dim", arms) / 0.98, abs=10.0)
+
+
+def test_capacity_says_no_more_than_the_search_knows() -> None:
+    def found(*brackets: tuple[float, float]) -> str:
+        return str(Capacity(CASE, brackets))
+
+    assert found((390.0, 400.0), (390.0, 400.0)) == "395 ± 5", "equal seeds, rounded by the search"
+    # t(0.975, 1)·s/√2 = 12.706·5 for two values 10 apart, and the 5 of the rounding.
+    assert found((390.0, 400.0), (400.0, 410.0)) == "400 ± 69"
+    assert found((390.0, 400.0)) == "395"
+    assert found((0.0, 200.0), (200.0, 400.0)) == "< 400"
+    assert found((600.0, math.inf), (400.0, 600.0)) == "> 400"
+    assert found((600.0, math.inf), (0.0, 200.0)) == "–"
+
+
+@pytest.mark.parametrize(("growth", "text"), [(1.0, "< 200"), (0.0, "> 600")])
+def test_capacity_beyond_the_search(growth: float, text: str) -> None:
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [{"queue_growth": growth * 100.0, "trips": 100} for _ in asked]
+
+    (capacity,), _ = capacities([CASE], Search.quick(), find)
+    assert str(capacity) == text
 
 
 def test_capacity_of_runs_that_fail_is_missing() -> None:
