@@ -223,7 +223,7 @@ def capacity_figure(archive: Archive) -> Figure:
     """
     found, missing = archive.capacities()
     figure = style.new_figure(9.2, 5.2)
-    axes = figure.add_axes((0.2, 0.13, 0.78, 0.69))
+    axes = figure.add_axes((0.2, 0.15, 0.78, 0.67))
     ends = [end for c in found for bracket in c.brackets for end in bracket if end < math.inf]
     highest = 100.0 * math.ceil(1.04 * max(ends) / 100.0)
     for capacity in found:

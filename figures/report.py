@@ -16,7 +16,7 @@ from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.version import __version__
 from scenarios.studies.archive import Archive, MissingRunsError, make_command
-from scenarios.studies.cells import saturated
+from scenarios.studies.cells import saturated, too_short
 from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
 from scenarios.studies.crossing import METRICS, tried
 from scenarios.studies.reproduction import Made
@@ -307,9 +307,11 @@ def _collisions(studies: Iterable[Results]) -> str:
 
 def _saturated(studies: Iterable[Results]) -> str:
     lines = []
+    short = 0
     for results in studies:
         grown: dict[str, list[str]] = {}
         for case, rows in _cells(results):
+            short += too_short(rows)
             if saturated(rows):
                 where = f"{style.look(case.series).label}, {case.where}"
                 grown.setdefault(where, []).append(f"{case.density:g}")
@@ -321,6 +323,10 @@ def _saturated(studies: Iterable[Results]) -> str:
         "Queues of the junction or of one lane grew more than chance until the end: the means of "
         "these cells depend on the horizon and are no delay that a driver could expect."
     )
+    if short:
+        lines.append(
+            f"- In {short} cells the runs are too short to tell: the roads were still filling."
+        )
     return f"{head}\n\n" + ("\n".join(lines) if lines else "None.")
 
 

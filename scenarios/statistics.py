@@ -16,6 +16,11 @@ from minisim.errors import InputError, integer, number, numbers
 GROWTH_SCORE = 2.326
 
 
+#: Travel times on a free road in the shortest horizon that tells of growth: the roads are full
+#: when the second of four quarters begins.
+FILLING = 4.0
+
+
 class Interval(NamedTuple):
     """A mean and the half width of its confidence interval.
 
@@ -131,8 +136,8 @@ def growing(growth: float, trips: int) -> bool:
     may be sums over runs, which sees slower growth: of cells of ten such hours none at 0.95, 6 %
     at 1, 98 % at 1.1.
 
-    A horizon of less than some four travel times is called growing as well: the roads are still
-    filling.
+    A horizon of less than four travel times (`FILLING`) says nothing: the roads are still filling
+    in the second quarter, and have more vehicles in the last whatever the queues do.
     """
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 

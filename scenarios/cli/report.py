@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from minisim.geometry import ARM_NAMES
+from scenarios.statistics import FILLING
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,17 +154,27 @@ def sweep_table(cells: pd.DataFrame) -> Table:
                 *(_interval(cell, metric) for metric in CELL_HEADINGS),
                 f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
                 Text(str(collisions), style="bold red" if collisions else ""),
-                Text("growing" if cell["growing"] else "", style="yellow"),
+                Text(_settled(cell), style="yellow"),
             )
         else:
             table.add_row(*named, cell["controller"], f"0{failed}", style="red")
     return table
 
 
-def sweep_notes(rows: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
+def _settled(cell: Mapping[Hashable, Any]) -> str:
+    """Whether queues had settled, where they had not."""
+    return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
+
+
+def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
     """What to know of the table: growing queues, capped signals, the first failure."""
     text = Text()
-    if "growing" in rows and rows["growing"].eq(True).any():
+    if "too_short" in cells and cells["too_short"].eq(True).any():
+        text.append(
+            "  too short: the roads were still filling, so that nothing can be said of queues; "
+            f"simulate {FILLING:g} travel times or more.\n"
+        )
+    if "growing" in cells and cells["growing"].eq(True).any():
         text.append(
             "  growing: queues had not settled by the horizon; a mean delay there says how long "
             "was simulated.\n"

@@ -110,7 +110,8 @@ def sweep(
     experiments = _experiments(what, seeds, horizon)
     with _executor(scheduler) as executor, Store(out) as store:
         rows = _run(experiments, executor, jobs or os.cpu_count() or 1, store, out)
-    show(sweep_table(cells(rows)), sweep_notes(rows, experiments))
+    averaged = cells(rows)
+    show(sweep_table(averaged), sweep_notes(rows, averaged, experiments))
     typer.echo(f"  {len(rows)} runs in {out}")
     if export is not None:
         write_table(rows, export)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from minisim.errors import InputError, choice
 from minisim.geometry import ARM_NAMES
 from minisim.trips import METRICS
-from scenarios.statistics import growing, mean_interval, prediction_interval
+from scenarios.statistics import FILLING, growing, mean_interval, prediction_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,8 +40,8 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
         `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
         (sums); each of `AVERAGED` with the half widths of its 95 % confidence interval (`…_ci95`)
         and of the 95 % prediction interval of one more run (`…_pi95`), NaN where unknown;
-        `growing`, whether its queues kept growing, asked of all its runs together; `cpu_s`, mean
-        processor time of a run.
+        `growing`, whether its queues kept growing, asked of all its runs together; `too_short`,
+        whether the runs are too short to tell; `cpu_s`, mean processor time of a run.
     """
     import pandas as pd
 
@@ -123,15 +123,35 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
             cell[metric] = interval.mean
             cell[f"{metric}_ci95"] = interval.half_width
             cell[f"{metric}_pi95"] = prediction_interval(values).half_width
-    cell["growing"] = saturated(good)
+    cell |= {"growing": saturated(good), "too_short": too_short(good)}
     cell["cpu_s"] = float(good["cpu_s"].mean())
     return cell
 
 
 def saturated(good: pd.DataFrame) -> bool:
-    """Whether the queues of a cell's runs, of the junction or of a lane, kept growing together."""
+    """Whether the queues of a cell's runs, of the junction or of a lane, kept growing together.
+
+    No where the runs are `too_short` to tell.
+    """
+    if too_short(good):
+        return False
     arms = int(good["arms"].iloc[0])
     return any(
         growing(float(good[f"{of}queue_growth"].sum()), int(good[f"{of}trips"].sum()))
         for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
     )
+
+
+def too_short(good: pd.DataFrame) -> bool:
+    """Whether a cell's runs end before growing queues can be told from roads that fill.
+
+    The travel time on a free road is taken as travel time less time loss: of the trips that ended,
+    and where none did, of what was driven.
+    """
+    horizon = float(good["horizon_s"].iloc[0])
+    ended, driven = (
+        (good[f"{form}travel_time_s"].astype(float) - good[f"{form}time_loss_s"].astype(float))
+        for form in ("", "complete_")
+    )
+    free = ended.fillna(driven).mean()
+    return bool(horizon < FILLING * free)

@@ -47,8 +47,8 @@ def sweep(
     Returns:
         What was run (`Experiment.identity`), the keys of `Run.summary()`, nested ones joined by
         "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth` and `growing`
-        (`scenarios.statistics`), `arrivals` (alike for common arrivals), `cpu_s`, `version`, and
-        `error`: why a run failed, missing where it did not.
+        (`scenarios.statistics`, which says when it means nothing), `arrivals` (alike for common
+        arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
 
     Raises:
         InputError: something other than an `Experiment`, or jobs beside an executor.

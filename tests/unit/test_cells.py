@@ -137,8 +137,12 @@ def test_real_runs(scenario: Scenario, controller: str, expected: bool) -> None:
     assert cell["growing"] is expected
 
 
-def test_a_road_that_still_fills_is_called_growing() -> None:
-    assert run_experiment(Experiment(four_way(350, horizon=100), Dim(), 1)).row["growing"]
+def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
+    row = run_experiment(Experiment(four_way(350, horizon=100), Dim(), 1)).row
+    (cell,) = cells(pd.DataFrame([row])).to_dict("records")
+    assert row["queue_growth"] > 0.0
+    assert cell["too_short"]
+    assert not cell["growing"]
 
 
 # --- cells -----------------------------------------------------------------------------------

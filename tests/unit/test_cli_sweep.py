@@ -41,7 +41,7 @@ def test_a_sweep_and_the_same_again(
     assert captured.err == ""
     lines = captured.out.splitlines()
     for name in ("dim", "fixed-time"):
-        assert any(f" {name} " in line and "growing" in line for line in lines)
+        assert any(f" {name} " in line and "too short" in line for line in lines)
     assert any("4 runs in" in line for line in lines)
     first = pd.read_csv(table)
     assert first["controller"].tolist() == ["dim", "dim", "fixed-time", "fixed-time"]

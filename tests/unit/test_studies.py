@@ -133,13 +133,37 @@ def test_quick_effort_and_bad_ones() -> None:
             Effort(**wrong)  # type: ignore[arg-type]
 
 
+def free_flow(seconds: float) -> dict[str, float | None]:
+    """Columns of a run of an hour with this travel time on a free road."""
+    return {
+        "horizon_s": 3600.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
+        "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("run", "expected"),
+    [
+        ({}, True),
+        ({"horizon_s": 240.0}, True),
+        ({"horizon_s": 239.0}, False),  # four times 60 s
+        ({"horizon_s": 150.0, "travel_time_s": None}, True),  # 30 s of what was driven
+        ({"horizon_s": 119.0, "travel_time_s": None}, False),
+    ],
+)
+def test_roads_that_fill_are_no_growing_queue(run: Mapping[str, Any], expected: bool) -> None:
+    quiet = {f"lanes_{k}_{key}": 0 for k in "abc" for key in ("trips", "queue_growth")}
+    row = {"arms": 3, "trips": 100, "queue_growth": 100.0, **quiet, **free_flow(60.0), **run}
+    assert saturated(pd.DataFrame([row])) is expected
+
+
 def test_saturated_sums_over_runs_and_lanes() -> None:
     """`GROWTH_SCORE` standard deviations √(5/12 · trips); two runs have √2 times that."""
     limit = GROWTH_SCORE * math.sqrt(5.0 / 12.0 * 120)
     quiet = {
         f"lanes_{k}_{key}": v for k in "abc" for key, v in (("trips", 40), ("queue_growth", 0))
     }
-    one = {"arms": 3, "trips": 120, "queue_growth": 0.9 * limit, **quiet}
+    one = {"arms": 3, "trips": 120, "queue_growth": 0.9 * limit, **quiet, **free_flow(60.0)}
     assert not saturated(pd.DataFrame([one]))
     assert saturated(pd.DataFrame([one, one]))
     lane = {**one, "queue_growth": 0.0, "lanes_c_queue_growth": 0.9 * limit}
@@ -364,6 +388,7 @@ def test_every_published_value_is_compared() -> None:
 def test_comparison_by_hand() -> None:
     rows = pd.DataFrame({
         "series": "dim", "arms": 4, "split": "balanced", "density": 150.0, "error": None,
+        **free_flow(60.0),
         "waiting_time_s": [0.5, 0.7], "travel_time_s": [70.0, 72.0], "queue_growth": 0.0,
         "trips": 600, **{f"lanes_{k}_{c}": 0 for k in "abcd" for c in ("trips", "queue_growth")},
     }, index=[0, 1])  # fmt: skip
