@@ -57,6 +57,10 @@ class MissingExtraError(MinisimError):
     """An optional dependency is needed and not installed."""
 
 
+class ExecutorError(MinisimError):
+    """Whoever was given runs gave them up; they have not failed, and may be tried again."""
+
+
 class SumoError(MinisimError):
     """SUMO, or a tool that comes with it, refused or died."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import re
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -11,6 +12,9 @@ from typing import Any
 
 from minisim.errors import InputError, MissingExtraError, instance
 from scenarios.sweep.experiment import results_version
+
+#: Of a scheduler; the protocols are Dask's.
+ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,9})", re.ASCII)
 
 #: How long a scheduler, and then its first worker, is waited for [s].
 PATIENCE = 5.0
@@ -27,15 +31,18 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         MissingExtraError: without the extra `dask`.
         InputError: no scheduler there, no workers, or workers with another version.
     """
-    instance("scheduler", address, str)
+    _check_address(address)
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
         raise MissingExtraError(
             "--scheduler needs the package distributed: pip install 'minisim[dask]'"
         ) from None
-    # What it reports of lost connections is told by the sweep, in one line.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    # What it reports of lost connections is told by the sweep, in one line. Each of its loggers has
+    # a level of its own.
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=patience, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
@@ -44,6 +51,20 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         _check_workers(client, address, patience)
         executor: Executor = client.get_executor()
         yield executor
+
+
+def _check_address(address: str) -> None:
+    """Dask would hang in clearing up what it began with an address that is none."""
+    instance("scheduler", address, str)
+    form = ADDRESS.fullmatch(address)
+    if form is None:
+        raise InputError(
+            f"no Dask scheduler at {address!r}: an address has the form tcp://host:port"
+        )
+    if not 1 <= int(form["port"]) <= 65535:
+        raise InputError(
+            f"no Dask scheduler at {address!r}: a port is 1 … 65535, got {form['port']}"
+        )
 
 
 def _check_workers(client: Any, address: str, patience: float) -> None:

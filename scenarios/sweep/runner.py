@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from minisim.errors import instance, integer
+from minisim.errors import ExecutorError, instance, integer
 from scenarios.pool import given, handed, pooled
 from scenarios.sweep.experiment import Experiment, Row, failed, run_experiment
 from scenarios.sweep.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: What a run left that a caller's executor never finished.
+GIVEN_UP = (BrokenExecutor, CancelledError)
 
 Progress = Callable[[int, int], None]
 
@@ -53,6 +56,8 @@ def sweep(
     Raises:
         InputError: something other than an `Experiment`, or jobs beside an executor.
         FileError: the store cannot be written; what it has stays.
+        ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died;
+            what was done is in the store. Without a store, their rows have it as an error.
     """
     import pandas as pd
 
@@ -97,12 +102,22 @@ def finished(
         )
     else:
         results = given(run_experiment, missing, executor)
+    lost = 0
     with closing(results):
         for k, result in results:
+            given_up = executor is not None and isinstance(result, GIVEN_UP)
+            if store is not None and given_up:
+                lost += 1
+                continue
             outcome = failed(todo[k], result) if isinstance(result, BaseException) else result
             if store is not None:
                 store.put(todo[k], outcome)
             yield k, outcome.row
+    if store is not None and lost:
+        raise ExecutorError(
+            f"the executor gave up {lost} of {len(todo)} runs; what was done is in {store.path}, "
+            "and the same sweep goes on from there"
+        )
 
 
 def _warm(experiments: Iterable[Experiment], pool: Executor) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from minisim.errors import FileError, instance
+from minisim.errors import FileError, instance, show
 from scenarios.sweep.experiment import Experiment, Outcome, Row, key_of, results_version
 
 if TYPE_CHECKING:
@@ -31,6 +31,9 @@ SCHEMA = 1
 
 #: How long a transaction of another process is waited for [s].
 PATIENCE = 30.0
+
+#: Columns by which rows are ordered; every row has them.
+ORDER = ("scenario", "profile", "split", "density", "controller", "horizon_s", "seed")
 
 _CREATE = f"""
 BEGIN EXCLUSIVE;
@@ -125,8 +128,7 @@ class Store:
         with self._guarded("read"):
             rows = [self._row(row) for (row,) in self._database.execute("SELECT row FROM runs")]
         frame = pd.DataFrame(rows)
-        order = ["scenario", "profile", "split", "density", "controller", "horizon_s", "seed"]
-        return frame.sort_values(order, ignore_index=True) if rows else frame
+        return frame.sort_values(list(ORDER), ignore_index=True) if rows else frame
 
     def close(self) -> None:
         """Let go of the file."""
@@ -158,6 +160,8 @@ class Store:
             row: Row = json.loads(text)
         except ValueError as error:
             raise FileError(f"store {self.path} is damaged: {error}") from error
+        if not isinstance(row, dict) or not row.keys() >= {*ORDER, "version", "error"}:
+            raise FileError(f"store {self.path} is damaged: {show(text)} is no row")
         return row
 
     @contextmanager

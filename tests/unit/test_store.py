@@ -182,12 +182,15 @@ def test_an_empty_file_becomes_a_store(tmp_path: Path) -> None:
     assert int.from_bytes(path.read_bytes()[68:72], "big") == APPLICATION
 
 
-def test_a_broken_row_is_told(tmp_path: Path, outcome: Outcome) -> None:
+@pytest.mark.parametrize("text", ["{", "[1,2]", "{}", "null"])
+def test_a_broken_row_is_told(text: str, tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
         store.put(experiment(), outcome)
-        store._database.execute("UPDATE runs SET row = '{'")
+        store._database.execute("UPDATE runs SET row = ?", (text,))
         with pytest.raises(FileError, match="damaged"):
             store.frame()
+        with pytest.raises(FileError, match="damaged"):
+            sweep([experiment()], jobs=1, store=store)
 
 
 def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
