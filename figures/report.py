@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from scenarios.studies.archive import Archive, MissingRunsError, make_command
 from scenarios.studies.cells import saturated, too_short
 from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
 from scenarios.studies.crossing import METRICS, tried
-from scenarios.studies.reproduction import Made
+from scenarios.studies.reproduction import PARTS, Made
 from scenarios.studies.results import Results
 from scenarios.studies.study import STUDIES, AnyCase
 
@@ -59,8 +59,10 @@ def write_report(
     folder: Path,
     pictures: Path,
     progress: Progress,
+    *,
+    parts: Collection[str] = PARTS,
 ) -> int:
-    """Draw everything into `pictures`, then write `folder`/report.md.
+    """Draw into `pictures`, then write `folder`/report.md.
 
     Args:
         archive: of the runs.
@@ -69,6 +71,7 @@ def write_report(
         folder: of the report.
         pictures: a folder inside it.
         progress: of drawing.
+        parts: what to report on: all, or only what is drawn from these studies.
 
     Returns:
         The number of figures and tables.
@@ -78,19 +81,25 @@ def write_report(
     """
     drawn: dict[str, Drawing] = {}
     missing: dict[str, str] = {}
-    for done, (name, item) in enumerate(GALLERY.items(), start=1):
+    whole = set(parts) >= set(PARTS)
+    chosen = {
+        name: item
+        for name, item in GALLERY.items()
+        if whole or not set(parts).isdisjoint(item.needs)
+    }
+    for done, (name, item) in enumerate(chosen.items(), start=1):
         try:
             drawn[name] = item.build(archive)
         except MissingRunsError as error:
             missing[name] = str(error)
         else:
             write(drawn[name], pictures, name)
-        progress(done, len(GALLERY))
+        progress(done, len(chosen))
     try:
         inside = pictures.relative_to(folder).as_posix()
     except ValueError as error:
         raise FileError(f"{pictures} is not inside {folder}") from error
-    text = "\n\n".join(_report(archive, made, jobs, drawn, missing, inside))
+    text = "\n\n".join(_report(archive, made, jobs, drawn, missing, inside, parts))
     with replacing(folder / "report.md") as part:
         part.write_text(text.rstrip() + "\n", encoding="utf-8")
     return len(drawn)
@@ -98,10 +107,10 @@ def write_report(
 
 def _report(
     archive: Archive, made: Sequence[Made], jobs: int, drawn: dict[str, Drawing],
-    missing: dict[str, str], folder: str,
+    missing: dict[str, str], folder: str, parts: Collection[str],
 ) -> Iterator[str]:  # fmt: skip
     effort = archive.effort
-    studies = [archive.study(name) for name in STUDIES]
+    studies = [archive.study(name) for name in STUDIES if name in parts]
     yield "# The paper's experiments, reproduced"
     yield (
         f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s a run, "
@@ -117,22 +126,27 @@ def _report(
     yield "## What was run"
     yield _made_table(made).markdown()
     yield _cost_table(studies).markdown()
-    yield "## Result in short"
-    yield from _verdict(archive)
+    verdict = [*_verdict(archive, parts)]
+    if verdict:
+        yield "## Result in short"
+        yield from verdict
     for heading, names in SECTIONS.items():
-        yield f"## {heading}"
-        for name in names:
+        shown = [name for name in names if name in drawn or name in missing]
+        if shown:
+            yield f"## {heading}"
+        for name in shown:
             if name in drawn:
                 yield _shown(name, drawn[name], folder)
             else:
                 yield f"*{GALLERY[name].title}: {missing[name]}.*"
-    yield "## The paper's values and ours, cell by cell"
-    for study in PAPER:
-        table = drawn.get(f"comparison-{study}")
-        if isinstance(table, Table):
-            yield table.markdown()
-    yield "## Causes of the differences"
-    yield _causes(archive)
+    if not set(parts).isdisjoint(PAPER):
+        yield "## The paper's values and ours, cell by cell"
+        for study in PAPER:
+            table = drawn.get(f"comparison-{study}")
+            if isinstance(table, Table):
+                yield table.markdown()
+        yield "## Causes of the differences"
+        yield _causes(archive)
     yield "## Collisions"
     yield _collisions(results for results in studies if results.study.name not in MISREAD)
     yield "## Over-saturated cells"
@@ -192,9 +206,18 @@ def _cost(rows: pd.DataFrame) -> str:
     return f"{float(rows['cpu_s'].astype(float).sum()) / hours:.2f}"
 
 
-def _verdict(archive: Archive) -> Iterator[str]:
+def _verdict(archive: Archive, parts: Collection[str]) -> Iterator[str]:
+    judged = [study for study in PAPER if study in parts]
+    if judged:
+        yield _inside(archive, judged)
+    if "fair" in parts:
+        yield _gates(archive)
+
+
+def _inside(archive: Archive, judged: Iterable[str]) -> str:
+    """How many of the paper's values lie inside our intervals, by study and controller."""
     lines = []
-    for study in PAPER:
+    for study in judged:
         results = archive.study(study)
         if results.good.empty:
             lines.append(f"- `{study}`: not run (`{make_command(archive.effort, study)}`).")
@@ -215,8 +238,7 @@ def _verdict(archive: Archive) -> Iterator[str]:
         "- Inside says that one more run of ours could well give the paper's value; where our runs "
         "spread widely, near saturation, nearly every value is inside."
     )
-    yield "\n".join(lines)
-    yield _gates(archive)
+    return "\n".join(lines)
 
 
 def _gates(archive: Archive) -> str:

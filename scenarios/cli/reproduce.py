@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from minisim.errors import integer
 from scenarios.cli.app import app
 from scenarios.cli.terminal import bar
+
+if TYPE_CHECKING:
+    from scenarios.studies.reproduction import Made
 
 
 @app.command(
@@ -68,14 +72,25 @@ def reproduce(
     folder = make_folder(out)
     pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
-        with bar("simulating") as progress:
-            made = run_all(plan, rows, processes, progress)
+        made = []
+        for part in plan.parts:
+            with bar(f"simulating {part}") as progress:
+                made += run_all(replace(plan, parts=(part,)), rows, processes, progress)
+            typer.echo(_done(made[-1]), err=True)
         with bar("drawing") as progress:
             files = write_report(
-                plan.archive(find_in(rows)), made, processes, folder, pictures, progress
-            )
+                plan.archive(find_in(rows)), made, processes, folder, pictures, progress,
+                parts=plan.parts,
+            )  # fmt: skip
     typer.echo(f"wrote {files} figures and tables to {pictures}")
     typer.echo(f"wrote {folder / 'report.md'}")
     broken = sum(len(part.failed) for part in made)
     if broken:
         typer.echo(f"{broken} runs failed; the report names them", err=True)
+
+
+def _done(made: Made) -> str:
+    failed = f", {len(made.failed)} failed" if made.failed else ""
+    return (
+        f"{made.name}: {made.computed} of {made.runs} runs computed in {made.wall_s:.0f} s{failed}"
+    )

@@ -13,6 +13,7 @@ import typer
 from minisim.errors import InputError, choice, integer, number
 from scenarios.cli.app import app
 from scenarios.cli.terminal import bar, show
+from scenarios.termination import Terminated
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -21,6 +22,17 @@ if TYPE_CHECKING:
 
     from scenarios.sweep.experiment import Experiment
     from scenarios.sweep.store import Store
+
+#: Key of a file -> its value where it is left out, as `scenarios.sweep.file` has it.
+DEFAULTS = {
+    "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
+    "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
+    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "on_collision": "stop",
+}  # fmt: skip
+#: A junction of one's own, as a file has it, and how the help shows brackets.
+CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
+PLAIN = str.maketrans({"[": r"\["})
+LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
 #: The study that is the paper's grid as its text prescribes it.
 PAPER = {"paper": "text"}
@@ -31,7 +43,9 @@ PAPER = {"paper": "text"}
     '  scenario = \\["four-way", "five-way"]\n\n'
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
-    "and also humans, profile, side, split, turns, model, arrivals, seeds, horizon, on_collision; "
+    "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
+    f"on_collision; what it leaves out is {LEFT_OUT}. A junction of one's own is written\n\n"
+    f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
     "reproduce[/bold] asked for it.\n\n"
@@ -41,7 +55,8 @@ PAPER = {"paper": "text"}
     "minisim sweep mine.toml --jobs 2 --out mine.db --export mine.csv\n\n"
     "minisim sweep mine.toml --scheduler tcp://10.0.0.1:8786 --out mine.db\n\n"
     "[bold]Exit codes[/bold]\n\n"
-    "0 done; 1 some runs failed (their rows say why); 2 bad input; 130 interrupted."
+    "0 done; 1 some runs failed (their rows say why); 2 bad input, or a store that cannot be "
+    "written, as on a full disk; 130 interrupted; 143 terminated. What was done is in the store."
 )
 def sweep(
     what: Annotated[
@@ -90,6 +105,7 @@ def sweep(
     ] = None,
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
+    from minisim.arrivals import MAX_TIME
     from minisim.recording import write_table
     from scenarios.cli.files import check_apart, check_table
     from scenarios.cli.report import sweep_notes, sweep_table
@@ -103,7 +119,7 @@ def sweep(
             raise InputError("--jobs is for this machine, --scheduler for a cluster; give one")
         integer("--jobs", jobs, low=1, high=1024)
     if horizon is not None:
-        number("--horizon [s]", horizon, above=0)
+        number("--horizon [s]", horizon, above=0, high=MAX_TIME)
     check_apart({"FILE.toml": Path(what), "--out": out, "--export": export})
     if export is not None:
         check_table(export)
@@ -162,7 +178,7 @@ def _run(
                 lost += row["error"] is not None
                 progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
                 progress(len(rows), len(experiments))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Terminated):
         kept = len(store.valid(experiment.key for experiment in experiments))
         typer.echo(
             f"minisim: {kept} of {len(experiments)} runs are in {out}; the same command goes on "

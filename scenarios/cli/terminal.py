@@ -7,6 +7,7 @@ import io
 import json
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -20,6 +21,10 @@ from rich.text import Text
 
 #: One character for one, where the terminal's encoding lacks it: tables keep their columns.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
+
+
+#: Without a terminal, progress is told once in so many seconds.
+SILENCE = 20.0
 
 
 class Bar:
@@ -38,14 +43,34 @@ class Bar:
         self._progress.update(self._task, description=text)
 
 
+class Lines:
+    """Says in a line now and then how far it is, where there is no terminal for a bar."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._said = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        """Say so, when it was not said lately."""
+        now = time.monotonic()
+        if now - self._said >= SILENCE:
+            self._said = now
+            typer.echo(f"{self._label}: {done} of {total}", err=True)
+
+    def label(self, text: str) -> None:
+        """Say something else in front of it."""
+        self._label = text
+
+
 @contextmanager
-def bar(label: str) -> Iterator[Bar]:
-    """A progress bar on stderr that leaves nothing behind; silent where that is no terminal."""
+def bar(label: str) -> Iterator[Bar | Lines]:
+    """A progress bar on stderr that leaves nothing behind; lines where that is no terminal."""
     console = Console(stderr=True)
+    if not console.is_terminal:
+        yield Lines(label)
+        return
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    with Progress(*columns, console=console, transient=True) as progress:
         yield Bar(progress, label)
 
 

@@ -71,6 +71,9 @@ SINGLE: dict[str, Any] = {"horizon": 3600.0, "min_headway": 1.5, "on_collision":
 #: What recorded arrivals replace.
 DRAWN = ("density", "split", "turns", "model", "min_headway")
 
+#: A junction of one's own.
+CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
+
 #: Keys of a scenario's table.
 JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_length")
 
@@ -99,6 +102,11 @@ def read_experiments(
     for number_, block in enumerate(blocks, start=1):
         with _at(f"{place}: [[experiment]] {number_}" if len(blocks) > 1 else place):
             _check_keys("key", block, [*AXES, *SINGLE])
+            if not {**table, **block}:
+                raise InputError(
+                    "nothing is said of what to run; name a scenario, a controller and a density, "
+                    "or any other of " + ", ".join((*AXES, *SINGLE))
+                )
             merged = {**table, **block, **overrides}
             for experiment in _block(merged, Path(path).parent):
                 found.setdefault(experiment.key, experiment)
@@ -148,8 +156,7 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
         if clash:
             raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
-    with _at("seeds"):
-        axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
+    axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
     count = prod(map(len, axes.values()))
     if count > MAX_EXPERIMENTS:
         raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
@@ -173,6 +180,8 @@ def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path
         _check_keys("key of a scenario", junction, JUNCTION)
         name, label = junction.pop("name"), junction.pop("label", "")
         instance("label", label, str)
+        if name == "custom" and "bearings" not in junction:
+            raise InputError(f"custom needs bearings, such as scenario = {CUSTOM}")
     made = scenario_named(
         name,
         junction.pop("bearings", None),
@@ -249,19 +258,24 @@ def _listed(key: str, value: object) -> list[Any]:
 
 def _seeds(value: object) -> list[int]:
     if isinstance(value, list):
-        return [integer("a seed", seed, low=0) for seed in _listed("seeds", value)]
-    return list(range(1, integer("seeds", value, low=1, high=MAX_EXPERIMENTS) + 1))
+        return [integer("seeds: a seed", seed, low=0) for seed in _listed("seeds", value)]
+    try:
+        count = integer("seeds", value, low=1, high=MAX_EXPERIMENTS)
+    except InputError as error:
+        raise InputError(f"{error}; or a list of seeds") from error
+    return list(range(1, count + 1))
 
 
 def _shares(key: str, value: object, equal: str) -> Any:
     """Shares are written "4:3:2:1"; equal ones have a name."""
     with _at(key):
-        return None if value == equal else parse_split(_text(key, value))
+        return None if value == equal else parse_split(_text(key, value, such_as="4:3:2:1"))
 
 
-def _text(key: str, value: object) -> str:
+def _text(key: str, value: object, such_as: str = "") -> str:
     if not isinstance(value, str):
-        raise InputError(f"{key} must be a text, got {show(value)}")
+        example = f' such as "{such_as}"' if such_as else ""
+        raise InputError(f"{key} must be a text{example}, got {show(value)}")
     return value
 
 

@@ -107,6 +107,7 @@ def test_the_papers_grid(
         (["FILE", "--seeds", "many"], "many"),
         (["FILE", "--horizon", "-5"], "--horizon [s] must be above 0"),
         (["FILE", "--horizon", "nan"], "--horizon [s] must be above 0"),
+        (["FILE", "--horizon", "inf"], "--horizon [s] must be above 0 and at most 1e+07, got inf"),
         (["FILE", "--jobs", "2", "--scheduler", "tcp://x:1"], "give one"),
         (["FILE", "--export", "rows.txt"], "suffix of rows.txt"),
         (["FILE", "--export", "missing/rows.csv"], "there is no folder"),
@@ -155,7 +156,13 @@ def test_the_extra_is_named_where_it_is_missing(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
-def test_ctrl_c_leaves_a_store_and_says_how_to_go_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_whoever_is_ended_leaves_a_store_and_says_how_to_go_on(
+    number: signal.Signals, code: int, word: str, tmp_path: Path
+) -> None:
     file, path = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text("horizon = 600\nseeds = 200\n")
     process = subprocess.Popen(
@@ -172,12 +179,12 @@ def test_ctrl_c_leaves_a_store_and_says_how_to_go_on(tmp_path: Path) -> None:
         if path.exists() and path.stat().st_size:
             with Store(path) as store:
                 kept = len(store)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, error = process.communicate(timeout=30)
-    assert process.returncode == 130
+    assert process.returncode == code
     assert out == ""
     said, last = error.splitlines()
-    assert last == "minisim: interrupted"
+    assert last == f"minisim: {word}"
     with Store(path) as store:
         assert 0 < len(store) < 200
         assert said == (

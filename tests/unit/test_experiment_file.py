@@ -11,9 +11,10 @@ from dim import Dim, Mixed
 from minisim.arrivals import write_arrivals
 from minisim.errors import FileError, InputError, MinisimError
 from scenarios import five_way, four_way, from_bearings, three_way
-from scenarios.cli import main
+from scenarios.cli import main, sweep
+from scenarios.cli.sweep import DEFAULTS
 from scenarios.sweep.experiment import Experiment
-from scenarios.sweep.file import check_can_run, read_experiments
+from scenarios.sweep.file import AXES, CUSTOM, SINGLE, check_can_run, read_experiments
 
 
 def read(tmp_path: Path, text: str) -> list[Experiment]:
@@ -22,8 +23,21 @@ def read(tmp_path: Path, text: str) -> list[Experiment]:
     return read_experiments(file)
 
 
-def test_an_empty_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
-    found = read(tmp_path, "")
+@pytest.mark.parametrize("text", ["", "# nothing yet", "[[experiment]]"])
+def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nothing is said of what to run; name a scenario"):
+        read(tmp_path, text)
+
+
+def test_the_help_has_the_values_of_what_is_left_out() -> None:
+    drawn = {**AXES, **SINGLE}
+    assert drawn.pop("arrivals") is None
+    assert drawn == DEFAULTS
+    assert sweep.CUSTOM == CUSTOM
+
+
+def test_a_short_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
+    found = read(tmp_path, "horizon = 3600")
     assert found == [Experiment(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
 
 
@@ -115,7 +129,8 @@ WRONG = [
     ('scenario = "for-way"', r"did you mean 'four-way'"),
     ('scenario = {name = "custom", bearing = [0]}', r"key of a scenario 'bearing'.*'bearings'"),
     ('scenario = {bearings = [0]}', r"has no name"),
-    ('scenario = "custom"', r"needs bearings"),
+    ('scenario = "custom"', r"needs bearings, such as scenario = { name = \"custom\", bea"),
+    ("split = [4, 3, 2, 1]", r'split must be a text such as "4:3:2:1", got 4'),
     ('scenario = {name = "four-way", label = 3}', r"label must be a str"),
     ("scenario = 4", r"scenario: must be a name"),
     ('controller = "dmi"', r"controller: unknown controller 'dmi'.*'dim'"),
@@ -135,9 +150,9 @@ WRONG = [
     ("density = []", r"density is an empty list"),
     ('density = "many"', r"density"),
     ("density = inf", r"density"),
-    ("seeds = 0", r"seeds: seeds must be an integer 1"),
+    ("seeds = 0", r"toml: seeds must be an integer 1 … .*, got 0; or a list of seeds"),
     ("seeds = [-1]", r"seeds: a seed must be"),
-    ("seeds = true", r"seeds: seeds must be an integer"),
+    ("seeds = true", r"toml: seeds must be an integer"),
     ("seeds = 1000000000", r"seeds"),
     ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 experiments are more than"),
     ("horizon = 0", r"horizon"),
