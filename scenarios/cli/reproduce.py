@@ -90,7 +90,5 @@ def reproduce(
 
 
 def _done(made: Made) -> str:
-    failed = f", {len(made.failed)} failed" if made.failed else ""
-    return (
-        f"{made.name}: {made.computed} of {made.runs} runs computed in {made.wall_s:.0f} s{failed}"
-    )
+    took = f"{made.name}: {made.computed} of {made.runs} runs computed in {made.wall_s:.0f} s"
+    return f"{took}, {len(made.failed)} failed" if made.failed else took

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from figures import report
 from figures.gallery import GALLERY
 from figures.tables import WRITERS
 from minisim.errors import InputError
-from scenarios.cli import main
+from scenarios.cli import main, terminal
 from scenarios.studies import reproduction
 from scenarios.studies.archive import MissingRunsError
 from scenarios.studies.capacity import CASES, Search
@@ -91,6 +92,35 @@ def test_reproduce_computes_what_is_missing(
     assert seen[-1] == (2, 2)
     assert first[0].hours == pytest.approx(6 * 100 / 3600)
     assert not any(part.failed for part in first)
+
+
+def test_progress_is_told_without_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 5.0, 25.0, 30.0, 50.0])
+    monkeypatch.setattr(terminal, "SILENCE", 20.0)
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock))
+    with terminal.bar("simulating text") as progress:
+        for done in (1, 2, 3):
+            progress(done, 9)
+        progress.label("still")
+        progress(4, 9)
+    assert capsys.readouterr().err == "simulating text: 2 of 9\nstill: 4 of 9\n"
+
+
+def test_reproduce_says_what_each_study_took(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduction.Plan, "of", lambda **_: TINY)
+    monkeypatch.setattr(reproduction, "CASES", CASES[:1])
+    monkeypatch.setattr(report, "write_report", lambda *_, parts: len(parts))
+    assert main(["reproduce", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    took = captured.err.splitlines()
+    assert [line.rpartition(" in ")[0] for line in took] == [
+        "fairness: 6 of 6 runs computed", "capacity: 1 of 1 runs computed",
+    ]  # fmt: skip
+    assert "wrote 2 figures and tables" in captured.out
 
 
 def test_plans() -> None:

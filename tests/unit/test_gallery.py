@@ -322,6 +322,29 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         report.write_report(empty, made, 1, pictures, tmp_path, lambda done, total: None)
 
 
+def test_a_report_on_one_study_has_nothing_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
+    pictures = tmp_path / "figures"
+    pictures.mkdir()
+    made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
+    count = report.write_report(
+        Archive(synthetic_find, EFFORT, SEARCH), made, 2, tmp_path, pictures,
+        lambda done, total: None, parts=("gate",),
+    )  # fmt: skip
+    assert count == 1
+    assert {file.stem for file in pictures.iterdir()} == {"gate"}
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
+    assert headings == [
+        "What was run", "When does DIM lose, and how far does the harmonious gate move it?",
+        "Collisions", "Over-saturated cells", "Failed runs",
+    ]  # fmt: skip
+    assert "| controller | gate |" in text
+    assert "- fair: " not in text
+
+
 def test_every_section_names_figures() -> None:
     shown = [name for names in report.SECTIONS.values() for name in names]
     assert len(shown) == len(set(shown))
