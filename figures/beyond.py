@@ -39,7 +39,7 @@ OTHERS = tuple(name for name in RIVALS if name not in GATES)
 ARMS: Mapping[int, tuple[str, str]] = MappingProxyType({
     3: (style.GREEN, "^"), 4: (style.BLUE, "s"), 5: (style.VERMILLION, "p"), 6: (style.INK, "h"),
 })  # fmt: skip
-#: The demand at which lanes are compared [veh/h/lane].
+#: The demand at which lanes are compared, or the nearest that was run [veh/h/lane].
 LANE_DENSITY = 300.0
 
 
@@ -59,7 +59,9 @@ def fair_figure(archive: Archive) -> Figure:
         style.plot_axes(axes, name[0].upper() + name[1:], lines.DENSITY_LABEL, "")
         lines.log_time(axes, 0.0, 4000.0, linear=0.1)
         lines.density_axis(axes, rows["density"])
-    panels[0].set_ylabel("mean of all vehicles [s], logarithmic", fontsize=9.5, color=style.INK)
+    panels[0].set_ylabel(
+        f"mean of all vehicles [s], {lines.scale_words(0.1)}", fontsize=9.5, color=style.INK
+    )
     _title(figure, "Every controller on four arms, profile fair")
     lines.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
     lines.marks_legend(figure, 0.012, 0.842, paper=False)
@@ -159,7 +161,9 @@ def gate_figure(archive: Archive) -> Figure:
         lines.log_time(axes, 0.0, 500.0, linear=0.1)
         axes.set_xticks(DENSITIES)
         axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
-    panels[0].set_ylabel("mean waiting of all vehicles [s], log.", fontsize=9.5, color=style.INK)
+    panels[0].set_ylabel(
+        f"mean waiting [s], {lines.scale_words(0.1)}", fontsize=9.5, color=style.INK
+    )
     _title(figure, "Two gates: nobody crossing, or in harmony with everybody who crosses")
     lines.series_legend(figure, GATES, 0.012, 0.925)
     lines.marks_legend(figure, 0.012, 0.865, paper=False)
@@ -174,10 +178,11 @@ def fairness_figure(archive: Archive) -> Figure:
     figure = style.new_figure(11.0, 4.7)
     by_lane, worst, spread = figure.subplots(1, 3)
     figure.subplots_adjust(left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22)
-    _draw_lanes(by_lane, rows[rows["density"] == LANE_DENSITY])
-    style.plot_axes(by_lane, f"By lane, {LANE_DENSITY:g} veh/h/lane", "lane", "mean waiting [s]")
+    compared = min(set(rows["density"]), key=lambda density: abs(density - LANE_DENSITY))
+    _draw_lanes(by_lane, rows[rows["density"] == compared])
+    style.plot_axes(by_lane, f"By lane, {compared:g} veh/h/lane", "lane", "mean waiting [s]")
     for axes, metric, title, label in (
-        (worst, "worst_lane_s", "Worst lane", "its mean waiting [s], logarithmic"),
+        (worst, "worst_lane_s", "Worst lane", f"its mean waiting [s], {lines.scale_words(0.1)}"),
         (spread, "gini", "Inequality between lanes", "Gini coefficient of the lanes' means"),
     ):
         lines.draw_means(axes, rows, metric, PRIORITIES)

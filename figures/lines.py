@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Series are drawn side by side, so that their bars do not cover each other, over this share of
-#: the range.
+#: the range, and at least so much apart.
 DODGE = 0.028
+APART = 0.0075
 DENSITY_LABEL = "demand [veh/h/lane]"
 #: Of small print [pt].
 FOOTNOTE_SIZE = 7.5
@@ -61,17 +62,17 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
             x, y, yerr=half, color=look.colour, marker=look.marker, linestyle=look.dashes,
             linewidth=1.7, markersize=5.0, capsize=2.6, elinewidth=1.1, zorder=3, label=look.label,
         )  # fmt: skip
-        grown = [(a, b) for a, b, (_, _, saturated) in zip(x, y, points, strict=True) if saturated]
-        for a, b in grown:
-            growth_arrow(axes, a, b, look.colour)
+        for a, b, bar, (_, _, grown) in zip(x, y, half, points, strict=True):
+            if grown:
+                growth_arrow(axes, a, b + bar, look.colour)
 
 
 def growth_arrow(axes: Axes, x: float, y: float, colour: str) -> None:
-    """An arrow up from a point: the queue was still growing there."""
+    """An arrow up from above a marker or the end of its bar: the queue was still growing there."""
     axes.annotate(
-        "", (x, y), xytext=(0, 13), textcoords="offset points", zorder=4,
+        "", (x, y), xytext=(0, 16), textcoords="offset points", zorder=4,
         arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 1.1, "shrinkA": 0,
-                    "shrinkB": 3.5},
+                    "shrinkB": 5.5},
     )  # fmt: skip
 
 
@@ -106,7 +107,7 @@ def offset(rows: pd.DataFrame, place: int, count: int) -> float:
     if rows.empty or count < 2:
         return 0.0
     span = float(rows["density"].max() - rows["density"].min())
-    return DODGE * span * (place / (count - 1) - 0.5)
+    return max(DODGE, APART * (count - 1)) * span * (place / (count - 1) - 0.5)
 
 
 def density_axis(axes: Axes, densities: Iterable[float]) -> None:
@@ -114,7 +115,7 @@ def density_axis(axes: Axes, densities: Iterable[float]) -> None:
     shown = sorted(set(densities))
     step = math.ceil(len(shown) / 6)
     axes.set_xticks(shown[(len(shown) - 1) % step :: step], minor=False)
-    margin = 0.04 * (shown[-1] - shown[0]) or 14.0
+    margin = 0.05 * (shown[-1] - shown[0]) or 14.0
     axes.set_xlim(shown[0] - margin, shown[-1] + margin)
 
 
@@ -138,6 +139,11 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     # A marker on 0 is whole, and so is one on the lowest value.
     axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
+
+
+def scale_words(linear: float | None) -> str:
+    """What to say of an axis of `log_time` beside its label."""
+    return "logarithmic" if linear is None else f"log., linear below {linear:g}"
 
 
 def series_legend(

@@ -95,9 +95,9 @@ def _draw_group(axes: Axes, rows: pd.DataFrame, group: str, gate: str) -> None:
         x, y, yerr=half, color=look.colour, marker=look.marker, linestyle=DASHES[gate],
         linewidth=1.7, markersize=5.0, capsize=2.6, elinewidth=1.1, zorder=3,
     )  # fmt: skip
-    for place, mean, (_, _, grown) in zip(x, y, points, strict=True):
+    for place, mean, bar, (_, _, grown) in zip(x, y, half, points, strict=True):
         if grown:
-            lines.growth_arrow(axes, place, mean, look.colour)
+            lines.growth_arrow(axes, place, mean + bar, look.colour)
 
 
 def _draw_stop(axes: Axes, rows: pd.DataFrame) -> None:

@@ -57,7 +57,7 @@ def split_figure(archive: Archive, metric: str, split: str) -> Figure:
         lines.draw_published(axes, wanted, rows, SERIES)
         _dress(axes, PANELS[found.study.name], metric)
     name = "equal inflow" if split == "balanced" else f"inflow {split}"
-    _head(figure, f"Mean {METRICS[metric]}, 4 arms, {name}", SERIES)
+    _head(figure, f"Mean {METRICS[metric]}, 4 arms, {name}", metric, SERIES)
     lines.footnote(figure, missing_note(results, lambda c: c.where == f"4 arms, {split}"))
     return figure
 
@@ -75,7 +75,7 @@ def arms_figure(archive: Archive, metric: str) -> Figure:
         lines.draw_means(axes, rows, metric, names)
         lines.draw_published(axes, wanted, rows, names)
         _dress(axes, PANELS[found.study.name], metric)
-    _head(figure, f"Mean {METRICS[metric]} under DIM by number of arms", names)
+    _head(figure, f"Mean {METRICS[metric]} under DIM by number of arms", metric, names)
     lines.footnote(
         figure,
         missing_note(results, lambda c: c.series == "dim" and c.where.endswith(", balanced")),
@@ -109,8 +109,9 @@ def _dress(axes: Axes, title: str, metric: str) -> None:
     axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
 
 
-def _head(figure: Figure, title: str, series: tuple[str, ...]) -> None:
-    figure.axes[0].set_ylabel("seconds (logarithmic)", fontsize=9.5, color=style.INK)
+def _head(figure: Figure, title: str, metric: str, series: tuple[str, ...]) -> None:
+    label = f"mean {METRICS[metric]} [s], {lines.scale_words(SCALES[metric][2])}"
+    figure.axes[0].set_ylabel(label, fontsize=9.5, color=style.INK)
     figure.text(0.012, 0.965, title, fontsize=13, fontweight="bold", color=style.INK, va="center")
     lines.series_legend(figure, series, 0.012, 0.925)
     lines.marks_legend(figure, 0.012, 0.868, paper=True)

@@ -16,7 +16,7 @@ from figures.tables import Table
 from minisim.geometry import ARM_NAMES
 from scenarios.library import MAKERS
 from scenarios.studies.archive import Archive, missing_note, smoke_test
-from scenarios.studies.comparison import causes, compare, score
+from scenarios.studies.comparison import causes, compare, labels, score
 from scenarios.studies.crossing import tried
 from scenarios.studies.study import AnyCase
 
@@ -206,7 +206,7 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
         row["metric"].removesuffix("_time_s") + lane,
         f"{row['density']:g}", f"{row['paper']:.2f}{_mark(row)}", _number(row["mean"]),
         _number(row["sd"]), _range(row), _inside(row),
-        " ".join(f"{known.number}" for known in causes(study, row)),
+        " ".join(dict.fromkeys(labels()[known.cause] for known in causes(study, row))),
     )  # fmt: skip
 
 

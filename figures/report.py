@@ -15,9 +15,9 @@ from figures.tables import Table
 from minisim.errors import FileError
 from minisim.recording import replacing
 from minisim.version import __version__
-from scenarios.studies.archive import Archive, MissingRunsError, make_command
+from scenarios.studies.archive import Archive, MissingRunsError, make_command, smoke_test
 from scenarios.studies.cells import saturated, too_short
-from scenarios.studies.comparison import SHOWN, compare, discrepancies, score
+from scenarios.studies.comparison import COLLIDING, SHOWN, compare, discrepancies, labels, score
 from scenarios.studies.crossing import METRICS, tried
 from scenarios.studies.reproduction import PARTS, Made
 from scenarios.studies.results import Results
@@ -216,6 +216,7 @@ def _verdict(archive: Archive, parts: Collection[str]) -> Iterator[str]:
 
 def _inside(archive: Archive, judged: Iterable[str]) -> str:
     """How many of the paper's values lie inside our intervals, by study and controller."""
+    smoke = smoke_test(archive.effort)
     lines = []
     for study in judged:
         results = archive.study(study)
@@ -224,8 +225,8 @@ def _inside(archive: Archive, judged: Iterable[str]) -> str:
             continue
         table = compare(results.good)
         lines.append(
-            f"- `{study}`: {score(table)} comparable values of the paper lie inside our 95 % "
-            f"prediction interval; of those that are not comparable, "
+            f"- `{study}`: {smoke}{score(table)} comparable values of the paper lie inside our "
+            f"95 % prediction interval; of those that are not comparable, "
             f"{score(table, comparable=False)}."
         )
         by = [
@@ -291,7 +292,7 @@ def _causes(archive: Archive) -> str:
         )
         found.setdefault((known.number, known.cause), []).append(where)
     listed = "\n".join(
-        f"- **{number}** {cause} ({'; '.join(where)}.) "
+        f"- **{labels()[cause]}** {cause} ({'; '.join(where)}.) "
         + (f"*Shown by {SHOWN[number]}.*" if number in SHOWN else "*Not isolated by a run here.*")
         for (number, cause), where in found.items()
     )
@@ -318,13 +319,23 @@ def _cells(results: Results) -> Iterator[tuple[AnyCase, pd.DataFrame]]:
 
 def _collisions(studies: Iterable[Results]) -> str:
     lines = []
+    published: dict[str, None] = {}
     for results in studies:
         for case, rows in _cells(results):
             count = int(rows["collisions"].sum())
             if count:
                 hours = len(rows) * results.effort.horizon / 3600.0
-                lines.append(f"- {results.study.name}: {case}: {count} in {hours:.1f} h")
-    return "\n".join(lines) if lines else "None in any run."
+                what = f"{style.look(case.series).label}, {case.where}, {case.density:g} veh/h/lane"
+                lines.append(f"- {results.study.name}: {what}: {count} in {hours:.1f} h")
+                if results.study.name == "as-run":
+                    published[case.series] = None
+    why = [
+        f"\nWhy {style.look(name).label} collides as it was run: {COLLIDING[name]} "
+        "(docs/fidelity.md, discrepancies)."
+        for name in published
+        if name in COLLIDING
+    ]
+    return "\n".join([*lines, *why]) if lines else "None in any run."
 
 
 def _saturated(studies: Iterable[Results]) -> str:

@@ -90,7 +90,10 @@ def number(
         raise InputError(f"{name} is too large: {show(value)}") from None
     inside = low <= result <= high and above < result < below
     if not math.isfinite(result) or not inside:
-        raise InputError(f"{name} must be {_range(low, high, above, below)}, got {show(value)}")
+        allowed = _range(low, high, above, below)
+        if inside and "finite" not in allowed:
+            allowed += " and finite"
+        raise InputError(f"{name} must be {allowed}, got {show(value)}")
     return result
 
 
@@ -123,7 +126,8 @@ def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         wanted = " or ".join(k.__name__ for k in kinds)
-        raise InputError(f"{name} must be a {wanted}, got {show(value)}")
+        article = "an" if wanted[0] in "AEIOaeio" else "a"
+        raise InputError(f"{name} must be {article} {wanted}, got {show(value)}")
 
 
 def items(name: str, value: object, of: str) -> list[Any]:

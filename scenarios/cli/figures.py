@@ -58,6 +58,7 @@ def figures(
         show(gallery_table(GALLERY.values()))
         return
     items = [item_named(name) for name in dict.fromkeys(names or GALLERY)]
+    left = 0
     plan = Plan.of(quick=quick, seeds=seeds)
     wanting = [item.name for item in items if item.needs]
     if store is None and names and wanting:
@@ -65,6 +66,9 @@ def figures(
             f"{', '.join(wanting)}: drawn from results; give them with --store "
             "(minisim reproduce makes them)"
         )
+    if store is None:
+        left = len(wanting)
+        items = [item for item in items if not item.needs]
     source = None if store is None else Store(store, create=False)
     try:
         folder = make_folder(out)
@@ -85,5 +89,7 @@ def figures(
         if source is not None:
             source.close()
     typer.echo(f"wrote {len(items) - len(missing)} figures and tables to {folder}")
+    if left:
+        typer.echo(f"  not {left} others, which need runs: name a store with --store", err=True)
     for name, why in missing:
         typer.echo(f"  not {name}: {why}", err=True)

@@ -69,6 +69,8 @@ def reproduce(
 
     plan = Plan.of(quick=quick, seeds=seeds, parts=only)
     processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
+    if store is not None and store.exists():
+        Store(store, create=False).close()  # refused before a folder is made
     folder = make_folder(out)
     pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:

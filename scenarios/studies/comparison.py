@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
 from statistics import stdev
+from string import ascii_lowercase
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -41,8 +42,9 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
     Returns:
         One row a published value, columns `COMPARED`: `low` and `high` are the bounds of the 95 %
         prediction interval, within which one more run of ours would fall, cut at 0, below which
-        no time is; `inside` whether the paper's value does; `seeds` is 0 where there is no run,
-        and what follows is missing.
+        no time is; `inside` whether the paper's value does, missing where there is one value or
+        all are equal, which makes no interval; `seeds` is 0 where there is no run, and what
+        follows is missing.
     """
     import pandas as pd
 
@@ -81,7 +83,7 @@ def _ours(cell: pd.DataFrame | None, column: str, paper: float) -> dict[str, obj
     low = low if math.isnan(low) else max(low, 0.0)
     return {
         "seeds": len(values), "mean": mean, "sd": sd, "low": low, "high": high,
-        "inside": None if one else bool(low <= paper <= high),
+        "inside": bool(low <= paper <= high) if sd > 0.0 else None,
         "saturated": saturated(cell),
     }  # fmt: skip
 
@@ -137,6 +139,15 @@ class Discrepancy(NamedTuple):
         )
 
 
+#: Series -> why its published rules collide.
+COLLIDING: Mapping[str, str] = MappingProxyType({
+    "dim": "the published five-arm table has pairs in harmony, such as c3 and e4, whose ways pass "
+           "1.48 m apart, less than a vehicle is wide; and by the published rule a decision may "
+           "still take the right of way from a vehicle that can no longer stop",
+    "v2ic": "the published conflict matrix is that of right-hand traffic (cause 14)",
+})  # fmt: skip
+
+
 #: Discrepancy -> the run or file here that shows it. The others are known from the authors' code
 #: and files, and no run here isolates them.
 SHOWN: Mapping[int, str] = MappingProxyType({
@@ -158,6 +169,19 @@ def discrepancies() -> tuple[Discrepancy, ...]:
     with file.open(encoding="utf-8") as text:
         rows = list(csv.DictReader(text))
     return tuple(Discrepancy(int(row.pop("number")), **row) for row in rows)
+
+
+@lru_cache
+def labels() -> Mapping[str, str]:
+    """Cause -> its number, with a letter where several have the same: 3, 9a, 9b."""
+    found: dict[int, dict[str, None]] = {}
+    for known in sorted(discrepancies()):
+        found.setdefault(known.number, {})[known.cause] = None
+    return {
+        cause: f"{number}{ascii_lowercase[k] if len(causes) > 1 else ''}"
+        for number, causes in found.items()
+        for k, cause in enumerate(causes)
+    }
 
 
 def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:

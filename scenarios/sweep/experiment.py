@@ -71,7 +71,9 @@ class Experiment:
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, Scenario)
         if isinstance(self.controller, type) or not isinstance(self.controller, Controller):
-            raise InputError(f"controller must be a Controller, got {show(self.controller)}")
+            missing = [part for part in ("name", "start") if not hasattr(self.controller, part)]
+            lack = f", which has no {' and no '.join(missing)}" if missing else ", which is a class"
+            raise InputError(f"controller must be a Controller, got {show(self.controller)}{lack}")
         integer("seed", self.seed, low=0)
         instance("label", self.label, str)
         choice("on_collision", self.on_collision, ON_COLLISION)

@@ -54,7 +54,7 @@ def sweep(
         arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
 
     Raises:
-        InputError: something other than an `Experiment`, or jobs beside an executor.
+        InputError: something other than an `Experiment` or a `Store`, or jobs beside an executor.
         FileError: the store cannot be written; what it has stays.
         ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died;
             what was done is in the store. Without a store, their rows have it as an error.
@@ -88,6 +88,8 @@ def finished(
     if jobs is None:
         jobs = os.cpu_count() or 1
     integer("jobs", jobs, low=1, high=1024)
+    if store is not None:
+        instance("store (open it with `Store(path)`)", store, Store)
     missing = dict(enumerate(todo))
     if store is not None:
         keys = [experiment.key for experiment in todo]

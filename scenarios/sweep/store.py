@@ -29,11 +29,15 @@ if TYPE_CHECKING:
 APPLICATION = 0x44494D73
 SCHEMA = 1
 
-#: How long a transaction of another process is waited for [s].
+#: How long a transaction of another process is waited for [s], and on opening: who has a store for
+#: longer than some milliseconds is no sweep.
 PATIENCE = 30.0
+OPENING = 3.0
 
 #: Columns by which rows are ordered; every row has them.
 ORDER = ("scenario", "profile", "split", "density", "controller", "horizon_s", "seed")
+
+COLUMNS = ("key", "version", "error", "experiment", "provenance", "row")
 
 _CREATE = f"""
 BEGIN EXCLUSIVE;
@@ -75,7 +79,7 @@ class Store:
             raise FileError(f"there is no store {self.path}")
         with self._guarded("open"):
             self._database = sqlite3.connect(
-                self.path, timeout=PATIENCE, isolation_level=None, cached_statements=16
+                self.path, timeout=OPENING, isolation_level=None, cached_statements=16
             )
         try:
             with self._guarded("open"):
@@ -149,11 +153,15 @@ class Store:
         if fresh:
             # In the roll-back journal, which makes the header part of the transaction.
             self._database.executescript(_CREATE)
+        columns = tuple(name for _, name, *_ in self._database.execute("PRAGMA table_info(runs)"))
+        if columns != COLUMNS:
+            raise FileError(f"{self.path} is not a store of minisim; it was left as it is")
         problem = self._database.execute("PRAGMA quick_check(1)").fetchone()[0]
         if problem != "ok":
             raise FileError(f"store {self.path} is damaged: {problem}")
         self._database.execute("PRAGMA journal_mode = WAL")
         self._database.execute("PRAGMA synchronous = FULL")
+        self._database.execute(f"PRAGMA busy_timeout = {round(1000 * PATIENCE)}")
 
     def _row(self, text: str) -> Row:
         try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from figures import report
+from figures import gallery, report
 from figures.gallery import GALLERY
 from figures.tables import WRITERS
 from minisim.errors import InputError
@@ -29,6 +29,29 @@ def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
     assert main(["figures", "webster", "harmony-3way", "--out", str(tmp_path / "new")]) == 0
     names = {f"{name}.{suffix}" for name in ("webster", "harmony-3way") for suffix in WRITERS}
     assert {file.name for file in (tmp_path / "new").iterdir()} == names
+
+
+def test_without_a_store_what_needs_runs_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = {name: GALLERY[name] for name in ("webster", "gate", "fair")}
+    monkeypatch.setattr(gallery, "GALLERY", few)
+    assert main(["figures", "--out", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("wrote 1 figures")
+    assert captured.err == "  not 2 others, which need runs: name a store with --store\n"
+
+
+def test_a_wrong_store_is_refused_before_a_folder_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notes, folder = tmp_path / "notes.txt", tmp_path / "out"
+    notes.write_text("mine")
+    assert main(["reproduce", "--store", str(notes), "--out", str(folder)]) == 2
+    assert "is not a store of minisim" in capsys.readouterr().err
+    assert not folder.exists()
+    assert main(["figures", "webster", "--out", str(notes)]) == 2
+    assert "it is a file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

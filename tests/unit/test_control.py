@@ -65,7 +65,7 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"intersection": "four-way"}, "intersection must be a Intersection"),
+        ({"intersection": "four-way"}, "intersection must be an Intersection"),
         ({"vehicle": None}, "vehicle must be a VehicleType"),
         ({"speed_limit": 0}, "speed_limit"),
         ({"demand": (1.0, 2.0)}, "demand must be 4 numbers"),

@@ -262,7 +262,7 @@ def test_a_path_is_text(path: object) -> None:
 
 def test_from_geometry_checks_its_arguments() -> None:
     intersection = four_way().intersection
-    with pytest.raises(InputError, match="intersection must be a Intersection"):
+    with pytest.raises(InputError, match="intersection must be an Intersection"):
         HarmonyMatrix.from_geometry("four-way")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="vehicle must be a VehicleType"):
         HarmonyMatrix.from_geometry(intersection, 5)  # type: ignore[arg-type]

@@ -91,3 +91,12 @@ def test_every_error_is_a_minisim_error_and_bad_input_a_value_error() -> None:
     assert len(kinds) >= 6
     assert all(issubclass(kind, MinisimError) for kind in kinds)
     assert issubclass(InputError, ValueError)
+
+
+def test_a_bound_that_is_not_the_trouble_is_not_all_that_is_said() -> None:
+    with pytest.raises(InputError, match=r"^x must be above 0 and finite, got inf$"):
+        errors.number("x", math.inf, above=0)
+    with pytest.raises(InputError, match=r"^x must be a finite number, got inf$"):
+        errors.number("x", math.inf)
+    with pytest.raises(InputError, match=r"^x must be an Exception, got 1$"):
+        errors.instance("x", 1, Exception)

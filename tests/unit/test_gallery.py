@@ -313,6 +313,7 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "CPU seconds for one simulated hour" in text
     assert "fixed-time signal, 4 arms, balanced: 500, 600, 700, 800 veh/h/lane" in text
     assert "**13** " in text
+    assert "**9a** " in text
     assert "None in any run." in text, "no collision"
     empty = Archive(lambda asked: [None] * len(asked), EFFORT, SEARCH)
     assert report.write_report(empty, made, 1, tmp_path, pictures, lambda done, total: None) == 1
@@ -343,6 +344,20 @@ def test_a_report_on_one_study_has_nothing_of_others(
     ]  # fmt: skip
     assert "| controller | gate |" in text
     assert "- fair: " not in text
+
+
+def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
+
+    report.write_report(
+        Archive(find, Effort.quick(), SEARCH), [], 1, tmp_path, tmp_path, lambda done, total: None,
+        parts=("as-run",),
+    )  # fmt: skip
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "- as-run: DIM, 5 arms, balanced, 350 veh/h/lane: 4 in 0.1 h" in text
+    assert "Why DIM collides as it was run: the published five-arm table" in text
+    assert "- `as-run`: Smoke test, which means nothing: " in text
 
 
 def test_every_section_names_figures() -> None:

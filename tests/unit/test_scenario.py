@@ -105,7 +105,7 @@ def test_scenarios_are_frozen_hashable_and_survive_pickling() -> None:
         ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
         ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
         ({"demand": Demand(density=900, model="shifted", min_headway=4)}, "leave no room for"),
-        ({"recorded": "file.csv"}, "recorded must be a Arrivals"),
+        ({"recorded": "file.csv"}, "recorded must be an Arrivals"),
         ({"recorded": table((0.0, 4, 1))}, "lane e is not in the geometry"),
         ({"recorded": table((0.0, 0, 4))}, "manoeuvre 4 does not exist with 4 arms"),
     ],

@@ -6,6 +6,7 @@ import json
 import sqlite3
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -103,6 +104,13 @@ def foreign(path: Path) -> None:
     database.close()
 
 
+def other_columns(path: Path) -> None:
+    Store(path).close()
+    database = sqlite3.connect(path)
+    database.executescript("DROP TABLE runs; CREATE TABLE runs (key, row)")
+    database.close()
+
+
 def filled(path: Path) -> None:
     result = run_experiment(experiment())
     with Store(path) as store:
@@ -137,6 +145,7 @@ def text(path: Path) -> None:
         (newer, "has layout 2, this version of minisim reads layout 1"),
         (foreign, "is not a store of minisim"),
         (text, "is not a store of minisim"),
+        (other_columns, "is not a store of minisim"),
         (beheaded, "is not a store of minisim"),
         (truncated, "malformed|damaged"),
         (scribbled, "malformed|damaged"),
@@ -218,6 +227,21 @@ def test_another_writer_is_waited_for(
         theirs._database.execute("ROLLBACK")
         ours.put(experiment(3), outcome)
         assert len(ours) == 3
+
+
+def test_a_store_that_another_holds_is_told_soon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scenarios.sweep.store.OPENING", 0.1)
+    Store(tmp_path / "s.db").close()
+    theirs = sqlite3.connect(tmp_path / "s.db", isolation_level=None)
+    theirs.execute("PRAGMA locking_mode = EXCLUSIVE")
+    theirs.execute("BEGIN EXCLUSIVE")
+    began = time.monotonic()
+    with pytest.raises(FileError, match=r"cannot open store .* locked"):
+        Store(tmp_path / "s.db")
+    assert time.monotonic() - began < 5.0
+    theirs.close()
 
 
 FULL_DISK = """

@@ -15,12 +15,22 @@ from hypothesis import strategies as st
 
 from baselines import FixedTime
 from dim import Dim, Mixed
+from figures.gallery import GALLERY
+from figures.tables import Table
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.statistics import GROWTH_SCORE
+from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import Capacity, Search, capacities, grows
 from scenarios.studies.cells import saturated
-from scenarios.studies.comparison import causes, compare, discrepancies, published, score
+from scenarios.studies.comparison import (
+    causes,
+    compare,
+    discrepancies,
+    labels,
+    published,
+    score,
+)
 from scenarios.studies.crossing import (
     METRICS,
     crossing,
@@ -403,6 +413,25 @@ def test_comparison_by_hand() -> None:
     assert travel["low"] == pytest.approx(71.0 - 12.7062 * math.sqrt(2.0) * math.sqrt(1.5), 1e-4)
     assert score(table).judged == 2
     assert int((table["seeds"] == 0).sum()) == 150
+
+
+def test_equal_values_make_no_interval() -> None:
+    def still(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [{**synthetic_row(e), "waiting_time_s": 0.0} for e in asked]
+
+    table = compare(collect(STUDIES["as-run"], Effort(seeds=2), still).good)
+    chosen = (table["metric"] == "waiting_time_s") & (table["lane"] == "all")
+    assert table[chosen]["inside"].isna().all()
+    assert table[~chosen]["inside"].notna().all()
+
+
+def test_causes_that_share_a_number_have_letters() -> None:
+    assert len(set(labels().values())) == len(labels())
+    assert {"3", "9a", "9b", "9c"} <= set(labels().values())
+    table = GALLERY["comparison-as-run"].build(Archive(synthetic_find, Effort(seeds=2), Search()))
+    assert isinstance(table, Table)
+    for row in table.rows:
+        assert len(row[-1].split()) == len(set(row[-1].split()))
 
 
 def test_causes_of_what_is_not_comparable() -> None:

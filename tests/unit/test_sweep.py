@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 import pytest
@@ -155,6 +155,7 @@ def test_interrupt_cancels_what_has_not_begun() -> None:
         lambda: Experiment(four_way(), Dim(), -1),
         lambda: Experiment(four_way(), Dim(), 1.5),  # type: ignore[arg-type]
         lambda: sweep([four_way()], ThreadPoolExecutor(1)),  # type: ignore[list-item]
+        lambda: sweep([], store="s.db"),  # type: ignore[arg-type]
         lambda: workers(0),
         lambda: Tour(seeds=1),
         lambda: Tour(densities=()),
@@ -164,6 +165,19 @@ def test_interrupt_cancels_what_has_not_begun() -> None:
 def test_bad_input(wrong: Any) -> None:
     with pytest.raises(InputError):
         wrong()
+
+
+def test_what_a_controller_lacks_is_said() -> None:
+    class Plain(NamedTuple):
+        x: float
+
+        def start(self, site: Site) -> BrokenSession:
+            return BrokenSession()
+
+    with pytest.raises(InputError, match=r"got Plain\(x=40.0\), which has no name$"):
+        Experiment(four_way(), Plain(40.0))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"which is a class$"):
+        Experiment(four_way(), Dim)  # type: ignore[arg-type]
 
 
 # --- statistics ------------------------------------------------------------------------------
