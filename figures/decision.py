@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Patch, Rectangle
 
 from dim import Explanation
 from figures import junction, style
@@ -44,7 +44,19 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
         color=style.RIGHT_OF_WAY, va="center",
     )  # fmt: skip
     figure.text(0.02, 0.035, explanation.reason, fontsize=10, color=style.INK, va="center")
+    _zone_legend(figure, plan)
     return figure
+
+
+def _zone_legend(figure: Figure, plan: Plan) -> None:
+    """The zones on the lanes, from the outside in."""
+    names = list(dict.fromkeys(m.name for m in plan.markings if m.end < APPROACH))
+    figure.legend(
+        [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in names],
+        [f"{name} zone" for name in names], loc="center right", bbox_to_anchor=(0.98, 0.08),
+        ncols=max(len(names), 1), frameon=False, fontsize=9, labelcolor=style.INK,
+        borderaxespad=0.0, handlelength=1.4, columnspacing=1.4,
+    )  # fmt: skip
 
 
 def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) -> None:

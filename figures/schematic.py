@@ -78,8 +78,8 @@ def _draw_map(axes: Axes, scenario: Scenario) -> None:
                 axes, path, path.entry - plan.hold_distance, path.exit + 6.0, style.BLUE,
                 strong=False,
             )  # fmt: skip
-    left, low = -0.94 * MAP_REACH, -0.94 * MAP_REACH
-    axes.plot([left, left + 20.0], [low, low], color=style.INK, linewidth=2.2, zorder=9,
+    left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # where no junction of the paper has a road
+    axes.plot([left, left + 20.0], [top, top], color=style.INK, linewidth=2.2, zorder=9,
               solid_capstyle="butt")  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def number(
     inside = low <= result <= high and above < result < below
     if not math.isfinite(result) or not inside:
         allowed = _range(low, high, above, below)
-        if inside and "finite" not in allowed:
+        if result == high == below and "finite" not in allowed:  # infinite, with no upper bound
             allowed += " and finite"
         raise InputError(f"{name} must be {allowed}, got {show(value)}")
     return result
