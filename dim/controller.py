@@ -183,7 +183,9 @@ class DimSession:
         )
         self._ranks = _ranking(dim, site)
         self._see = dim.perception.start(site)
-        self._watch = dim.monitor.start(site, matrix) if dim.monitor else None
+        self._watch = (
+            dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
+        )
         self._dt = site.dt
         self._agents: dict[int, Agent] = {}
 
@@ -207,6 +209,9 @@ class DimSession:
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
             goes = agent.decide(percept, table)
+            if self._watch is not None:
+                goes = self._watch.goes(view, sight, ego, goes, table.priorities)
+                agent.right_of_way = goes
             if goes != had:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
             if not goes:

@@ -17,12 +17,17 @@ anybody as far as a monitor can tell, it never brakes, and a run is the same as 
 
 Two who brake for each other must not stand for ever: of two that stand, the one further in goes
 first, of equals the one of the first lane, unless the other stands in its way. Both can see that.
+
+Nor must those who wait for each other: vehicles that read each other differently may each find
+that it is not its turn. Somebody always has a right of way, so where nobody crosses and everybody
+has been standing for a while, somebody has misread. Then the first lane goes, alone, for which no
+intent needs to be known.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +57,11 @@ STANDING = 0.1
 ROOM = 0.25
 
 
+#: How long all who take part stand before the first of them goes alone [s]: what an all-way stop
+#: takes between two vehicles at most, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
+PATIENCE = 2.0
+
+
 @dataclass(frozen=True)
 class Monitor:
     """A last resort for every vehicle, beside what it decides.
@@ -61,6 +71,7 @@ class Monitor:
         look_ahead: how far ahead motion is predicted [s].
         tolerance: how far beside a path a vehicle may seem to be while it is on it [m].
         deceleration: how hard it brakes at most [m/s²]; None is what the brakes can do.
+        patience: how long all who take part stand before the first of them goes alone [s].
 
     Raises:
         InputError: a number out of range.
@@ -70,17 +81,25 @@ class Monitor:
     look_ahead: float = LOOK_AHEAD
     tolerance: float = TOLERANCE
     deceleration: float | None = None
+    patience: float = PATIENCE
 
     def __post_init__(self) -> None:
         number("time_margin [s]", self.time_margin, low=0, high=10)
         number("look_ahead [s]", self.look_ahead, low=0.5, high=30)
         number("tolerance [m]", self.tolerance, above=0, high=1)
+        number("patience [s]", self.patience, low=0.5, high=60)
         if self.deceleration is not None:
             number("deceleration of the monitor [m/s²]", self.deceleration, above=0, high=1000)
 
-    def start(self, site: Site, matrix: HarmonyMatrix) -> Watch:
-        """Begin a run in which movements are in harmony as `matrix` says."""
-        return Watch(self, site, matrix)
+    def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
+        """Begin a run.
+
+        Args:
+            site: where.
+            matrix: which movements are in harmony.
+            sight: from where on before the junction vehicles take part [m].
+        """
+        return Watch(self, site, matrix, sight)
 
 
 class Watch:
@@ -90,8 +109,11 @@ class Watch:
         needed: whether anybody might get in the way of another before the next wake-up.
     """
 
-    def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix) -> None:
+    def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
         self.needed = False
+        self._sight, self._patience = sight, monitor.patience
+        self._since: dict[int, float] = {}
+        self._alone: set[int] = set()
         self._margin = monitor.time_margin
         self._site, self._n = site, site.intersection.n
         self._conflict = ~matrix.values
@@ -104,6 +126,37 @@ class Watch:
         self._readings: dict[tuple[int, int], set[int]] = {}
         self._braking: dict[int, float] = {}
 
+    def goes(
+        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
+    ) -> bool:
+        """Whether a vehicle goes: as it decided, or alone where all stand and wait.
+
+        Args:
+            view: the true one, for its time.
+            seen: what the ego sees.
+            decided: whether it goes by its own decision.
+            ranks: of the lanes, 0 first.
+        """
+        others = [v for v in seen.vehicles if v.id != ego.id and v.distance <= self._sight]
+        free = not any(v.distance < 0.0 or not can_stop(v, self._b) for v in others)
+        here = ego.distance >= 0.0 and can_stop(ego, self._b)
+        if ego.id in self._alone:
+            if free or not here:
+                return True
+            self._alone.discard(ego.id)
+            return False
+        fronts = {v.lane: v for v in reversed(seen.vehicles) if 0.0 <= v.distance <= self._sight}
+        waits = not decided and free and all(v.speed < STANDING for v in fronts.values())
+        if not waits or fronts[ego.lane].id != ego.id:
+            self._since.pop(ego.id, None)
+            return decided
+        since = self._since.setdefault(ego.id, view.time)
+        if view.time < since + self._patience or min(fronts, key=ranks.__getitem__) != ego.lane:
+            return False
+        del self._since[ego.id]
+        self._alone.add(ego.id)
+        return True
+
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
         """Who has to brake, and how hard.
 
@@ -115,7 +168,12 @@ class Watch:
         crossing = [v for v in view.vehicles if v.distance < 0.0 or not can_stop(v, self._b)]
         inside = {v.id for v in crossing}
         egos = [v for v in view.vehicles if v.id in seen and (v.id in going or v.id in inside)]
-        self.needed = len({v.lane for v in crossing} | {v.lane for v in egos}) > 1
+        here = seen.keys()
+        self._alone &= here
+        self._since = {vehicle: since for vehicle, since in self._since.items() if vehicle in here}
+        self.needed = (
+            bool(self._since) or len({v.lane for v in crossing} | {v.lane for v in egos}) > 1
+        )
         readings = self._readings
         self._readings = {}
         braking: dict[int, float] = {}
@@ -166,14 +224,21 @@ class Watch:
         if room == math.inf:
             return 0.0
         first = _goes_first(ego, other)
-        stuck = mirrored.way(y, x) < math.inf  # the other, as long as the ego stands
-        if other.speed < STANDING and shared.way(x, y) == math.inf and (first or stuck):
-            return 0.0
+        if other.speed < STANDING and self._open(mine, x, other):
+            stuck = mirrored.way(y, x) < math.inf  # the other, as long as the ego stands
+            if first or stuck:
+                return 0.0
         if self._passes_first(ego, other, shared, mirrored):
             return 0.0
         if not first and ego.distance > 0.0:
             room = min(room, ego.distance)
         return self._braking_for(ego, other, room - ROOM, shared)
+
+    def _open(self, mine: int, x: float, other: Observed) -> bool:
+        """Whether nobody is in the ego's way as long as the other stands where its body is."""
+        body = other.lane * (self._n - 1) + other.manoeuvre - 1  # a path that it is on
+        shared = area(self._site, mine, body)
+        return shared is None or shared.way(x, -other.distance) == math.inf
 
     def _passes_first(self, ego: Observed, other: Observed, shared: Area, mirrored: Area) -> bool:
         """Whether the ego, as fast as now, is out of the area in good time before the other."""
