@@ -4,6 +4,7 @@ from dim.as_run import AsRunDim
 from dim.controller import Dim
 from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
+from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
 
@@ -14,6 +15,7 @@ __all__ = [
     "ExactPerception",
     "Explanation",
     "HarmonyMatrix",
+    "NoisyPerception",
     "Perception",
     "Zones",
     "decide",

@@ -13,11 +13,12 @@ wake-ups suffice, because between them no agent would change its mind:
   that only one of them has, and a lane that both have does not count.
 - Somebody stops crossing when its rear bumper leaves the junction (wake-up).
 
-Three exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
-past half of the green zone, where it is granted it: another mark. And on a host whose brakes
-differ, a vehicle that loses its right of way may look committed until it stands: then the session
-looks again every step. And where lane priorities change with time (`dim.priorities`), it looks
-again when they do.
+Four exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
+past half of the green zone, where it is granted it: another mark. On a host whose brakes differ, a
+vehicle that loses its right of way may look committed until it stands: then the session looks again
+every step. Where lane priorities change with time (`dim.priorities`), it looks again when they do.
+And where perception errs, vehicles do not see the same, so nothing of the above holds: they look
+around with a period (`Perception.period`).
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ class Dim:
         sensor_range: how far vehicles see the others' approach lanes and yellow zones [m]; what
             "waiting" may remember depends on it.
         monitor: a safety monitor in every vehicle, or None.
-        period: look around every so many seconds too, or None: not needed, for tests.
+        period: look around every so many seconds too; None is as often as the perception needs,
+            which is never where it is exact.
 
     Raises:
         InputError: an unknown rule, or priorities that are no ranks.
@@ -117,6 +119,7 @@ class Dim:
             "paper-commit": self.commit == "paper",
             str(self.priorities): isinstance(self.priorities, str),
             "priorities": isinstance(self.priorities, tuple),
+            self.perception.name: self.perception.name != "exact",
             "monitored": self.monitor is not None,
         }
         return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
@@ -158,6 +161,7 @@ class DimSession:
     Attributes:
         rules: those that all agents hold.
         reader: how they read what they see.
+        see: what each of them sees.
         plan: what the host has to provide.
     """
 
@@ -177,12 +181,12 @@ class DimSession:
             markings=zones.markings(site),
             marks=(zones.yellow_start, *half_green, *entry),
             wake_on_clear=True,
-            period=dim.period,
+            period=dim.perception.period if dim.period is None else dim.period,
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
         self._ranks = _ranking(dim, site)
-        self._see = dim.perception.start(site)
+        self.see = dim.perception.start(site)
         self._watch = (
             dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
         )
@@ -204,7 +208,7 @@ class DimSession:
             vehicle = ego.id
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
-            sight = sights[vehicle] = self._see(view, ego)
+            sight = sights[vehicle] = self.see(view, ego)
             if sight is not seen or percept is None:  # all who see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way

@@ -1,8 +1,8 @@
 """What one vehicle sees of the others, and how it reads that.
 
 Seeing and reading are apart. A `Perception` says what an ego sees of the true view: everything
-(`ExactPerception`), or one day less, later, or wrong. `Reader` turns what was seen into the few
-facts that Algorithm 1 needs, the same way for every vehicle.
+(`ExactPerception`), or less, later, or wrong (`dim.noise`). `Reader` turns what was seen into the
+few facts that Algorithm 1 needs, the same way for every vehicle.
 """
 
 from __future__ import annotations
@@ -33,6 +33,18 @@ See = Callable[[View, Observed], View]
 class Perception(Protocol):
     """A recipe for the vehicles' senses: hashable, picklable, never changed by a run."""
 
+    @property
+    def name(self) -> str:
+        """Short name; "exact" where everybody sees everything as it is."""
+
+    @property
+    def period(self) -> float | None:
+        """How often vehicles must look [s]; None where what they see changes at wake-ups only.
+
+        DIM's few wake-ups suffice as long as all see the same (`dim.controller`). Once what one
+        sees may change by itself, vehicles have to look again and again.
+        """
+
     def start(self, site: Site) -> See:
         """Begin a run: random streams and memory, if there are any, belong to the result."""
 
@@ -41,12 +53,22 @@ class Perception(Protocol):
 class ExactPerception:
     """Everyone sees everything, at once and as it is: the paper's assumption."""
 
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return "exact"
+
+    @property
+    def period(self) -> None:
+        """The wake-ups suffice."""
+
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
         """The view itself, which a session therefore reads once for all vehicles."""
-        return _see_all
+        return see_all
 
 
-def _see_all(view: View, ego: Observed) -> View:  # noqa: ARG001  (See's argument)
+def see_all(view: View, ego: Observed) -> View:  # noqa: ARG001  (See's argument)
+    """The view itself."""
     return view
 
 

@@ -6,6 +6,10 @@ every controller (common random numbers), whatever the controller draws.
 
 from __future__ import annotations
 
+import hashlib
+import math
+import struct
+
 import numpy as np
 
 from minisim.errors import choice, integer
@@ -19,3 +23,30 @@ def stream(seed: int, name: str) -> np.random.Generator:
     integer("seed", seed, low=0)
     key = STREAMS.index(choice("random stream", name, STREAMS))
     return np.random.default_rng(np.random.SeedSequence(entropy=seed, spawn_key=(key,)))
+
+
+class Draws:
+    """Random numbers by what they are for: the same in whatever order they are asked for.
+
+    A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step. So one
+    more question never shifts the answers to others, as it would in a stream. The hash is BLAKE2b
+    (RFC 7693), whose key is drawn from the stream.
+
+    Args:
+        seed: of the run.
+        name: of the stream.
+    """
+
+    def __init__(self, seed: int, name: str) -> None:
+        self._key = stream(seed, name).bytes(32)
+
+    def uniform(self, *of: int) -> float:
+        """A number uniform on (0, 1), both ends excluded."""
+        words = struct.pack(f"<{len(of)}q", *of)
+        digest = hashlib.blake2b(words, digest_size=8, key=self._key).digest()
+        return ((int.from_bytes(digest, "little") >> 12) + 0.5) * 2.0**-52
+
+    def normal(self, *of: int) -> float:
+        """A number of the standard normal distribution (Box & Muller 1958)."""
+        radius = math.sqrt(-2.0 * math.log(self.uniform(*of, 0)))
+        return radius * math.cos(2.0 * math.pi * self.uniform(*of, 1))

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import scenarios
 from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue, webster, webster_delay
 from baselines.signals import Phase, Program
-from dim import Dim, ExactPerception, HarmonyMatrix, Zones, decide, explain
+from dim import Dim, ExactPerception, HarmonyMatrix, NoisyPerception, Zones, decide, explain
 from minisim import simulate
 from minisim.arrivals import Arrivals, Demand, read_arrivals
 from minisim.control import Marking, Plan, Site, Unregulated
@@ -113,6 +113,12 @@ CASES = {
         Dim,
         {"order": "size", "commit": "stoppable", "gate": "clear", "priorities": None,
          "zones": Zones(), "matrix": None, "perception": ExactPerception(), "period": None},
+    ),
+    "NoisyPerception": Case(
+        NoisyPerception,
+        {"intent_error": 0.15, "kind": "missed", "shared": True, "persistent": False,
+         "unsignalled": (0.3, 0.25), "confidence": 0.9, "sensor_range": 30.0, "occlusion": True,
+         "delay": 0.5, "position_noise": 0.1, "speed_noise": 0.1, "frame": 0.1},
     ),
     "FixedTime": Case(
         FixedTime,

@@ -220,6 +220,9 @@ def test_sessions_share_nothing_but_the_table() -> None:
 class Blind:
     """Everyone sees only itself."""
 
+    name = "blind"
+    period = None
+
     def start(self, site: Site) -> See:
         return lambda view, ego: View(view.time, (ego,))
 
