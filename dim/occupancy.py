@@ -15,23 +15,30 @@ import numpy as np
 import shapely
 
 from minisim.control import CLEARANCE, Site
-from minisim.geometry import SWEEP_STEP, Bools, Floats, Intersection, Path
+from minisim.geometry import Bools, Floats, Intersection, Path
 from minisim.vehicle import VehicleType
+
+#: Grid of positions [m].
+STEP = 0.25
+
+#: Room between a body and another that passes it at a crawl, or is seen to stand [m]: the buffer
+#: of 0.25 m around one of the two (see `minisim.control.CLEARANCE`).
+CLOSE = 0.25
 
 
 class Area(NamedTuple):
-    """The conflict area of two movements, on a grid of `SWEEP_STEP` from the junction entry on.
+    """The conflict area of two movements, on a grid of `STEP` from the junction entry on.
 
     Rows are positions of the first vehicle's front past the entry, columns of the second's; a
     position before the entry counts as the entry, one past the grid is out of the area.
 
     Attributes:
-        near: whether the bodies come closer than `CLEARANCE`, anywhere within one step of the
-            grid point.
-        ever: whether they do at this or a later position of the second vehicle.
+        close: whether the bodies come closer than `CLOSE`, anywhere within one step of the grid
+            point.
+        ever: whether they come closer than `CLEARANCE` at this or a later position of the second.
     """
 
-    near: Bools
+    close: Bools
     ever: Bools
 
     def room(self, first: float, second: float) -> float:
@@ -40,25 +47,21 @@ class Area(NamedTuple):
 
     def way(self, first: float, second: float) -> float:
         """How far the first may still go while the second stands where it is [m]."""
-        return _free(self.near, first, second)
+        return _free(self.close, first, second)
 
     def touches(self, first: Floats, second: Floats) -> bool:
-        """Whether the bodies come too near at any of these moments (positions past the entry)."""
+        """Whether the bodies come close at any of these moments (positions past the entry)."""
         rows, columns = _index(first), _index(second)
-        inside = (rows < len(self.near)) & (columns < self.near.shape[1])
-        return bool(self.near[rows[inside], columns[inside]].any())
-
-    def begins(self) -> float:
-        """How far past the entry the second vehicle may be before it can matter at all [m]."""
-        return float(np.flatnonzero(self.near.any(axis=0))[0]) * SWEEP_STEP
+        inside = (rows < len(self.close)) & (columns < self.close.shape[1])
+        return bool(self.close[rows[inside], columns[inside]].any())
 
     def ends(self, second: float) -> float:
         """From where on the first is out of the area for a second as far as this or further [m]."""
-        column = max(int(second / SWEEP_STEP), 0)
+        column = max(int(second / STEP), 0)
         if column >= self.ever.shape[1]:
             return 0.0
         rows = np.flatnonzero(self.ever[:, column])
-        return float(rows[-1] + 1) * SWEEP_STEP if len(rows) else 0.0
+        return float(rows[-1] + 1) * STEP if len(rows) else 0.0
 
 
 def area(site: Site, first: int, second: int) -> Area | None:
@@ -77,38 +80,46 @@ def showing(site: Site, tolerance: float) -> Floats:
 
 
 def _index(position: Floats) -> np.typing.NDArray[np.intp]:
-    return np.maximum(np.floor(position / SWEEP_STEP), 0.0).astype(np.intp)
+    return np.maximum(np.floor(position / STEP), 0.0).astype(np.intp)
 
 
 def _free(blocked: Bools, first: float, second: float) -> float:
-    row, column = max(int(first / SWEEP_STEP), 0), max(int(second / SWEEP_STEP), 0)
+    row, column = max(int(first / STEP), 0), max(int(second / STEP), 0)
     if row >= blocked.shape[0] or column >= blocked.shape[1]:
         return math.inf
     ahead = np.flatnonzero(blocked[row:, column])
     if len(ahead) == 0:
         return math.inf
-    return max(float(row + ahead[0]) * SWEEP_STEP - first, 0.0)
+    return max(float(row + ahead[0]) * STEP - first, 0.0)
 
 
 @lru_cache(maxsize=4096)
 def _area(
     intersection: Intersection, length: float, width: float, first: int, second: int
 ) -> Area | None:
-    vehicle = VehicleType(length=length, width=width)
-    paths = intersection.paths
-    one, other = _bodies(paths[first], vehicle), _bodies(paths[second], vehicle)
-    near = np.asarray(shapely.dwithin(one[:, None], other[None, :], CLEARANCE))
+    near, close = _grids(intersection, length, width, min(first, second), max(first, second))
     if not near.any():
         return None
-    near = _widened(near)
-    ever = np.logical_or.accumulate(near[:, ::-1], axis=1)[:, ::-1]
-    return Area(near, ever)
+    if first > second:
+        near, close = near.T, close.T
+    return Area(close, np.logical_or.accumulate(near[:, ::-1], axis=1)[:, ::-1])
+
+
+@lru_cache(maxsize=4096)
+def _grids(
+    intersection: Intersection, length: float, width: float, first: int, second: int
+) -> tuple[Bools, Bools]:
+    """Whether the bodies come closer than `CLEARANCE`, and than `CLOSE`, near each grid point."""
+    vehicle = VehicleType(length=length, width=width)
+    one, other = (_bodies(intersection.paths[k], vehicle) for k in (first, second))
+    distance = shapely.distance(one[:, None], other[None, :])
+    return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
 
 
 def _bodies(path: Path, vehicle: VehicleType) -> np.typing.NDArray[np.object_]:
     """The body with its front at each grid point, until its rear has left the junction."""
     last = path.exit - path.entry + vehicle.length
-    s = np.arange(0.0, last + SWEEP_STEP, SWEEP_STEP)
+    s = np.arange(0.0, last + STEP, STEP)
     return np.asarray(shapely.polygons(path.bodies(path.entry + s, vehicle)))
 
 
