@@ -35,7 +35,7 @@ import numpy as np
 from dim.harmony import HarmonyMatrix
 from dim.occupancy import Area, area, showing
 from dim.perception import UNKNOWN
-from minisim.control import Brake, Command, Observed, Site, View, can_stop
+from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
 from minisim.errors import number
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
@@ -123,6 +123,7 @@ class Watch:
         self._a, self._b = vehicle.acceleration, vehicle.deceleration
         asked = monitor.deceleration or vehicle.max_deceleration
         self._b_max = min(asked, vehicle.max_deceleration)
+        self._gentle = min(self._b, self._b_max)
         self._readings: dict[tuple[int, int], set[int]] = {}
         self._braking: dict[int, float] = {}
 
@@ -132,24 +133,28 @@ class Watch:
         """Whether a vehicle goes: as it decided, or alone where all stand and wait.
 
         Args:
-            view: the true one, for its time.
+            view: the true one; of others only where they are and how fast is taken from it.
             seen: what the ego sees.
             decided: whether it goes by its own decision.
             ranks: of the lanes, 0 first.
         """
-        others = [v for v in seen.vehicles if v.id != ego.id and v.distance <= self._sight]
-        free = not any(v.distance < 0.0 or not can_stop(v, self._b) for v in others)
-        here = ego.distance >= 0.0 and can_stop(ego, self._b)
-        if ego.id in self._alone:
-            if free or not here:
+        alone = ego.id in self._alone
+        if not alone and (decided or ego.speed >= STANDING):
+            self._since.pop(ego.id, None)
+            return decided
+        ids = {v.id for v in seen.vehicles}
+        near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
+        free = not any(self._crosses(v) for v in near if v.id != ego.id)
+        if alone:
+            if free or self._crosses(ego):
                 return True
             self._alone.discard(ego.id)
             return False
-        fronts = {v.lane: v for v in reversed(seen.vehicles) if 0.0 <= v.distance <= self._sight}
-        waits = not decided and free and all(v.speed < STANDING for v in fronts.values())
-        if not waits or fronts[ego.lane].id != ego.id:
+        fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
+        stuck = free and all(v.speed < STANDING for v in fronts.values())
+        if not stuck or fronts.get(ego.lane) != ego:
             self._since.pop(ego.id, None)
-            return decided
+            return False
         since = self._since.setdefault(ego.id, view.time)
         if view.time < since + self._patience or min(fronts, key=ranks.__getitem__) != ego.lane:
             return False
@@ -165,7 +170,7 @@ class Watch:
             seen: what each vehicle in it that can decide sees, by id.
             going: ids of those who hold a right of way.
         """
-        crossing = [v for v in view.vehicles if v.distance < 0.0 or not can_stop(v, self._b)]
+        crossing = [v for v in view.vehicles if self._crosses(v)]
         inside = {v.id for v in crossing}
         egos = [v for v in view.vehicles if v.id in seen and (v.id in going or v.id in inside)]
         here = seen.keys()
@@ -193,6 +198,9 @@ class Watch:
             if braking.get(ego.id, 0.0) != self._braking.get(ego.id, 0.0):
                 yield Brake(ego.id, braking.get(ego.id, 0.0))
         self._braking = braking
+
+    def _crosses(self, vehicle: Observed) -> bool:
+        return vehicle.distance < 0.0 or not can_stop(vehicle, self._b)
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
         """How hard the ego has to brake for another, whatever that may do [m/s²]; 0 not at all."""
@@ -230,8 +238,8 @@ class Watch:
                 return 0.0
         if self._passes_first(ego, other, shared, mirrored):
             return 0.0
-        if not first and ego.distance > 0.0:
-            room = min(room, ego.distance)
+        if not first and stopping_distance(ego.speed, self._b_max) + ROOM <= ego.distance:
+            room = min(room, ego.distance)  # there it keeps nobody from clearing the junction
         return self._braking_for(ego, other, room - ROOM, shared)
 
     def _open(self, mine: int, x: float, other: Observed) -> bool:
@@ -254,10 +262,10 @@ class Watch:
         v, a, dt = ego.speed, self._a, self._site.dt
         after = v + a * dt
         left = room - (v + after) / 2.0 * dt
-        if left > 0.0 and after * after <= 2.0 * self._b * left:
+        if left > 0.0 and after * after <= 2.0 * self._gentle * left:
             return 0.0
         if room > 0.0 and v * v <= 2.0 * self._b_max * room:
-            return max(self._b, v * v / (2.0 * room))
+            return max(self._gentle, v * v / (2.0 * room))
         if self._touches(ego, -self._b_max, other, shared) and not self._touches(
             ego, a, other, shared
         ):
