@@ -4,6 +4,7 @@ from dim.as_run import AsRunDim
 from dim.controller import Dim
 from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
+from dim.monitor import Monitor
 from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
@@ -15,6 +16,7 @@ __all__ = [
     "ExactPerception",
     "Explanation",
     "HarmonyMatrix",
+    "Monitor",
     "NoisyPerception",
     "Perception",
     "Zones",

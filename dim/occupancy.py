@@ -90,7 +90,7 @@ def _free(blocked: Bools, first: float, second: float) -> float:
     ahead = np.flatnonzero(blocked[row:, column])
     if len(ahead) == 0:
         return math.inf
-    return max(float(row + ahead[0]) * STEP - first, 0.0)
+    return max(int(row + ahead[0]) * STEP - first, 0.0)
 
 
 @lru_cache(maxsize=4096)

@@ -12,7 +12,7 @@ import pytest
 
 import minisim
 from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import AsRunDim, Dim
+from dim import AsRunDim, Dim, Monitor, NoisyPerception
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -53,6 +53,7 @@ CONTROLLERS: tuple[Controller, ...] = (
     Dim(priorities="rotating"),
     Dim(order="lanes", priorities="waiting"),
     Dim(gate="harmonious", priorities="waiting"),
+    Dim(perception=NoisyPerception(intent_error=0.15, kind="symmetric"), monitor=Monitor()),
     FixedTime(),
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),
