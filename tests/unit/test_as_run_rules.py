@@ -286,6 +286,11 @@ def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     assert plan.lanes_open
 
 
+def test_behind_a_long_approach_no_reach_is_asked_for() -> None:
+    plan = AsRunDim().start(four_way(profile="as_run", arm_length=700.0).site()).plan
+    assert plan.reach == 0.0
+
+
 def test_names_and_orders() -> None:
     assert isinstance(controller_named("dim", "as_run"), AsRunDim)
     assert controller_named("dim", "as_run") == AsRunDim(order="lanes")

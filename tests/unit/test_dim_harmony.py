@@ -245,11 +245,19 @@ def test_unreadable_and_unwritable_paths(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(FileError, match="cannot read harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot read harmony matrix"):
         HarmonyMatrix.from_csv(path)
-    with pytest.raises(FileError, match="cannot write harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot write harmony matrix"):
         HarmonyMatrix.paper(3).to_csv(path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_reason_of_the_system_is_told_without_its_number(tmp_path: Path) -> None:
+    path = tmp_path / "missing" / "m.csv"
+    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
+        HarmonyMatrix.from_csv(path)
+    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
+        HarmonyMatrix.paper(3).to_csv(path)
 
 
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])

@@ -65,6 +65,24 @@ def test_no_wait_counts_more_than_the_memory() -> None:
     assert ranks == [(2, 3, 1, 0), (0, 3, 1, 2)]  # c, d alike, and d's turn; then all, and a's
 
 
+def test_waits_that_differ_by_rounding_tie_and_others_do_not() -> None:
+    """2e-7 s apart are one instant, and the turn decides; 0.4 s apart are not."""
+    one_turn = {"memory": 50.0, "turn_time": 100.0}
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-7}, **one_turn).ranks == (0, 1)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 0.4}, **one_turn).ranks == (1, 0)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-6}, **one_turn).ranks == (1, 0)
+
+
+def test_ranks_hold_until_a_wait_reaches_the_memory_or_the_turn_ends() -> None:
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 100.0).until == 32.0
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 31.0).until == 31.0
+    assert longest_waiting(30.0, 3, {1: 22.0}, 8.0, 100.0).until == 100.0  # it has just done so
+
+
+def test_who_has_just_come_is_before_nobody() -> None:
+    assert longest_waiting(0.0, 3, {2: 0.0}, 8.0, 100.0).ranks == (1, 2, 0)
+
+
 def test_memory_is_how_long_everybody_has_watched() -> None:
     """100 m range, yellow zone from 8 m: 92 m at 40 km/h."""
     site = four_way().site()

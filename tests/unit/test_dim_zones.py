@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 
 import pytest
 
@@ -99,7 +100,8 @@ def test_a_speed_above_the_limit_is_painted_on_the_whole_red_zone() -> None:
     ],
 )
 def test_zones_are_checked(field: str, value: object) -> None:
-    with pytest.raises(InputError, match=field.split("_")[0]):
+    label = "red_speed [m/s]" if field == "red_speed" else f"{field} zone [m]"
+    with pytest.raises(InputError, match=rf"^{re.escape(label)} must be"):
         Zones(**{field: value})  # type: ignore[arg-type]
 
 

@@ -148,6 +148,15 @@ def test_answers_that_depend_on_the_order_are_found(monkeypatch: pytest.MonkeyPa
     assert [claim.name for claim in analysis.claims if not claim.holds] == ["order"]
 
 
+def test_progress_is_told_every_256_cases_and_at_the_end() -> None:
+    told: list[tuple[int, int]] = []
+    analyse(HarmonyMatrix.paper(3), progress=lambda *done: told.append(done))
+    analyse(HarmonyMatrix.paper(4), progress=lambda *done: told.append(done))
+    analyse(HarmonyMatrix.paper(5), progress=lambda *done: told.append(done))
+    expected = [*range(256, 3124, 256), 3124]
+    assert told == [(26, 26), (255, 255), *((case, 3124) for case in expected)]
+
+
 def test_too_many_cases_are_refused() -> None:
     with pytest.raises(InputError, match="8 arms have 16777215 cases"):
         analyse(matrix_of(8))
