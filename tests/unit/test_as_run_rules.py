@@ -309,11 +309,28 @@ def test_the_exit_speed_can_be_that_of_the_signals() -> None:
         AsRunDim(order="alphabet")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"matrix": "paper"}, "^matrix must be "),
+        ({"names": 5}, "^names must be "),
+        ({"names": "abca"}, "^names must be different letters, got 'abca'"),
+        ({"exit_speed": -1.0}, r"^exit_speed \[m/s\] must be "),
+        ({"order": "first"}, "unknown order 'first'"),
+    ],
+)
+def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        AsRunDim(**arguments)  # type: ignore[arg-type]
+
+
 def test_sites_that_the_rules_do_not_fit() -> None:
     with pytest.raises(InputError, match="3, 4 or 5 arms"):
         AsRunDim().start(regular(6, profile="as_run").site())
     with pytest.raises(InputError, match="matrix is for 3 arms"):
         AsRunDim(matrix=HarmonyMatrix.paper(3)).start(four_way().site())
+    with pytest.raises(InputError, match="names must be 4 letters, one an arm, got 'abc'"):
+        AsRunDim(names="abc").start(four_way().site())
     with pytest.raises(InputError, match="zones begin"):
         AsRunDim().start(four_way(arm_length=300.0).site())
     assert set(BOUND) == set(MAKERS)

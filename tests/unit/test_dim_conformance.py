@@ -73,6 +73,13 @@ def test_of_two_on_one_movement_the_last_one_leaves_it() -> None:
     assert checked.state.inside == 0
 
 
+def test_on_the_line_it_is_not_yet_inside() -> None:
+    checked = session()
+    checked.decide(view(0.0, seen(7, 1, 2, 6.0, 1.0)))
+    checked.decide(view(1.0, seen(7, 1, 2, 0.0, 1.0)))
+    assert checked.state == State((None, (2, COMMITTED, True), None, None))
+
+
 def test_a_vehicle_that_appears_inside_is_refused() -> None:
     with pytest.raises(ConformanceError, match=r"^at 3\.0 s vehicle 9 is inside unseen$"):
         session().decide(view(3.0, seen(9, 1, 2, -2.0)))

@@ -157,7 +157,7 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
     [
         (4, four()[:-1], "12 × 12, got 11 × 12"),
         (4, [row[:-1] for row in four()], "12 × 12, got 12 × 11"),
-        (4, [*four()[:-1], [0, 1]], "rows differ in length"),
+        (4, [*four()[:-1], [0, 1]], r"^a harmony matrix is square: its rows differ in length$"),
         (4, 1, "12 × 12, got 1"),
         (3, four(), "3 arms is 6 × 6, got 12 × 12"),
         (5, four(), "20 × 20"),
@@ -178,6 +178,12 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
 def test_what_is_no_harmony_matrix(n: object, values: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         HarmonyMatrix(n, values)  # type: ignore[arg-type]
+
+
+def test_numbers_of_numpy_become_python_numbers() -> None:
+    matrix = HarmonyMatrix(np.int64(4), four())  # type: ignore[arg-type]
+    assert type(matrix.n) is int
+    assert repr(matrix) == repr(HarmonyMatrix.paper(4))
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])

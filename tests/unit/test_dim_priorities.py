@@ -13,6 +13,7 @@ import minisim
 from dim import Dim, Zones
 from dim.controller import DimSession
 from dim.priorities import (
+    SAME_TIME,
     TURN_TIME,
     Watch,
     longest_waiting,
@@ -77,6 +78,7 @@ def test_ranks_hold_until_a_wait_reaches_the_memory_or_the_turn_ends() -> None:
     assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 100.0).until == 32.0
     assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 31.0).until == 31.0
     assert longest_waiting(30.0, 3, {1: 22.0}, 8.0, 100.0).until == 100.0  # it has just done so
+    assert longest_waiting(0.0, 3, {1: 0.0}, SAME_TIME, 100.0).until == 100.0
 
 
 def test_who_has_just_come_is_before_nobody() -> None:
