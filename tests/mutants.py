@@ -4,6 +4,7 @@
     python tests/mutants.py results                # those that survived
     python tests/mutants.py show MUTANT            # what was changed
     python tests/mutants.py table                  # how many, by module
+    python tests/mutants.py sample 80              # names of mutants drawn at random, to `run`
 
 As it comes, mutmut has pytest collect the tests anew for every mutant, which takes longer than to
 run them. Here they are collected once, and each mutant is tried in a fork of that process: by the
@@ -13,6 +14,7 @@ tests that reach the changed function, fast ones first, up to the first that fai
 from __future__ import annotations
 
 import json
+import math
 import os
 import random
 import signal
@@ -133,22 +135,42 @@ def sample(size: int) -> None:
 
 @cli.command()
 def table() -> None:
-    """Print how many mutants there are and how many survived, by module."""
-    total: Counter[str] = Counter()
-    print("| module | mutants | killed | survived | score |\n|---|---|---|---|---|")
+    """Print how many mutants there are, were tried and survived, by module."""
+    print("| module | mutants | tried | killed | survived | score | 95 % interval |")
+    print("|---|---|---|---|---|---|---|")
+    everything: list[int | None] = []
     for module, codes in _verdicts().items():
-        counts = Counter(status_by_exit_code[code] for code in codes.values() if code is not None)
-        if counts:
-            print(_row(f"`{module}`", counts))
-        total += counts
-    print(_row("all", total))
+        if codes:
+            print(_row(f"`{module}`", list(codes.values())))
+            everything += codes.values()
+    print(_row("all", everything))
 
 
-def _row(name: str, counts: Counter[str]) -> str:
-    tried = counts.total()
-    survived = counts["survived"] + counts["no tests"]
-    score = 100.0 * (tried - survived) / max(tried, 1)
-    return f"| {name} | {tried} | {tried - survived} | {survived} | {score:.1f} % |"
+def _row(name: str, codes: list[int | None]) -> str:
+    verdicts = Counter(status_by_exit_code[code] for code in codes if code is not None)
+    tried, survived = verdicts.total(), verdicts["survived"] + verdicts["no tests"]
+    killed = tried - survived
+    score = f"{100.0 * killed / tried:.1f} %" if tried else "–"
+    low, high = _interval(killed, tried)
+    return (
+        f"| {name} | {len(codes)} | {tried} | {killed} | {survived} | {score} | "
+        f"{100.0 * low:.0f}–{100.0 * high:.0f} % |"
+    )
+
+
+def _interval(killed: int, tried: int) -> tuple[float, float]:
+    """What share would be killed if all were tried: Wilson's score interval at 95 %.
+
+    Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
+    Assoc. 22 (1927).
+    """
+    if not tried:
+        return 0.0, 1.0
+    z = 1.96
+    share, weight = killed / tried, z * z / tried
+    centre = (share + weight / 2.0) / (1.0 + weight)
+    half = z / (1.0 + weight) * math.sqrt((share * (1.0 - share) + weight / 4.0) / tried)
+    return centre - half, centre + half
 
 
 if __name__ == "__main__":

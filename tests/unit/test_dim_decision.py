@@ -306,5 +306,15 @@ def test_priorities_are_a_permutation_of_the_lanes(priorities: object) -> None:
         decide(["a1"], HarmonyMatrix.paper(4), "size", priorities)  # type: ignore[arg-type]
 
 
+def test_wrong_priorities_are_named() -> None:
+    message = r"^priorities of 4 lanes are the ranks 0 … 3, each once, got \(0, 1, 2, 2\)$"
+    with pytest.raises(InputError, match=message):
+        lane_ranks([0, 1, 2, 2], 4)
+    with pytest.raises(InputError, match=r"^priorities must be a sequence of lane ranks"):
+        lane_ranks(4, 4)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^lane rank must be an integer of at least 0, got -1"):
+        lane_ranks([-1, 0, 1], 3)
+
+
 def test_default_priorities_are_the_lanes_own_order() -> None:
     assert lane_ranks(None, 4) == lane_ranks([0, 1, 2, 3], 4) == (0, 1, 2, 3)

@@ -268,9 +268,9 @@ def test_the_reason_of_the_system_is_told_without_its_number(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])
 def test_a_path_is_text(path: object) -> None:
-    with pytest.raises(InputError, match="path of a harmony matrix"):
+    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.from_csv(path)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="path of a harmony matrix"):
+    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]
 
 

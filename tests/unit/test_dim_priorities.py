@@ -94,12 +94,14 @@ def test_memory_is_how_long_everybody_has_watched() -> None:
     with pytest.raises(InputError, match="sensors that reach 8 m"):
         Dim(priorities="waiting", sensor_range=8.0).start(site)
     Dim(priorities="rotating", sensor_range=8.0).start(site)
+    assert memory_of(site, Zones(), 8.5) == pytest.approx(0.5 / (40.0 / 3.6))
 
 
 def test_a_watch_notes_who_passes_the_start() -> None:
     watch = Watch(8.0)
     assert watch.look(1.0, [car(1, 0, 8.1)]) == {}
     assert watch.look(2.0, [car(1, 0, 7.9), car(5, 2, 3.0)]) == {0: 2.0, 2: 2.0}
+    assert Watch(8.0).look(2.0, [car(1, 0, 8.0), car(5, 2, 0.0)]) == {0: 2.0, 2: 2.0}
     assert watch.look(3.0, [car(1, 0, -1.0), car(2, 0, 6.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 2.0}
     assert watch.look(4.0, [car(2, 0, 2.0)]) == {0: 3.0}
     assert watch.look(5.0, [car(2, 0, 2.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 5.0}

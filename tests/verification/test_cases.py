@@ -117,6 +117,8 @@ def test_orders() -> None:
     around = list(node_orders(four, 6))
     assert len(set(around)) == 8
     assert {order[0] for order in around} == set(four)
+    a, b, c, d = four
+    assert around[:4] == [(a, b, c, d), (a, d, c, b), (b, c, d, a), (b, a, d, c)]
 
 
 WRONG = {
