@@ -132,6 +132,7 @@ ENTER = Event("enter", 1, 2)
         (True, [(State((None, ENTERS, None), 1), ENTER),
                 (State((None, ENTERS, None), 1), Event("leave", 0, 1))]),
         (True, [(State((None, ENTERS, None), 1), ENTER), (State((None, ENTERS, None)), ENTER)]),
+        (True, [(State((None, ENTERS, None)), ENTER), (State((None, ENTERS, None), 1), ENTER)]),
         (True, [(State((None, ENTERS, None), 8), ENTER)]),  # others follow b2
     ],
 )  # fmt: skip

@@ -110,7 +110,8 @@ def test_a_watch_notes_who_passes_the_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"turn_time": 0.0}, "turn_time"),
+        ({"turn_time": 0.9}, "turn_time"),
+        ({"turn_time": 3600.5}, "turn_time"),
         ({"turn_time": "10"}, "turn_time"),
         ({"sensor_range": 0.0}, "sensor_range"),
         ({"priorities": "rotate"}, "unknown priorities 'rotate'.*did you mean 'rotating'"),

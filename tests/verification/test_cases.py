@@ -70,6 +70,10 @@ def test_lanes_first_is_not_always_the_largest(n: int) -> None:
     false = {claim.name: claim.failures for claim in analysis.claims if not claim.holds}
     assert false == {"largest": SMALLER[n]}
     check(analysis, n)
+    by_lanes, by_size = (DecisionTable(analysis.matrix, order) for order in ("lanes", "size"))
+    differing = [m for m in by_size if by_lanes.decide(m) != by_size.decide(m)]
+    for claim in analysis.claims:
+        assert claim.example == (None if claim.holds else min(differing, key=len))
 
 
 def test_ties_of_the_papers_255_cases() -> None:
