@@ -14,6 +14,7 @@ from dim.as_run import (
     HELD_SPEED,
     RED_SPEED,
     AsRunRules,
+    AsRunSession,
     Car,
     winner,
 )
@@ -255,6 +256,26 @@ def test_the_session_reads_views_and_tells_changes_once() -> None:
     assert session.rules.action == [7]
     assert list(session.decide(seen(508.1))) == [Advise(7, 20.0), Wake(50.01)]
     assert list(session.decide(View(60.0, ()))) == []
+
+
+def test_the_recipe_reaches_the_rules() -> None:
+    dim = AsRunDim("size", HarmonyMatrix.paper(4), "acbd", 14.0)
+    made = dim.start(four_way(profile="as_run").site()).rules
+    assert (made.arms, made.order, made.names, made.exit_speed) == (4, "size", "acbd", 14.0)
+    assert made.matrix is dim.matrix
+    with pytest.raises(InputError, match=r"^site must be a Site"):
+        AsRunSession("site", made)  # type: ignore[arg-type]
+
+
+def test_the_session_names_vehicles_by_second_lane_and_manoeuvre() -> None:
+    """v100.b_2 before v20.a_1 and v20.a_2, whatever their ids and whoever is in front."""
+    session = AsRunDim().start(four_way(profile="as_run").site())
+    distance = 492.8 - 4.1 - 486.0
+    cars = [(1, 0, 2, 20.9), (2, 0, 1, 20.0), (3, 1, 2, 100.0)]
+    session.decide(
+        View(110.0, tuple(Observed(k, lane, j, distance, 0.0, 4.0, t) for k, lane, j, t in cars))
+    )
+    assert session.rules.action == [3, 2, 1]
 
 
 def test_nobody_is_told_anything_that_is_not_in_the_view() -> None:

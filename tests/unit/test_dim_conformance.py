@@ -93,6 +93,22 @@ def test_a_vehicle_that_went_without_the_right_of_way_is_refused() -> None:
         checked.decide(view(1.5, a, seen(2, 1, 2, -0.5, 5.0)))
 
 
+def test_by_the_papers_rule_it_rolls_unseen_into_the_junction() -> None:
+    checked = session(Dim(commit="paper"))
+    checked.decide(view(0.0, seen(1, 0, 2, 6.0, 1.0)))
+    checked.decide(view(1.0, seen(1, 0, 2, -0.5, 5.0)))
+    assert checked.state == State((None,) * 4, 1 << 1)
+    assert checked.steps == 6  # arrive, look, roll, commit, enter, look
+
+
+def test_by_the_papers_rule_nobody_backs_out_of_being_committed() -> None:
+    checked = session(Dim(commit="paper"))
+    checked.decide(view(0.0, seen(1, 0, 2, 6.0, 1.0)))
+    checked.decide(view(1.0, seen(1, 0, 2, 0.9, 1.0)))  # past half of the green zone of 2 m
+    with pytest.raises(ConformanceError, match=r"^at 2\.0 s: slow a2 is not possible"):
+        checked.decide(view(2.0, seen(1, 0, 2, 1.5, 1.0)))
+
+
 def test_no_event_but_a_look_is_a_look() -> None:
     checked = session()
     checked.decide(view(0.0, seen(1, 0, 2, 6.0, 1.0)))

@@ -138,7 +138,9 @@ def test_nobody() -> None:
     assert decide([], matrix) == ()
     assert DecisionTable(matrix).lanes(0) == 0
     assert DecisionTable(matrix).decide([]) == ()
-    with pytest.raises(InputError, match="at least one participant"):
+    with pytest.raises(
+        InputError, match=r"^a decision needs at least one participant, such as a1$"
+    ):
         explain([], matrix)
 
 

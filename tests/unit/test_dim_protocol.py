@@ -148,6 +148,7 @@ def test_a_turn_ends_after_a_decision_or_when_nobody_is_there() -> None:
     after = happens(rules, decided)["turn"]
     assert (after.turn, after.decided) == (1, False)
     assert goes(rules, after) == "b"  # a2 and b2 are in conflict, and it is b's turn
+    assert rules.look(state(front("a1"))).decided
     frozen = state(front("a2"), inside=B2)  # no decision: somebody crosses
     assert not rules.look(frozen).decided
     assert not rules.look(state(inside=B2)).decided
