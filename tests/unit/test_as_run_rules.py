@@ -224,6 +224,13 @@ def test_the_first_clique_in_the_alphabet_wins_whatever_its_size() -> None:
     assert winner(matrix, frozenset(), "lanes") == ()
 
 
+@pytest.mark.parametrize(("order", "chosen"), [("lanes", (1,)), ("size", (2, 4))])
+def test_the_rules_decide_by_their_order(order: str, chosen: tuple[int, ...]) -> None:
+    rule = rules(4, order)
+    step(rule, car("v1.a_3", 486.0), car("v2.b_2", 486.0), car("v4.d_2", 486.0))
+    assert rule.chosen == chosen
+
+
 @pytest.mark.parametrize(("arms", "differ", "cases"), [(3, 1, 26), (4, 26, 255), (5, 508, 3124)])
 def test_how_often_the_orders_differ(arms: int, differ: int, cases: int) -> None:
     """The counts of as_run.md, one vehicle a lane."""

@@ -269,7 +269,7 @@ def test_who_is_admitted_beside_crossing_vehicles(
         (["a4"], "no movement 'a4'"),
         ([5], "no movement 5"),
         ([10**5000], "no movement a int too large"),
-        ("a1", "must be a sequence of movements such as a1, b2"),
+        ("a1", "^participants must be a sequence of movements such as a1, b2"),
         (7, "must be a sequence"),
     ],
 )

@@ -35,7 +35,9 @@ class OneOf(Protocol):
 
 def test_all_states_of_a_lone_lane() -> None:
     """The lane empty, waiting, going, committed; then inside, and another one waiting for ever."""
-    found = explore(OneOf(PAPER))
+    protocol = OneOf(PAPER)
+    found = explore(protocol)
+    assert found.protocol is protocol
     assert (found.states, found.transitions) == (6, 5)
     assert (found.complete, found.unsafe) == (True, ())
     path = [str(event) for event in found.stuck or ()]

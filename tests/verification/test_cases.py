@@ -76,6 +76,14 @@ def test_lanes_first_is_not_always_the_largest(n: int) -> None:
         assert claim.example == (None if claim.holds else min(differing, key=len))
 
 
+@pytest.mark.parametrize("order", ["size", "lanes"])
+def test_the_claims_hold_with_given_priorities(order: str) -> None:
+    analysis = analyse(HarmonyMatrix.paper(4), order, (2, 3, 1, 0))
+    assert analysis.priorities == (2, 3, 1, 0)
+    assert {c.name for c in analysis.claims if not c.holds} <= {"largest"}
+    assert analysis.holds == (order == "size")
+
+
 def test_ties_of_the_papers_255_cases() -> None:
     analysis = analyse(HarmonyMatrix.paper(4))
     assert analysis.tied == 130
