@@ -231,6 +231,14 @@ def test_the_rules_decide_by_their_order(order: str, chosen: tuple[int, ...]) ->
     assert rule.chosen == chosen
 
 
+@pytest.mark.parametrize(("names", "chosen"), [("abcd", (2,)), ("acbd", (3,))])
+def test_the_rules_decide_by_the_arms_names(names: str, chosen: tuple[int, ...]) -> None:
+    """b2 and c2 are in conflict; in the runs at 4:1:4:1 the second arm was called c."""
+    rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", names)
+    step(rule, car("v2.b_2", 486.0), car("v3.c_2", 486.0))
+    assert rule.chosen == chosen
+
+
 @pytest.mark.parametrize(("arms", "differ", "cases"), [(3, 1, 26), (4, 26, 255), (5, 508, 3124)])
 def test_how_often_the_orders_differ(arms: int, differ: int, cases: int) -> None:
     """The counts of as_run.md, one vehicle a lane."""
@@ -331,6 +339,7 @@ def test_the_exit_speed_can_be_that_of_the_signals() -> None:
     """as_run.md, discrepancy 15."""
     rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", exit_speed=14.0)
     assert step(rule, car("v1.a_1", 508.01)) == {1: 14.0}
+    assert AsRunDim(exit_speed=0.5).name == "dim-as-run-exit-0.5"
     with pytest.raises(InputError, match=r"exit_speed \[m/s\]"):
         AsRunDim(exit_speed=0.0)
     with pytest.raises(InputError, match="order"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from importlib import resources
 from pathlib import Path
 
@@ -74,6 +75,11 @@ def test_the_paper_has_three_matrices(n: int) -> None:
         HarmonyMatrix.paper(n)
 
 
+def test_a_number_of_arms_is_a_number() -> None:
+    with pytest.raises(InputError, match=r"^number of arms must be an integer"):
+        HarmonyMatrix.paper("4")  # type: ignore[arg-type]
+
+
 def test_vehicles_of_one_lane_are_never_in_harmony() -> None:
     intersection = Intersection((0.0, 80.0, 190.0, 260.0))
     matrix = HarmonyMatrix.from_geometry(intersection, clearance=0.0)
@@ -140,7 +146,7 @@ def test_unknown_movement(unknown: object) -> None:
 
 @pytest.mark.parametrize("pair", ["a1", ("a1",), ("a1", "b1", "c1")])
 def test_index_is_a_pair(pair: object) -> None:
-    with pytest.raises(InputError, match="indexed by two movements"):
+    with pytest.raises(InputError, match=re.escape(f"indexed by two movements, got {pair!r}")):
         HarmonyMatrix.paper(4)[pair]  # type: ignore[index]
 
 

@@ -152,6 +152,7 @@ def test_a_turn_ends_after_a_decision_or_when_nobody_is_there() -> None:
     frozen = state(front("a2"), inside=B2)  # no decision: somebody crosses
     assert not rules.look(frozen).decided
     assert not rules.look(state(inside=B2)).decided
+    assert rules.look(rules.start) == rules.start
     assert rules.look(decided._replace(inside=B2)).decided  # it stays made
     assert not protocol().look(waiting).decided  # of no importance elsewhere
     assert "turn" not in happens(protocol(), protocol().start)
