@@ -48,7 +48,7 @@ TIME_MARGIN = 1.0
 TOLERANCE = 0.3
 
 #: How far ahead motion is predicted where it is too late to stop clear of the area [s]: longer than
-#: a vehicle at 20 km/h takes through the junction; a longer one changes nothing.
+#: a vehicle at 20 km/h takes through the junction.
 LOOK_AHEAD = 4.0
 
 #: Who is slower than this stands [m/s]; SUMO's definition of waiting.
