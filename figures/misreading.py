@@ -86,7 +86,8 @@ def perception_figure(archive: Archive) -> Figure:
     _labels(panels.tolist())
     _title(figure, "What misread intents do to DIM on four arms, 250 veh/h/lane, profile fair")
     _legend(figure, [*LOOKS.values(), SILENT])
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    note = missing_note([results], lambda case: case.series == "dim")
+    lines.footnote(figure, f"{_NOTE}  {note}")
     return figure
 
 
@@ -110,7 +111,7 @@ def confidence_figure(archive: Archive) -> Figure:
     _title(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents misread "
                    "by all alike, lasting")  # fmt: skip
     _legend(figure, KIND_LOOKS.values())
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    lines.footnote(figure, f"{_NOTE}  {missing_note([results], lambda _: True)}")
     return figure
 
 
@@ -134,7 +135,7 @@ def perception_table(archive: Archive) -> Table:
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
         tuple(listed), labels=3,
-        notes=(f"{missing_note([results], lambda _: True)}  {_NOTE}",),
+        notes=(f"{_NOTE}  {missing_note([results], lambda _: True)}",),
     )  # fmt: skip
 
 
