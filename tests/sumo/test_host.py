@@ -27,6 +27,7 @@ from dim.tally import Tallied
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
+    Brake,
     Command,
     Controller,
     Go,
@@ -171,8 +172,18 @@ class _TimedSession:
         {0.0: (Go(0),), 10.0: (Advise(0, 0.0),), 30.0: (Advise(0, 9.0),)},
         {0.0: (Go(0),), 34.0: (Hold(0),), 60.0: (Open(0),)},
         {50.0: (Open(0),)},
+        {0.0: (Go(0),), 20.0: (Brake(0, 6.0),), 30.0: (Brake(0, 0.0),)},
+        {0.0: (Go(0),), 35.0: (Brake(0, 20.0),), 40.0: (Brake(0, 0.0),)},
     ],
-    ids=["go", "advise", "advise standstill", "revoke, hard braking", "open"],
+    ids=[
+        "go",
+        "advise",
+        "advise standstill",
+        "revoke, hard braking",
+        "open",
+        "brake",
+        "brake in the junction",
+    ],
 )
 def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
     ours, theirs = both(single(), Timed(script), record="all")
