@@ -53,15 +53,19 @@ class Point(NamedTuple):
 Measure = Callable[["pd.DataFrame"], Point | None]
 
 
-def perception_figure(archive: Archive) -> Figure:
+def perception_figure(archive: Archive, series: str = "dim") -> Figure:
     """Collisions, false grants and delay over the probability of an intent error.
+
+    Args:
+        archive: of the runs.
+        series: whose vehicles misread.
 
     Raises:
         MissingRunsError: nothing was run.
     """
     (results,) = archive.need("perception")
     rows = with_total_delay(results.good)
-    rows = rows[rows["series"] == "dim"]
+    rows = rows[rows["series"] == series]
     figure = style.new_figure(11.5, 7.4)
     panels = figure.subplots(len(KINDS), len(_measures()), squeeze=False)
     figure.subplots_adjust(
@@ -84,9 +88,10 @@ def perception_figure(archive: Archive) -> Figure:
             _scale(axes, title)
             axes.set_xticks(range(len(RATES)), [f"{rate:g}" for rate in RATES])
     _labels(panels.tolist())
-    _title(figure, "What misread intents do to DIM on four arms, 250 veh/h/lane, profile fair")
+    who = style.look(series).label
+    _title(figure, f"What misread intents do: {who}, four arms, 250 veh/h/lane, profile fair")
     _legend(figure, [*LOOKS.values(), SILENT])
-    note = missing_note([results], lambda case: case.series == "dim")
+    note = missing_note([results], lambda case: case.series == series)
     lines.footnote(figure, f"{_NOTE}  {note}")
     return figure
 

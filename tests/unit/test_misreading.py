@@ -8,7 +8,7 @@ import math
 import pandas as pd
 import pytest
 
-from dim import Dim, ExactPerception, NoisyPerception
+from dim import Dim, ExactPerception, Monitor, NoisyPerception
 from dim.intent import RATES
 from dim.noise import UNSIGNALLED
 from dim.tally import Tallied
@@ -93,13 +93,13 @@ def test_runs_without_tally_have_their_trips() -> None:
 
 def test_the_study_goes_over_rates_kinds_and_manners() -> None:
     cases = [c for c in STUDIES["perception"].cases if isinstance(c, Misreading)]
-    assert len(cases) == len(set(cases)) == 2 + 2 * 4 * 6 + 2 * 4 + 2
+    assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
     found = {
         (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
     }
     assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
     exact = [c.experiment(1).controller for c in cases if c.perception.period is None]
-    assert exact == [Dim(), Dim(order="lanes")]
+    assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
     assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
     keys = {c.experiment(1).key for c in cases}
     assert len(keys) == len(cases)
