@@ -39,15 +39,16 @@ from minisim.control import Brake, Command, Observed, Site, View, can_stop, stop
 from minisim.errors import number
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
-#: safe [s].
+#: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
 TIME_MARGIN = 1.0
 
 #: How far beside a path a vehicle may seem to be while it is on it [m]: the lateral error that
-#: automated driving on local roads must stay below (0.29 m; Reid et al., "Localization
-#: requirements for autonomous vehicles", SAE Int. J. Connected and Automated Vehicles 2(3), 2019).
+#: automated driving on local streets must stay below (0.29 m; Reid et al., "Localization
+#: requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv 1906.01061).
 TOLERANCE = 0.3
 
-#: How far ahead motion is predicted [s].
+#: How far ahead motion is predicted where it is too late to stop clear of the area [s]: longer than
+#: a vehicle at 20 km/h takes through the junction.
 LOOK_AHEAD = 4.0
 
 #: Who is slower than this stands [m/s]; SUMO's definition of waiting.
