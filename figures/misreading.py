@@ -53,15 +53,19 @@ class Point(NamedTuple):
 Measure = Callable[["pd.DataFrame"], Point | None]
 
 
-def perception_figure(archive: Archive) -> Figure:
+def perception_figure(archive: Archive, series: str = "dim") -> Figure:
     """Collisions, false grants and delay over the probability of an intent error.
+
+    Args:
+        archive: of the runs.
+        series: whose vehicles misread.
 
     Raises:
         MissingRunsError: nothing was run.
     """
     (results,) = archive.need("perception")
     rows = with_total_delay(results.good)
-    rows = rows[rows["series"] == "dim"]
+    rows = rows[rows["series"] == series]
     figure = style.new_figure(11.5, 7.4)
     panels = figure.subplots(len(KINDS), len(_measures()), squeeze=False)
     figure.subplots_adjust(
@@ -84,9 +88,11 @@ def perception_figure(archive: Archive) -> Figure:
             _scale(axes, title)
             axes.set_xticks(range(len(RATES)), [f"{rate:g}" for rate in RATES])
     _labels(panels.tolist())
-    _title(figure, "What misread intents do to DIM on four arms, 250 veh/h/lane, profile fair")
+    who = style.look(series).label
+    _title(figure, f"What misread intents do: {who}, four arms, 250 veh/h/lane, profile fair")
     _legend(figure, [*LOOKS.values(), SILENT])
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    note = missing_note([results], lambda case: case.series == series)
+    lines.footnote(figure, f"{_NOTE}  {note}")
     return figure
 
 
@@ -110,7 +116,7 @@ def confidence_figure(archive: Archive) -> Figure:
     _title(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents misread "
                    "by all alike, lasting")  # fmt: skip
     _legend(figure, KIND_LOOKS.values())
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    lines.footnote(figure, f"{_NOTE}  {missing_note([results], lambda _: True)}")
     return figure
 
 
@@ -134,7 +140,7 @@ def perception_table(archive: Archive) -> Table:
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
         tuple(listed), labels=3,
-        notes=(f"{missing_note([results], lambda _: True)}  {_NOTE}",),
+        notes=(f"{_NOTE}  {missing_note([results], lambda _: True)}",),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from baselines import (
     Reservation,
     V2ICAsRun,
 )
-from dim import AsRunDim, Dim, NoisyPerception
+from dim import AsRunDim, Dim, Monitor, NoisyPerception
 from dim.noise import CLASSIFIER, UNSIGNALLED
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -42,6 +42,7 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-lanes-rotating": lambda _: Dim(order="lanes", priorities="rotating"),
     "dim-lanes-waiting": lambda _: Dim(order="lanes", priorities="waiting"),
     "dim-paper-commit": lambda _: Dim(commit="paper"),
+    "dim-monitored": lambda _: Dim(monitor=Monitor()),
     "dim-symmetric-0.15": lambda _: Dim(perception=NoisyPerception(CLASSIFIER, "symmetric")),
     "dim-unsignalled": lambda _: Dim(perception=NoisyPerception(unsignalled=UNSIGNALLED)),
     "dim-occlusion": lambda _: Dim(perception=NoisyPerception(occlusion=True)),

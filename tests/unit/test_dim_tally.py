@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dim import DecisionTable, Dim, HarmonyMatrix, NoisyPerception, Perception
+from dim import DecisionTable, Dim, HarmonyMatrix, Monitor, NoisyPerception, Perception
 from dim.perception import See
 from dim.tally import Tallied, TallySession
 from minisim import simulate
@@ -76,7 +76,7 @@ def test_counting_changes_nothing(perception: NoisyPerception) -> None:
 
 @pytest.mark.parametrize(
     "dim", [Dim(), Dim(gate="harmonious"), Dim(order="lanes"), Dim(priorities="waiting"),
-            Dim(period=0.1)]
+            Dim(period=0.1), Dim(monitor=Monitor())]
 )  # fmt: skip
 def test_exact_perception_has_nothing_to_count(dim: Dim) -> None:
     """But the crossings: whoever is not in the junction or on the approach at the end."""

@@ -8,11 +8,13 @@ import math
 import pandas as pd
 import pytest
 
-from dim import Dim, ExactPerception, NoisyPerception
+from dim import Dim, ExactPerception, Monitor, NoisyPerception
 from dim.intent import RATES
 from dim.noise import UNSIGNALLED
 from dim.tally import Tallied
-from minisim.errors import InputError
+from minisim import simulate
+from minisim.errors import CollisionError, InputError
+from scenarios import four_way
 from scenarios.cli import main
 from scenarios.controllers import controller_named
 from scenarios.misreading import counted, with_perception
@@ -93,13 +95,13 @@ def test_runs_without_tally_have_their_trips() -> None:
 
 def test_the_study_goes_over_rates_kinds_and_manners() -> None:
     cases = [c for c in STUDIES["perception"].cases if isinstance(c, Misreading)]
-    assert len(cases) == len(set(cases)) == 2 + 2 * 4 * 6 + 2 * 4 + 2
+    assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
     found = {
         (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
     }
     assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
     exact = [c.experiment(1).controller for c in cases if c.perception.period is None]
-    assert exact == [Dim(), Dim(order="lanes")]
+    assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
     assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
     keys = {c.experiment(1).key for c in cases}
     assert len(keys) == len(cases)
@@ -123,6 +125,18 @@ def test_a_row_holds_what_was_counted() -> None:
     assert row["deadlock_s"] == 0.0
     plain, _ = run_experiment(Misreading("dim").experiment(1, 60.0))
     assert "crossings" not in plain
+
+
+def test_the_collision_that_docs_explain() -> None:
+    """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
+    scenario = four_way(250, profile="fair")
+    with pytest.raises(CollisionError) as caught:
+        simulate(scenario, Dim(perception=WRONG), 1)
+    (collision,) = caught.value.collisions
+    assert (collision.time, collision.movements) == (662.8, ("c3", "b3"))
+    table = Dim().start(scenario.site(1)).rules.table
+    assert [str(m) for m in table.decide(["b3", "c3", "d1"])] == ["c3", "d1"]
+    assert [str(m) for m in table.decide(["b3", "c2", "d1"])] == ["b3"]
 
 
 # --- the command line ------------------------------------------------------------------------
