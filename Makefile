@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c co
 TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint bench figures reproduce clean
+.PHONY: help demo test test-all lint bench mutants figures reproduce clean
 
 help:  ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -33,6 +33,10 @@ bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 	$(BIN)/python tests/bench/bench.py
 	$(BIN)/python tests/bench/workers.py
 
+mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call goes on with it
+	$(BIN)/python tests/mutants.py run
+	$(BIN)/python tests/mutants.py table
+
 figures: $(VENV)/.installed  ## every figure and table, from out/runs.sqlite (make reproduce) or else a quick run
 	if [ -f out/runs.sqlite ]; then $(BIN)/minisim figures --store out/runs.sqlite --out out/figures; \
 	else $(BIN)/minisim reproduce --quick --out out/quick; fi
@@ -41,7 +45,7 @@ reproduce: $(VENV)/.installed  ## the paper's experiments and ours: out/report.m
 	$(BIN)/minisim reproduce --out out
 
 clean:  ## remove the environment, caches and results
-	rm -rf $(VENV) out build dist .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) out build dist mutants .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The stamps form a chain, so that `make -j` never installs twice at the same time.
@@ -60,4 +64,8 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 $(VENV)/.installed-all: $(VENV)/.installed-dev
 	$(PIP) -e '.[dev,sumo,dask]'
+	@touch $@
+
+$(VENV)/.installed-mutants: $(VENV)/.installed-all
+	$(PIP) -e '.[mutants]'
 	@touch $@

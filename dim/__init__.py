@@ -6,6 +6,7 @@ from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
 from dim.humans import Humans
 from dim.mixed import Mixed
+from dim.monitor import Monitor
 from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
 from dim.zones import Zones
@@ -19,6 +20,7 @@ __all__ = [
     "HarmonyMatrix",
     "Humans",
     "Mixed",
+    "Monitor",
     "NoisyPerception",
     "Perception",
     "Zones",

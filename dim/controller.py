@@ -31,6 +31,7 @@ from typing import Literal
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
 from dim.harmony import HarmonyMatrix
+from dim.monitor import Monitor
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
 from dim.priorities import (
     SENSOR_RANGE,
@@ -72,6 +73,7 @@ class Dim:
         turn_time: how long a lane comes first in "rotating" and among equals in "waiting" [s].
         sensor_range: how far vehicles see the others' approach lanes and yellow zones [m]; what
             "waiting" may remember depends on it.
+        monitor: a safety monitor in every vehicle, or None.
         period: look around every so many seconds too; None is as often as the perception needs,
             which is never where it is exact.
 
@@ -88,6 +90,7 @@ class Dim:
     perception: Perception = field(default_factory=ExactPerception)
     turn_time: float = TURN_TIME
     sensor_range: float = SENSOR_RANGE
+    monitor: Monitor | None = None
     period: float | None = None
 
     def __post_init__(self) -> None:
@@ -101,6 +104,7 @@ class Dim:
         instance("zones", self.zones, Zones)
         instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
         instance("perception", self.perception, Perception)
+        instance("monitor", self.monitor, (Monitor, type(None)))
         number("turn_time [s]", self.turn_time, low=1, high=3600)
         number("sensor_range [m]", self.sensor_range, low=1, high=1000)
         if self.period is not None:
@@ -116,6 +120,7 @@ class Dim:
             str(self.priorities): isinstance(self.priorities, str),
             "priorities": isinstance(self.priorities, tuple),
             self.perception.name: self.perception.name != "exact",
+            "monitored": self.monitor is not None,
         }
         return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
 
@@ -171,7 +176,8 @@ class DimSession:
         instance("site", site, Site)
         zones = dim.zones
         zones.check(site)
-        table = decision_table(dim.harmony(site), dim.order, dim.ranks(site))
+        matrix = dim.harmony(site)
+        table = decision_table(matrix, dim.order, dim.ranks(site))
         self.rules = Rules(table, dim.gate, dim.commit)
         self.reader = Reader(site.intersection.n, zones, site.vehicle.deceleration, dim.commit)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
@@ -187,6 +193,9 @@ class DimSession:
         )
         self._ranks = _ranking(dim, site)
         self.see = dim.perception.start(site)
+        self._watch = (
+            dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
+        )
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
@@ -199,23 +208,31 @@ class DimSession:
         look_again = waiting = False
         table, until = self.table(view)
         seen = percept = None
+        sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
             if ego.distance > start or not self._follows(vehicle):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
-            sight = self.see(view, ego)
+            sight = sights[vehicle] = self.see(view, ego)
             if sight is not seen or percept is None:  # all who see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
             goes = agent.decide(percept, table)
+            if self._watch is not None:
+                goes = self._watch.goes(view, sight, ego, goes, table.priorities)
+                agent.right_of_way = goes
             if goes != had:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
             if not goes:
                 look_again |= vehicle in percept.crossing
                 waiting |= vehicle in percept.participants
         self._agents = agents
+        if self._watch is not None:
+            going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
+            commands += self._watch.look(view, sights, going)
+            look_again |= self._watch.needed
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:

@@ -131,7 +131,7 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
                 if _waits(after, lane):
                     graph.add_edge(state, after, event=event)
     for part in list(nx.strongly_connected_components(graph)):
-        if len(part) == 1 or not is_fair(protocol, _steps(graph, part)):
+        if not is_fair(protocol, _steps(graph, part)):
             graph.remove_nodes_from(part)
     return _shortest(protocol, graph, reached, lane) if graph else None
 

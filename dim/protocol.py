@@ -203,10 +203,6 @@ class Protocol:
                 return self.matrix.movements[other], self.matrix.movements[k]
         return None
 
-    def crossing(self, state: State) -> bool:
-        """Whether somebody is."""
-        return bool(state.inside) or any(f and f.phase == COMMITTED for f in state.fronts)
-
     def _enter(self, state: State, lane: int, manoeuvre: int) -> State:
         after = self._put(state, lane, None)
         return after._replace(

@@ -107,6 +107,10 @@ def _beyond() -> Iterable[Item]:
         misreading.perception_figure, ("perception",),
     )  # fmt: skip
     yield Item(
+        "perception-monitored", "the same with a safety monitor in every vehicle",
+        partial(misreading.perception_figure, series="dim-monitored"), ("perception",),
+    )  # fmt: skip
+    yield Item(
         "perception-table", "outcomes of 15 % misread intents", misreading.perception_table,
         ("perception",),
     )  # fmt: skip

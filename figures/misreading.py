@@ -53,19 +53,23 @@ class Point(NamedTuple):
 Measure = Callable[["pd.DataFrame"], Point | None]
 
 
-def perception_figure(archive: Archive) -> Figure:
+def perception_figure(archive: Archive, series: str = "dim") -> Figure:
     """Collisions, false grants and delay over the probability of an intent error.
+
+    Args:
+        archive: of the runs.
+        series: whose vehicles misread.
 
     Raises:
         MissingRunsError: nothing was run.
     """
     (results,) = archive.need("perception")
     rows = with_total_delay(results.good)
-    rows = rows[rows["series"] == "dim"]
+    rows = rows[rows["series"] == series]
     figure = style.new_figure(11.5, 7.4)
     panels = figure.subplots(len(KINDS), len(_measures()), squeeze=False)
     figure.subplots_adjust(
-        left=0.062, right=0.988, top=0.815, bottom=0.095, wspace=0.2, hspace=0.42
+        left=0.062, right=0.988, top=0.815, bottom=0.095, wspace=0.22, hspace=0.42
     )
     signalled = rows[~rows["unsignalled"].astype(bool)]
     exact = signalled[signalled["rate"] == 0.0]
@@ -74,18 +78,21 @@ def perception_figure(archive: Archive) -> Figure:
             for place, (manner, look) in enumerate(LOOKS.items()):
                 found = _of(signalled, kind=kind, shared=manner[0], persistent=manner[1])
                 cells = [exact, *(found[found["rate"] == rate] for rate in RATES[1:])]
-                shift = 0.0025 * (place - 1.5)
-                _draw(axes, [rate + shift for rate in RATES], cells, measure, look)
+                # Side by side, so that bars do not cover each other; rates are far from even.
+                places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
+                _draw(axes, places, cells, measure, look)
             if kind == "missed":
                 _level(axes, rows[rows["unsignalled"].astype(bool)], measure)
             style.plot_axes(axes, f"{title}, {KIND_LOOKS[kind].label}", "probability of an error",
                             "")  # fmt: skip
             _scale(axes, title)
-            axes.set_xticks(RATES[2:], [f"{rate:g}" for rate in RATES[2:]])
+            axes.set_xticks(range(len(RATES)), [f"{rate:g}" for rate in RATES])
     _labels(panels.tolist())
-    _title(figure, "What misread intents do to DIM on four arms, 250 veh/h/lane, profile fair")
+    who = style.look(series).label
+    _title(figure, f"What misread intents do: {who}, four arms, 250 veh/h/lane, profile fair")
     _legend(figure, [*LOOKS.values(), SILENT])
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    note = missing_note([results], lambda case: case.series == series)
+    lines.footnote(figure, f"{_NOTE}  {note}")
     return figure
 
 
@@ -95,7 +102,7 @@ def confidence_figure(archive: Archive) -> Figure:
     rows = with_total_delay(results.good)
     figure = style.new_figure(11.5, 4.6)
     panels = figure.subplots(1, len(_measures()), squeeze=False)
-    figure.subplots_adjust(left=0.062, right=0.988, top=0.735, bottom=0.155, wspace=0.2)
+    figure.subplots_adjust(left=0.062, right=0.988, top=0.735, bottom=0.155, wspace=0.22)
     for axes, (title, measure) in zip(panels[0], _measures().items(), strict=True):
         for kind, look in KIND_LOOKS.items():
             found = _of(rows, kind=kind)
@@ -109,7 +116,7 @@ def confidence_figure(archive: Archive) -> Figure:
     _title(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents misread "
                    "by all alike, lasting")  # fmt: skip
     _legend(figure, KIND_LOOKS.values())
-    lines.footnote(figure, f"{missing_note([results], lambda _: True)}  {_NOTE}")
+    lines.footnote(figure, f"{_NOTE}  {missing_note([results], lambda _: True)}")
     return figure
 
 
@@ -133,7 +140,7 @@ def perception_table(archive: Archive) -> Table:
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
         tuple(listed), labels=3,
-        notes=(f"{missing_note([results], lambda _: True)}  {_NOTE}",),
+        notes=(f"{_NOTE}  {missing_note([results], lambda _: True)}",),
     )  # fmt: skip
 
 
@@ -202,10 +209,9 @@ def _scale(axes: Axes, title: str) -> None:
 
 
 def _labels(panels: Iterable[Sequence[Axes]]) -> None:
-    for row in panels:
-        for axes in row[:-1]:
-            axes.set_ylabel(f"in {CROSSINGS:,} crossings", fontsize=9.0, color=style.INK)
-        row[-1].set_ylabel("of all vehicles [s]", fontsize=9.0, color=style.INK)
+    for first, *_, last in panels:
+        first.set_ylabel(f"in {CROSSINGS:,} crossings", fontsize=9.0, color=style.INK)
+        last.set_ylabel("of all vehicles [s]", fontsize=9.0, color=style.INK)
 
 
 def _title(figure: Figure, text: str) -> None:

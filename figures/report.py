@@ -45,7 +45,9 @@ SECTIONS = {
     "Capacity": ("capacity", "capacity-table"),
     "Fairness": ("fairness",),
     "Human drivers": ("humans",),
-    "Wrong perception": ("perception", "perception-table", "confidence"),
+    "Wrong perception": (
+        "perception", "perception-monitored", "perception-table", "confidence",
+    ),
     "Schematic figures": ("maps", "decision-4way", "worst-case"),
 }  # fmt: skip
 

@@ -63,6 +63,7 @@ LOOKS: Mapping[str, Look] = MappingProxyType({
     "dim-3": Look("3 arms", GREEN, "^", "--"),
     "dim-4": Look("4 arms", BLUE, "o", "-"),
     "dim-5": Look("5 arms", VERMILLION, "p", "-."),
+    "dim-monitored": Look("DIM with safety monitor", PURPLE, "v", "-."),
     "dim-lanes": Look("DIM, lanes first", GREEN, "^", "--"),
     "dim-rotating": Look("DIM, rotating priority", VERMILLION, "s", "--"),
     "dim-waiting": Look("DIM, longest-waiting priority", GREEN, "D", ":"),

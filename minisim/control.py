@@ -182,13 +182,26 @@ class Advise:
 
 
 @dataclass(frozen=True, slots=True)
+class Brake:
+    """Make one vehicle brake at least at `deceleration` [m/s²] until told otherwise; 0 lifts it.
+
+    It acts wherever the vehicle is, inside the junction too, and no harder than its brakes can. A
+    vehicle that stands keeps standing. It ends when the vehicle leaves the view for good: nobody
+    could lift it then.
+    """
+
+    vehicle: int
+    deceleration: float
+
+
+@dataclass(frozen=True, slots=True)
 class Wake:
     """Wake the session at `time` [s] (once; a later `Wake` replaces an earlier one)."""
 
     time: float
 
 
-Command = Go | Hold | Open | Close | Advise | Wake
+Command = Go | Hold | Open | Close | Advise | Brake | Wake
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,8 @@ def accelerate_engines(
                 if s >= leave:
                     nearest = min(nearest, gap)
             overlap |= nearest <= 0.0
-            me["a"] = realise(v, me["a"], u, me["stopping"] != 0, law, engine)
+            a = realise(v, me["a"], u, me["stopping"] != 0, law, engine)
+            me["a"] = min(a, max(me["brake"], -v / law.dt))
             me["stopping"] = v0 == 0.0
     return overlap
 

@@ -10,6 +10,7 @@ from minisim.arrivals import Arrivals
 from minisim.collision import Collision
 from minisim.control import (
     Advise,
+    Brake,
     Close,
     Command,
     Controller,
@@ -42,7 +43,7 @@ RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
 #: Commands by what they are for: building a union of types for each check is slow.
-TO_VEHICLES, TO_LANES = (Go, Hold, Advise), (Open, Close)
+TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
 AFTERMATH = 2.0
@@ -105,6 +106,8 @@ def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> No
         integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
         if isinstance(command, Advise) and command.speed != math.inf:
             number("advised speed [m/s]", command.speed, low=0)
+        if isinstance(command, Brake):
+            number("deceleration to brake at [m/s²]", command.deceleration, low=0)
     elif isinstance(command, TO_LANES):
         integer("lane", command.lane, low=0, high=site.intersection.n - 1)
     elif isinstance(command, Wake):

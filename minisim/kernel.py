@@ -232,7 +232,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 k += 1
             if not released and s < law.entry:
                 acc = min(acc, hold(v, s, law))
-            me["a"] = max(acc, -law.b_max)
+            brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # who stands keeps standing
+            me["a"] = max(min(acc, brake), -law.b_max)
     return overlap
 
 
@@ -380,6 +381,7 @@ def move(
                 lanes[exit_arm]["tail"] = i
             if vehicles[i]["cleared"] == 0 and s >= max(ends[p, 0] + law.length, law.leave):
                 vehicles[i]["cleared"] = 1
+                vehicles[i]["brake"] = math.inf
                 if law.wake_on_clear:
                     reasons |= CLEAR
             if s >= ends[p, 1] - law.slack:

@@ -12,6 +12,7 @@ from minisim import kernel
 from minisim.collision import Body, Collision, touching
 from minisim.control import (
     Advise,
+    Brake,
     Close,
     Command,
     Controller,
@@ -218,12 +219,19 @@ class Simulation:
         match command:
             case Advise(vehicle, speed):
                 self._advice[self._row[vehicle]] = speed
+            case Brake(vehicle, deceleration):
+                self._brake(self._row[vehicle], deceleration)
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
             case Wake(time):
                 self._wake_tick = first_tick(time, self.site.dt)
+
+    def _brake(self, row: int, deceleration: float) -> None:
+        if not self._vehicles["cleared"][row]:
+            limited = min(deceleration, self._law.b_max)
+            self._vehicles["brake"][row] = -limited if limited > 0.0 else math.inf
 
     def _check_collisions(self) -> None:
         """Ask pymunk which bodies touch; in a lane the gap tells."""

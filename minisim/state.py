@@ -52,6 +52,7 @@ VEHICLE = np.dtype(
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
+        ("brake", np.float64),  # cap on its acceleration [m/s²]: negative, or infinite
         ("entered", np.int64),  # tick of entering the junction (engine only)
         ("stopping", np.int64),  # advised to stand in the step before (engine only)
         ("depart_tick", np.int64),
@@ -313,6 +314,7 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     vehicles["factor"] = _speed_factors(site, len(order))[order]
     vehicles["ahead"] = -1
     vehicles["advice"] = np.inf
+    vehicles["brake"] = np.inf
     vehicles["depart_tick"] = -1
     vehicles["arrival_tick"] = -1
     return vehicles

@@ -18,6 +18,7 @@ from typing import Any, Literal, get_args
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import (
     Advise,
+    Brake,
     Close,
     Command,
     Controller,
@@ -206,7 +207,7 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
 
     Raises:
         ContractError: not a command, a vehicle that is not in the view, a lane that does not
-            exist, a speed below 0, or a wake-up that is not in the future.
+            exist, a speed or deceleration below 0, or a wake-up that is not in the future.
     """
     ids = {vehicle.id for vehicle in view.vehicles}
     for command in commands:
@@ -217,12 +218,16 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
 
 def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | None:
     match command:
-        case Go(vehicle) | Hold(vehicle) | Advise(vehicle, _) if vehicle not in ids:
+        case Go(vehicle) | Hold(vehicle) | Advise(vehicle, _) | Brake(vehicle, _) if (
+            vehicle not in ids
+        ):
             return "this vehicle is not in the view"
         case Open(lane) | Close(lane) if lane not in range(lanes):
             return f"there is no such lane (0 … {lanes - 1})"
         case Advise(_, speed) if not speed >= 0.0:
             return "a speed must be at least 0 m/s"
+        case Brake(_, deceleration) if not 0.0 <= deceleration < math.inf:
+            return "a deceleration must be a number of at least 0 m/s²"
         case Wake(time) if not now < time < math.inf:
             return "a wake-up must be in the future"
     return None if isinstance(command, get_args(Command)) else "this is not a command"

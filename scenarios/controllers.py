@@ -14,7 +14,7 @@ from baselines import (
     Reservation,
     V2ICAsRun,
 )
-from dim import AsRunDim, Dim, NoisyPerception
+from dim import AsRunDim, Dim, Monitor, NoisyPerception
 from dim.noise import CLASSIFIER, UNSIGNALLED
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
@@ -42,9 +42,10 @@ CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
     "dim-lanes-rotating": lambda _: Dim(order="lanes", priorities="rotating"),
     "dim-lanes-waiting": lambda _: Dim(order="lanes", priorities="waiting"),
     "dim-paper-commit": lambda _: Dim(commit="paper"),
-    "dim-misread": lambda _: Dim(perception=NoisyPerception(CLASSIFIER, "symmetric")),
+    "dim-monitored": lambda _: Dim(monitor=Monitor()),
+    "dim-symmetric-0.15": lambda _: Dim(perception=NoisyPerception(CLASSIFIER, "symmetric")),
     "dim-unsignalled": lambda _: Dim(perception=NoisyPerception(unsignalled=UNSIGNALLED)),
-    "dim-occluded": lambda _: Dim(perception=NoisyPerception(occlusion=True)),
+    "dim-occlusion": lambda _: Dim(perception=NoisyPerception(occlusion=True)),
     "dim-as-run": lambda _: AsRunDim(),
     "dim-as-run-size": lambda _: AsRunDim(order="size"),
     "dim-as-run-exit-14": lambda _: AsRunDim(exit_speed=14.0),

@@ -45,6 +45,7 @@ class Car:
     """A vehicle; `minisim.state.VEHICLE` explains the values.
 
     Attributes:
+        brake: how hard it was told to brake at least [m/s²]; 0 where it was not.
         present: whether it is on the road.
         seen: tick at which it was looked at last.
         lost_ticks: as there; between two looks that are more than a step apart it is the time
@@ -52,9 +53,9 @@ class Car:
     """
 
     __slots__ = (
-        "a", "advice", "cleared", "commanded", "demand_time", "desired", "factor", "go", "id",
-        "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "row", "s", "section",
-        "seen", "v",
+        "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
+        "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "row", "s",
+        "section", "seen", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records, law: Law) -> None:
@@ -65,7 +66,7 @@ class Car:
         self.path = int(record["path"])
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
-        self.s = self.v = self.a = self.lost_ticks = 0.0
+        self.s = self.v = self.a = self.lost_ticks = self.brake = 0.0
         self.section = self.mark = self.seen = 0
         self.go = self.cleared = self.present = False
         self.advice = math.inf
@@ -177,7 +178,8 @@ class Follower:
         held = held and near(v, law.hold - s, law)
         # SUMO would drop to a lower desired speed at once; the law brakes.
         self._desire(car, max(v0, v))
-        if not (slower or held or v > v0 or v0 < LEAST_SPEED or z > 0.0):
+        braked = car.brake > 0.0
+        if not (slower or held or braked or v > v0 or v0 < LEAST_SPEED or z > 0.0):
             self._hand_back(car)
             return
         free = self._free(v, v0)
@@ -187,6 +189,8 @@ class Follower:
             k += 1
         if held:
             acc = min(acc, kernel.hold(v, s, law))
+        if braked:
+            acc = min(acc, -car.brake)
         if acc < free or v > v0 or v0 < LEAST_SPEED:
             speed = v + max(acc, -law.b_max) * law.dt
             self._vehicle.setSpeed(car.name, max(speed, 0.0))
@@ -243,14 +247,18 @@ class Cruiser:
             car.desired = speed
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
-        """Brake for hold lines where the model itself brakes less."""
+        """Brake for hold lines, and where told to, if the model itself brakes less."""
         law = self._law
         for lane in lanes:
             ahead = None
             for car in lane:
+                acc = -car.brake if car.brake > 0.0 else math.inf
                 held = car.s < law.entry and not released(car)
                 if held and near(car.v, law.hold - car.s, law):
-                    self._hold(car, ahead)
+                    acc = min(acc, max(kernel.hold(car.v, car.s, law), -law.b_max))
+                if acc < math.inf and acc < self._own(car, ahead):
+                    self._vehicle.setSpeed(car.name, max(car.v + acc * law.dt, 0.0))
+                    car.commanded = True
                 else:
                     self.release(car)
                 ahead = car
@@ -260,15 +268,6 @@ class Cruiser:
         if car.commanded:
             self._vehicle.setSpeed(car.name, -1.0)
             car.commanded = False
-
-    def _hold(self, car: Car, ahead: Car | None) -> None:
-        law = self._law
-        acc = max(kernel.hold(car.v, car.s, law), -law.b_max)
-        if acc < self._own(car, ahead):
-            self._vehicle.setSpeed(car.name, max(car.v + acc * law.dt, 0.0))
-            car.commanded = True
-        else:
-            self.release(car)
 
     def _own(self, car: Car, ahead: Car | None) -> float:
         """Acceleration of the model on the approach, where a command would replace it [m/s²]."""

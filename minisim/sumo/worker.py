@@ -24,6 +24,7 @@ import numpy as np
 from minisim.collision import Collision
 from minisim.control import (
     Advise,
+    Brake,
     Close,
     Command,
     Go,
@@ -148,6 +149,8 @@ class Worker:
                 car.advice = speed
                 if car.present:
                     self._steering.advise(car)
+            case Brake(vehicle, deceleration):
+                self._cars[str(vehicle)].brake = min(deceleration, self._job.law.b_max)
             case Wake(time):
                 self._wake_tick = first_tick(time, self._job.law.dt)
 

@@ -30,8 +30,9 @@ MANNERS = {
     (False, True): "each for itself, lasting",
     (False, False): "each for itself, each frame anew",
 }
-#: Whose vehicles misread: largest clique first, and highest-priority lane first.
-MISREADERS = ("dim", "dim-lanes")
+#: Whose vehicles misread: the rules alone, with a safety monitor, and with the highest-priority
+#: lane first.
+MISREADERS = ("dim", "dim-monitored", "dim-lanes")
 #: Thresholds of confidence; 0 takes every reading as it is.
 THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 
@@ -87,7 +88,8 @@ class Misreading(NamedTuple):
 ERRORS = (
     *(Misreading(series) for series in MISREADERS),
     *(
-        Misreading("dim", kind, rate, shared, persistent)
+        Misreading(series, kind, rate, shared, persistent)
+        for series in MISREADERS[:2]
         for kind, (shared, persistent), rate in product(KINDS, MANNERS, RATES[1:])
     ),
     *(

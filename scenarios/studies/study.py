@@ -160,7 +160,8 @@ def _as_run(cell: Cell) -> Case:
 #: times a signal; its runs differ little.
 _FEW = {"v2ic": 3}
 
-#: Vehicles that misread each other look around every 0.1 s, which costs 3 s of CPU an hour.
+#: Vehicles that misread each other look around every 0.1 s, which costs 3 s of CPU an hour, and
+#: more with a monitor.
 _FEW_MISREAD = dict.fromkeys(MISREADERS, 5)
 
 #: Everything that is compared on equal terms; the paper's four first.

@@ -12,10 +12,11 @@ import pytest
 
 import minisim
 from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import AsRunDim, Dim, Mixed
+from dim import AsRunDim, Dim, Mixed, Monitor, NoisyPerception
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
+    Brake,
     Close,
     Command,
     Controller,
@@ -55,6 +56,7 @@ CONTROLLERS: tuple[Controller, ...] = (
     Mixed(share=0.3),
     Mixed(Dim(gate="harmonious"), 0.6, trust="signals"),
     Mixed(share=1.0),
+    Dim(perception=NoisyPerception(intent_error=0.15, kind="symmetric"), monitor=Monitor()),
     FixedTime(),
     FixedTime(amber=0.0),
     FixedTime(greens=2.0, amber=3.0, all_red=1.0),
@@ -328,7 +330,8 @@ VIEW = View(10.0, (Observed(3, 0, 1, 5.0, 5.0, 5.0), Observed(9, 2, 1, 5.0, 5.0,
 
 def test_valid_commands_pass() -> None:
     valid = (
-        Go(3), Hold(9), Open(0), Close(3), Advise(9, 0.0), Advise(3, math.inf), Wake(10.1),
+        Go(3), Hold(9), Open(0), Close(3), Advise(9, 0.0), Advise(3, math.inf), Brake(3, 4.5),
+        Brake(9, 0.0), Wake(10.1),
     )  # fmt: skip
     check_commands(valid, VIEW, small_scenario(4).site(0))
 
@@ -337,6 +340,7 @@ def test_valid_commands_pass() -> None:
     "command",
     [
         Go(4), Hold(-1), Advise(10, 5.0), Advise(3, -1.0), Advise(3, math.nan), Open(4), Close(-1),
+        Brake(4, 1.0), Brake(3, -1.0), Brake(3, math.nan), Brake(3, math.inf),
         Wake(10.0), Wake(math.nan), Wake(math.inf), (3,), None,
     ],
 )  # fmt: skip

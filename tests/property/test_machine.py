@@ -7,6 +7,9 @@ that was before.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
 import pytest
 from hypothesis import Phase, settings
 from hypothesis import strategies as st
@@ -22,7 +25,8 @@ from dim import Dim
 from dim.agent import GATES
 from dim.conformance import Checked
 from dim.decision import ORDERS
-from minisim.control import Observed, View, can_stop
+from dim.perception import See
+from minisim.control import Brake, Command, Controller, Observed, Site, View, can_stop
 from minisim.errors import CollisionError
 from minisim.simulation import Simulation
 from scenarios import Scenario, regular
@@ -109,15 +113,17 @@ class Traffic(RuleBasedStateMachine):
     def _view(self) -> View:
         simulation = self._simulation()
         simulation.advance(self.time)
-        session = simulation._session
-        # Of `CheckedSession`; the protocol of sessions does not have it.
-        self.going = set(session._going)  # type: ignore[attr-defined]
+        released = simulation._vehicles["go"] == 1
+        self.going = set(simulation._vehicles["id"][released].tolist())
         return simulation.view()
 
     def _simulation(self) -> Simulation:
         trips = self.trips or [(HORIZON, 0, 1)]
         scenario = replayed(self.road, *trips, horizon=HORIZON)
-        return Simulation(scenario, Checked(self.dim))
+        return Simulation(scenario, self._controller())
+
+    def _controller(self) -> Controller:
+        return Checked(self.dim)
 
     def _time_to_yellow_zone(self) -> float:
         """From demand to the start of the yellow zone, on an empty road [s]."""
@@ -128,7 +134,122 @@ class Traffic(RuleBasedStateMachine):
         return lead
 
 
+@dataclass(frozen=True)
+class Stall:
+    """A vehicle that brakes comfortably from a time on, and stands until another."""
+
+    vehicle: int
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """A vehicle whose indicator shows another manoeuvre until a time."""
+
+    vehicle: int
+    shown: int
+    until: float
+
+
+@dataclass(frozen=True)
+class Indicators:
+    """Everybody, the vehicle too, goes by what the indicators show at the time."""
+
+    changes: tuple[Change, ...]
+    name = "indicators"
+    period = 0.1
+
+    def start(self, site: Site) -> See:
+        def see(view: View, ego: Observed) -> View:
+            shown = {c.vehicle: c.shown for c in self.changes if view.time < c.until - 1e-6}
+            return View(
+                view.time,
+                tuple(v._replace(manoeuvre=shown.get(v.id, v.manoeuvre)) for v in view.vehicles),
+            )
+
+        return see
+
+
+@dataclass(frozen=True)
+class Stalling:
+    """DIM, and vehicles that stall."""
+
+    dim: Dim
+    stalls: tuple[Stall, ...]
+    name = "stalling"
+
+    def start(self, site: Site) -> StallingSession:
+        return StallingSession(self, site)
+
+
+class StallingSession:
+    def __init__(self, recipe: Stalling, site: Site) -> None:
+        self._dim = recipe.dim.start(site)
+        self._stalls = recipe.stalls
+        self._hard = site.vehicle.deceleration
+        self._stalled: set[int] = set()
+        self.plan = replace(self._dim.plan, period=site.dt)
+
+    def decide(self, view: View) -> Iterable[Command]:
+        now = {s.vehicle for s in self._stalls if s.start - 1e-6 <= view.time < s.end - 1e-6}
+        yield from self._dim.decide(view)
+        yield from (Brake(vehicle, self._hard) for vehicle in sorted(now))
+        yield from (Brake(vehicle, 0.0) for vehicle in sorted(self._stalled - now))
+        self._stalled = now
+
+
+class DisturbedTraffic(Traffic):
+    """The same where vehicles stall, anywhere, and change their minds while they still may.
+
+    The model knows neither; what has to hold is that nobody collides, that who cannot stop has
+    the right of way, and that in the end everybody has been served.
+    """
+
+    stalls: tuple[Stall, ...] = ()
+    changes: tuple[Change, ...] = ()
+
+    @rule(which=st.integers(0, 20), tenths=st.integers(5, 150))
+    @precondition(lambda self: self.trips)
+    def stalls_now(self, which: int, tenths: int) -> None:
+        """Somebody in sight, before the junction or inside, comes to a stand for a while."""
+        here = self._view().vehicles
+        free = [v.id for v in here if all(s.vehicle != v.id for s in self.stalls)]
+        if free:
+            vehicle = free[which % len(free)]
+            self.stalls += (Stall(vehicle, self.time, round(self.time + tenths / 10, 1)),)
+
+    @rule(which=st.integers(0, 20), manoeuvre=TURNS)
+    @precondition(lambda self: self.trips)
+    def changes_indicator(self, which: int, manoeuvre: int) -> None:
+        """Somebody who can still stop wants to go elsewhere, and says so from now on."""
+        b = self.road.profile.vehicle.deceleration
+        here = [v for v in self._view().vehicles if v.distance >= 0.0 and can_stop(v, b)]
+        free = [v for v in here if all(c.vehicle != v.id for c in self.changes)]
+        if not free:
+            return
+        vehicle = free[which % len(free)]
+        before = self.trips, self.changes
+        # Ids are the order of demand, of equals that of lanes.
+        order = sorted(range(len(self.trips)), key=lambda k: self.trips[k][:2])
+        changed = list(self.trips)
+        time, lane, shown = changed[order[vehicle.id]]
+        assert (lane, shown) == (vehicle.lane, vehicle.manoeuvre)
+        changed[order[vehicle.id]] = time, lane, 1 + manoeuvre % (self.n - 1)
+        self.trips, self.changes = changed, (*self.changes, Change(vehicle.id, shown, self.time))
+        # On its way to another exit it may have come a little faster: too fast for a change.
+        now = next((v for v in self._view().vehicles if v.id == vehicle.id), None)
+        if now is None or now.distance < 0.0 or not can_stop(now, b):
+            self.trips, self.changes = before
+
+    def _controller(self) -> Controller:
+        dim = replace(self.dim, perception=Indicators(self.changes))
+        return Stalling(dim, self.stalls)
+
+
 TestTraffic = Traffic.TestCase
+TestDisturbedTraffic = DisturbedTraffic.TestCase
+TestDisturbedTraffic.settings = settings(max_examples=8, stateful_step_count=12)
 TestTraffic.settings = settings(max_examples=15, stateful_step_count=15)
 
 

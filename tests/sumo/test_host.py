@@ -22,10 +22,12 @@ from hypothesis import given
 
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from dim import Dim, Mixed
+from dim import Dim, Mixed, NoisyPerception
+from dim.tally import Tallied
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
+    Brake,
     Command,
     Controller,
     Go,
@@ -170,8 +172,18 @@ class _TimedSession:
         {0.0: (Go(0),), 10.0: (Advise(0, 0.0),), 30.0: (Advise(0, 9.0),)},
         {0.0: (Go(0),), 34.0: (Hold(0),), 60.0: (Open(0),)},
         {50.0: (Open(0),)},
+        {0.0: (Go(0),), 20.0: (Brake(0, 6.0),), 30.0: (Brake(0, 0.0),)},
+        {0.0: (Go(0),), 35.0: (Brake(0, 20.0),), 40.0: (Brake(0, 0.0),)},
     ],
-    ids=["go", "advise", "advise standstill", "revoke, hard braking", "open"],
+    ids=[
+        "go",
+        "advise",
+        "advise standstill",
+        "revoke, hard braking",
+        "open",
+        "brake",
+        "brake in the junction",
+    ],
 )
 def test_commands_do_the_same(script: dict[float, tuple[Command, ...]]) -> None:
     ours, theirs = both(single(), Timed(script), record="all")
@@ -210,6 +222,18 @@ def test_sessions_see_the_same() -> None:
         for a, b in zip(mine.vehicles, its.vehicles, strict=True):
             assert b.distance == pytest.approx(a.distance, abs=0.01)
             assert b.speed == pytest.approx(a.speed, abs=0.01)
+
+
+def test_what_a_session_counts_is_in_the_summary() -> None:
+    """The same misread vehicles in both hosts: readings belong to vehicles, not to calls."""
+    scenario = small_scenario(4, density=350.0, demand_time=150.0)
+    senses = NoisyPerception(0.5, "symmetric")
+    tallied = Tallied(Dim(perception=senses))
+    ours, theirs = (run(scenario, tallied, 1, on_collision="record")
+                    for run in (minisim.simulate, simulate))  # fmt: skip
+    assert theirs.counts == {key: theirs.summary()[key] for key in ours.counts}
+    assert theirs.counts["crossings"] == pytest.approx(ours.counts["crossings"], abs=2)
+    assert theirs.counts["false_grants"] > 0
 
 
 def test_wake_rings_once() -> None:

@@ -14,6 +14,7 @@ from dim.as_run import (
     HELD_SPEED,
     RED_SPEED,
     AsRunRules,
+    AsRunSession,
     Car,
     winner,
 )
@@ -223,6 +224,21 @@ def test_the_first_clique_in_the_alphabet_wins_whatever_its_size() -> None:
     assert winner(matrix, frozenset(), "lanes") == ()
 
 
+@pytest.mark.parametrize(("order", "chosen"), [("lanes", (1,)), ("size", (2, 4))])
+def test_the_rules_decide_by_their_order(order: str, chosen: tuple[int, ...]) -> None:
+    rule = rules(4, order)
+    step(rule, car("v1.a_3", 486.0), car("v2.b_2", 486.0), car("v4.d_2", 486.0))
+    assert rule.chosen == chosen
+
+
+@pytest.mark.parametrize(("names", "chosen"), [("abcd", (2,)), ("acbd", (3,))])
+def test_the_rules_decide_by_the_arms_names(names: str, chosen: tuple[int, ...]) -> None:
+    """b2 and c2 are in conflict; in the runs at 4:1:4:1 the second arm was called c."""
+    rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", names)
+    step(rule, car("v2.b_2", 486.0), car("v3.c_2", 486.0))
+    assert rule.chosen == chosen
+
+
 @pytest.mark.parametrize(("arms", "differ", "cases"), [(3, 1, 26), (4, 26, 255), (5, 508, 3124)])
 def test_how_often_the_orders_differ(arms: int, differ: int, cases: int) -> None:
     """The counts of as_run.md, one vehicle a lane."""
@@ -257,6 +273,26 @@ def test_the_session_reads_views_and_tells_changes_once() -> None:
     assert list(session.decide(View(60.0, ()))) == []
 
 
+def test_the_recipe_reaches_the_rules() -> None:
+    dim = AsRunDim("size", HarmonyMatrix.paper(4), "acbd", 14.0)
+    made = dim.start(four_way(profile="as_run").site()).rules
+    assert (made.arms, made.order, made.names, made.exit_speed) == (4, "size", "acbd", 14.0)
+    assert made.matrix is dim.matrix
+    with pytest.raises(InputError, match=r"^site must be a Site"):
+        AsRunSession("site", made)  # type: ignore[arg-type]
+
+
+def test_the_session_names_vehicles_by_second_lane_and_manoeuvre() -> None:
+    """v100.b_2 before v20.a_1 and v20.a_2, whatever their ids and whoever is in front."""
+    session = AsRunDim().start(four_way(profile="as_run").site())
+    distance = 492.8 - 4.1 - 486.0
+    cars = [(1, 0, 2, 20.9), (2, 0, 1, 20.0), (3, 1, 2, 100.0)]
+    session.decide(
+        View(110.0, tuple(Observed(k, lane, j, distance, 0.0, 4.0, t) for k, lane, j, t in cars))
+    )
+    assert session.rules.action == [3, 2, 1]
+
+
 def test_nobody_is_told_anything_that_is_not_in_the_view() -> None:
     """Who still has the right of way far behind the junction is told 20 m/s at 600 m, for good."""
     site = four_way(profile="as_run").site()
@@ -286,6 +322,11 @@ def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     assert plan.lanes_open
 
 
+def test_behind_a_long_approach_no_reach_is_asked_for() -> None:
+    plan = AsRunDim().start(four_way(profile="as_run", arm_length=700.0).site()).plan
+    assert plan.reach == 0.0
+
+
 def test_names_and_orders() -> None:
     assert isinstance(controller_named("dim", "as_run"), AsRunDim)
     assert controller_named("dim", "as_run") == AsRunDim(order="lanes")
@@ -298,10 +339,26 @@ def test_the_exit_speed_can_be_that_of_the_signals() -> None:
     """as_run.md, discrepancy 15."""
     rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", exit_speed=14.0)
     assert step(rule, car("v1.a_1", 508.01)) == {1: 14.0}
+    assert AsRunDim(exit_speed=0.5).name == "dim-as-run-exit-0.5"
     with pytest.raises(InputError, match=r"exit_speed \[m/s\]"):
         AsRunDim(exit_speed=0.0)
     with pytest.raises(InputError, match="order"):
         AsRunDim(order="alphabet")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"matrix": "paper"}, "^matrix must be "),
+        ({"names": 5}, "^names must be "),
+        ({"names": "abca"}, "^names must be different letters, got 'abca'"),
+        ({"exit_speed": -1.0}, r"^exit_speed \[m/s\] must be "),
+        ({"order": "first"}, "unknown order 'first'"),
+    ],
+)
+def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        AsRunDim(**arguments)  # type: ignore[arg-type]
 
 
 def test_sites_that_the_rules_do_not_fit() -> None:
@@ -309,6 +366,8 @@ def test_sites_that_the_rules_do_not_fit() -> None:
         AsRunDim().start(regular(6, profile="as_run").site())
     with pytest.raises(InputError, match="matrix is for 3 arms"):
         AsRunDim(matrix=HarmonyMatrix.paper(3)).start(four_way().site())
+    with pytest.raises(InputError, match="names must be 4 letters, one an arm, got 'abc'"):
+        AsRunDim(names="abc").start(four_way().site())
     with pytest.raises(InputError, match="zones begin"):
         AsRunDim().start(four_way(arm_length=300.0).site())
     assert set(BOUND) == set(MAKERS)

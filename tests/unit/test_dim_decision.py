@@ -138,7 +138,9 @@ def test_nobody() -> None:
     assert decide([], matrix) == ()
     assert DecisionTable(matrix).lanes(0) == 0
     assert DecisionTable(matrix).decide([]) == ()
-    with pytest.raises(InputError, match="at least one participant"):
+    with pytest.raises(
+        InputError, match=r"^a decision needs at least one participant, such as a1$"
+    ):
         explain([], matrix)
 
 
@@ -267,7 +269,7 @@ def test_who_is_admitted_beside_crossing_vehicles(
         (["a4"], "no movement 'a4'"),
         ([5], "no movement 5"),
         ([10**5000], "no movement a int too large"),
-        ("a1", "must be a sequence of movements such as a1, b2"),
+        ("a1", "^participants must be a sequence of movements such as a1, b2"),
         (7, "must be a sequence"),
     ],
 )
@@ -304,6 +306,16 @@ def test_priorities_are_a_permutation_of_the_lanes(priorities: object) -> None:
         lane_ranks(priorities, 4)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"priorities|lane rank"):
         decide(["a1"], HarmonyMatrix.paper(4), "size", priorities)  # type: ignore[arg-type]
+
+
+def test_wrong_priorities_are_named() -> None:
+    message = r"^priorities of 4 lanes are the ranks 0 … 3, each once, got \(0, 1, 2, 2\)$"
+    with pytest.raises(InputError, match=message):
+        lane_ranks([0, 1, 2, 2], 4)
+    with pytest.raises(InputError, match=r"^priorities must be a sequence of lane ranks"):
+        lane_ranks(4, 4)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^lane rank must be an integer of at least 0, got -1"):
+        lane_ranks([-1, 0, 1], 3)
 
 
 def test_default_priorities_are_the_lanes_own_order() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from importlib import resources
 from pathlib import Path
 
@@ -74,6 +75,11 @@ def test_the_paper_has_three_matrices(n: int) -> None:
         HarmonyMatrix.paper(n)
 
 
+def test_a_number_of_arms_is_a_number() -> None:
+    with pytest.raises(InputError, match=r"^number of arms must be an integer"):
+        HarmonyMatrix.paper("4")  # type: ignore[arg-type]
+
+
 def test_vehicles_of_one_lane_are_never_in_harmony() -> None:
     intersection = Intersection((0.0, 80.0, 190.0, 260.0))
     matrix = HarmonyMatrix.from_geometry(intersection, clearance=0.0)
@@ -140,7 +146,7 @@ def test_unknown_movement(unknown: object) -> None:
 
 @pytest.mark.parametrize("pair", ["a1", ("a1",), ("a1", "b1", "c1")])
 def test_index_is_a_pair(pair: object) -> None:
-    with pytest.raises(InputError, match="indexed by two movements"):
+    with pytest.raises(InputError, match=re.escape(f"indexed by two movements, got {pair!r}")):
         HarmonyMatrix.paper(4)[pair]  # type: ignore[index]
 
 
@@ -157,7 +163,7 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
     [
         (4, four()[:-1], "12 × 12, got 11 × 12"),
         (4, [row[:-1] for row in four()], "12 × 12, got 12 × 11"),
-        (4, [*four()[:-1], [0, 1]], "rows differ in length"),
+        (4, [*four()[:-1], [0, 1]], r"^a harmony matrix is square: its rows differ in length$"),
         (4, 1, "12 × 12, got 1"),
         (3, four(), "3 arms is 6 × 6, got 12 × 12"),
         (5, four(), "20 × 20"),
@@ -178,6 +184,12 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
 def test_what_is_no_harmony_matrix(n: object, values: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         HarmonyMatrix(n, values)  # type: ignore[arg-type]
+
+
+def test_numbers_of_numpy_become_python_numbers() -> None:
+    matrix = HarmonyMatrix(np.int64(4), four())  # type: ignore[arg-type]
+    assert type(matrix.n) is int
+    assert repr(matrix) == repr(HarmonyMatrix.paper(4))
 
 
 @pytest.mark.parametrize("n", [3, 4, 5])
@@ -245,18 +257,26 @@ def test_unreadable_and_unwritable_paths(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(FileError, match="cannot read harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot read harmony matrix"):
         HarmonyMatrix.from_csv(path)
-    with pytest.raises(FileError, match="cannot write harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot write harmony matrix"):
         HarmonyMatrix.paper(3).to_csv(path)
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_reason_of_the_system_is_told_without_its_number(tmp_path: Path) -> None:
+    path = tmp_path / "missing" / "m.csv"
+    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
+        HarmonyMatrix.from_csv(path)
+    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
+        HarmonyMatrix.paper(3).to_csv(path)
+
+
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])
 def test_a_path_is_text(path: object) -> None:
-    with pytest.raises(InputError, match="path of a harmony matrix"):
+    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.from_csv(path)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="path of a harmony matrix"):
+    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]
 
 

@@ -171,8 +171,9 @@ def test_exact_perception_is_the_view_itself() -> None:
     ("arguments", "message"),
     [
         ((2, Zones(), 2.0, "paper"), "number of arms"),
+        ((13, Zones(), 2.0, "paper"), "number of arms"),
         ((4, "zones", 2.0, "paper"), "zones must be a Zones"),
-        ((4, Zones(), 0.0, "paper"), "deceleration"),
+        ((4, Zones(), 0.0, "paper"), r"^deceleration \[m/s²\] must be"),
         ((4, Zones(), 2.0, "papr"), "unknown commit rule 'papr'.*did you mean 'paper'"),
     ],
 )

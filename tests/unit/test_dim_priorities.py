@@ -13,6 +13,7 @@ import minisim
 from dim import Dim, Zones
 from dim.controller import DimSession
 from dim.priorities import (
+    SAME_TIME,
     TURN_TIME,
     Watch,
     longest_waiting,
@@ -65,6 +66,25 @@ def test_no_wait_counts_more_than_the_memory() -> None:
     assert ranks == [(2, 3, 1, 0), (0, 3, 1, 2)]  # c, d alike, and d's turn; then all, and a's
 
 
+def test_waits_that_differ_by_rounding_tie_and_others_do_not() -> None:
+    """2e-7 s apart are one instant, and the turn decides; 0.4 s apart are not."""
+    one_turn = {"memory": 50.0, "turn_time": 100.0}
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-7}, **one_turn).ranks == (0, 1)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 0.4}, **one_turn).ranks == (1, 0)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-6}, **one_turn).ranks == (1, 0)
+
+
+def test_ranks_hold_until_a_wait_reaches_the_memory_or_the_turn_ends() -> None:
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 100.0).until == 32.0
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 31.0).until == 31.0
+    assert longest_waiting(30.0, 3, {1: 22.0}, 8.0, 100.0).until == 100.0  # it has just done so
+    assert longest_waiting(0.0, 3, {1: 0.0}, SAME_TIME, 100.0).until == 100.0
+
+
+def test_who_has_just_come_is_before_nobody() -> None:
+    assert longest_waiting(0.0, 3, {2: 0.0}, 8.0, 100.0).ranks == (1, 2, 0)
+
+
 def test_memory_is_how_long_everybody_has_watched() -> None:
     """100 m range, yellow zone from 8 m: 92 m at 40 km/h."""
     site = four_way().site()
@@ -74,12 +94,14 @@ def test_memory_is_how_long_everybody_has_watched() -> None:
     with pytest.raises(InputError, match="sensors that reach 8 m"):
         Dim(priorities="waiting", sensor_range=8.0).start(site)
     Dim(priorities="rotating", sensor_range=8.0).start(site)
+    assert memory_of(site, Zones(), 8.5) == pytest.approx(0.5 / (40.0 / 3.6))
 
 
 def test_a_watch_notes_who_passes_the_start() -> None:
     watch = Watch(8.0)
     assert watch.look(1.0, [car(1, 0, 8.1)]) == {}
     assert watch.look(2.0, [car(1, 0, 7.9), car(5, 2, 3.0)]) == {0: 2.0, 2: 2.0}
+    assert Watch(8.0).look(2.0, [car(1, 0, 8.0), car(5, 2, 0.0)]) == {0: 2.0, 2: 2.0}
     assert watch.look(3.0, [car(1, 0, -1.0), car(2, 0, 6.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 2.0}
     assert watch.look(4.0, [car(2, 0, 2.0)]) == {0: 3.0}
     assert watch.look(5.0, [car(2, 0, 2.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 5.0}
@@ -88,7 +110,8 @@ def test_a_watch_notes_who_passes_the_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"turn_time": 0.0}, "turn_time"),
+        ({"turn_time": 0.9}, "turn_time"),
+        ({"turn_time": 3600.5}, "turn_time"),
         ({"turn_time": "10"}, "turn_time"),
         ({"sensor_range": 0.0}, "sensor_range"),
         ({"priorities": "rotate"}, "unknown priorities 'rotate'.*did you mean 'rotating'"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dim import Dim, NoisyPerception, Perception
+from dim import DecisionTable, Dim, HarmonyMatrix, Monitor, NoisyPerception, Perception
 from dim.perception import See
 from dim.tally import Tallied, TallySession
 from minisim import simulate
@@ -76,7 +76,7 @@ def test_counting_changes_nothing(perception: NoisyPerception) -> None:
 
 @pytest.mark.parametrize(
     "dim", [Dim(), Dim(gate="harmonious"), Dim(order="lanes"), Dim(priorities="waiting"),
-            Dim(period=0.1)]
+            Dim(period=0.1), Dim(monitor=Monitor())]
 )  # fmt: skip
 def test_exact_perception_has_nothing_to_count(dim: Dim) -> None:
     """But the crossings: whoever is not in the junction or on the approach at the end."""
@@ -138,6 +138,14 @@ def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> N
     assert run.collisions
     assert run.counts["false_grants"] >= len(run.collisions)
     assert run.counts["disagreement_s"] > 0.0
+
+
+def test_lanes_first_lets_the_first_lane_go_in_every_case() -> None:
+    """All 255 cases of four arms; the largest clique leaves it out in some."""
+    for order, always in (("lanes", True), ("size", False)):
+        table = DecisionTable(HarmonyMatrix.paper(4), order)
+        goes = [table.lanes(table.case(case)) >> case[0].origin & 1 for case in table]
+        assert all(goes) is always
 
 
 @pytest.mark.parametrize("confidence", [None, 0.9])

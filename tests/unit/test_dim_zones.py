@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import re
 
 import pytest
 
@@ -99,8 +100,19 @@ def test_a_speed_above_the_limit_is_painted_on_the_whole_red_zone() -> None:
     ],
 )
 def test_zones_are_checked(field: str, value: object) -> None:
-    with pytest.raises(InputError, match=field.split("_")[0]):
+    label = "red_speed [m/s]" if field == "red_speed" else f"{field} zone [m]"
+    with pytest.raises(InputError, match=rf"^{re.escape(label)} must be"):
         Zones(**{field: value})  # type: ignore[arg-type]
+
+
+def test_the_largest_zones_and_speed() -> None:
+    Zones(red=1000.0, yellow=1000.0, green=1000.0, red_speed=100.0)
+    Zones(red=0.0, green=COMMIT_MARGIN)
+    for field in ("red", "yellow", "green"):
+        with pytest.raises(InputError, match=field):
+            Zones(**{field: 1000.5})
+    with pytest.raises(InputError, match="red_speed"):
+        Zones(red_speed=100.5)
 
 
 def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:

@@ -18,7 +18,9 @@ from dim import Dim
 from minisim.control import (
     LATERAL_ACCELERATION,
     Advise,
+    Brake,
     Close,
+    Command,
     Go,
     Hold,
     Marking,
@@ -30,7 +32,7 @@ from minisim.control import (
 from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.simulation import Simulation
 from minisim.trips import METRICS, TRIP_COLUMNS
-from minisim.vehicle import VehicleType
+from minisim.vehicle import EngineVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.runs import Fixed, digest, replayed
@@ -119,6 +121,95 @@ def test_advice_caps_the_speed_and_infinity_lifts_it() -> None:
     capped = run.trajectories.query(f"{entry - 330} < s_m < {entry - 305}")["speed_mps"]
     assert capped.to_numpy() == pytest.approx(8.0, abs=0.3)
     assert run.trajectories["speed_mps"].iloc[-1] > 13.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Timed:
+    """Looks every step; commands at set times [s]."""
+
+    script: dict[float, tuple[Command, ...]]
+    reach: float = 0.0
+    is_open: bool = True
+    name: str = "timed"
+
+    def start(self, site):
+        plan = Plan(lanes_open=self.is_open, period=site.dt, reach=self.reach)
+        return _TimedSession(self.script, plan)
+
+
+class _TimedSession:
+    def __init__(self, script, plan):
+        self.plan, self._script = plan, script
+
+    def decide(self, view):
+        return self._script.get(round(view.time, 6), ())
+
+
+def braked(
+    vehicle: VehicleType, script: dict[float, tuple[Command, ...]], reach: float = 60.0
+) -> minisim.Run:
+    """One vehicle at 14 m/s, straight on; it is in view up to `reach` past the entry [m]."""
+    profile = dataclasses.replace(FAIR, vehicle=vehicle)
+    scenario = replayed(four_way(profile=profile), STRAIGHT, horizon=60.0)
+    return minisim.simulate(scenario, Timed(script, reach), record="all")
+
+
+LAWS = {
+    "idm": VehicleType(),
+    "iidm": VehicleType(model="iidm"),
+    "krauss": VehicleType(model="krauss"),
+    "cc": EngineVehicle(),
+}
+
+
+@pytest.mark.parametrize("asked", [3.0, 6.0, 50.0])
+@pytest.mark.parametrize("model", LAWS)
+@pytest.mark.parametrize("time", [20.0, 35.6], ids=["approach", "junction"])
+def test_braking_takes_what_it_takes(model: str, asked: float, time: float) -> None:
+    """v²/2b to standstill, wherever it is told to, by b or what its brakes can."""
+    run = braked(LAWS[model], {time: (Brake(0, asked),)})
+    trace = run.trajectories
+    b = min(asked, LAWS[model].max_deceleration)
+    before = trace[trace["time_s"] <= time + 1e-6].iloc[-1]
+    assert before["speed_mps"] == pytest.approx(14.0, abs=0.2)
+    rest = trace[trace["time_s"] > time + 1e-6]
+    assert rest["acceleration_mps2"].min() == pytest.approx(-b)
+    assert rest["speed_mps"].iloc[-1] == 0.0
+    assert (trace[trace["speed_mps"] == 0.0]["acceleration_mps2"].iloc[1:] == 0.0).all()
+    needed = before["speed_mps"] ** 2 / (2.0 * b)
+    # A law that drives each step at its new speed comes v·dt/2 short of that.
+    short = 14.0 * FAIR.dt / 2.0 if model in ("krauss", "cc") else 0.0
+    driven = trace["s_m"].iloc[-1] - before["s_m"]
+    assert driven == pytest.approx(needed - short, abs=0.05)
+
+
+@pytest.mark.parametrize("model", LAWS)
+def test_braking_ends_when_lifted_and_changes_nothing_else(model: str) -> None:
+    free = braked(LAWS[model], {})
+    lifted = braked(LAWS[model], {20.0: (Brake(0, 0.0),)})
+    assert digest(lifted) == digest(free)
+    slowed = braked(LAWS[model], {20.0: (Brake(0, 4.0),), 22.0: (Brake(0, 0.0),)})
+    speeds = slowed.trajectories.set_index("time_s")["speed_mps"]
+    assert speeds.loc[22.0] == pytest.approx(6.0, abs=0.3)
+    assert speeds.loc[40.0] > 12.0
+
+
+def test_the_harder_of_two_brakings_counts() -> None:
+    """A vehicle held at its line at 4.5 m/s² is not braked more softly by a command of 1."""
+    scenario = replayed(four_way(profile="fair"), STRAIGHT, horizon=60.0)
+    held = minisim.simulate(scenario, Fixed(Plan()), record="all").trace["a"].min()
+    told = minisim.simulate(scenario, Timed({33.0: (Brake(0, 1.0),)}, is_open=False), record="all")
+    assert told.trace["a"].min() == pytest.approx(held) == pytest.approx(-4.5)
+
+
+def test_braking_ends_when_the_vehicle_leaves_the_view() -> None:
+    """Nobody sees it any more, so nobody could lift it."""
+    free = braked(LAWS["idm"], {}, reach=0.0)
+    soft = braked(LAWS["idm"], {35.0: (Brake(0, 1.0),)}, reach=0.0)
+    assert soft.trace["v"].min() == pytest.approx(12.5, abs=0.7)
+    assert soft.trace["v"][-1] > 13.9
+    gone = braked(LAWS["idm"], {50.0: (Brake(0, 9.0),)}, reach=0.0)
+    assert digest(gone) == digest(free)
 
 
 def test_queue_stands_at_the_minimum_gap() -> None:
@@ -355,7 +446,20 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
 
 @pytest.mark.parametrize(
     "command",
-    [Go(99), Hold(-1), Open(4), Close(-1), Advise(0, -1.0), Wake(0.0), "go", None, Go("x")],
+    [
+        Go(99),
+        Hold(-1),
+        Open(4),
+        Close(-1),
+        Advise(0, -1.0),
+        Brake(0, -1.0),
+        Brake(9, 1.0),
+        Brake(0, math.inf),
+        Wake(0.0),
+        "go",
+        None,
+        Go("x"),
+    ],
     ids=repr,
 )
 def test_bad_commands_are_named(command: object) -> None:

@@ -50,9 +50,11 @@ def check(analysis: Analysis, n: int) -> None:
 
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_every_claim_holds_in_every_case(n: int) -> None:
-    analysis = analyse(HarmonyMatrix.paper(n))
+    told: list[tuple[int, int]] = []
+    analysis = analyse(HarmonyMatrix.paper(n), progress=lambda *done: told.append(done))
     assert analysis.holds, [claim for claim in analysis.claims if not claim.holds]
     check(analysis, n)
+    assert told == [(case, CASES[n]) for case in [*range(256, CASES[n], 256), CASES[n]]]
 
 
 @pytest.mark.slow
@@ -68,6 +70,18 @@ def test_lanes_first_is_not_always_the_largest(n: int) -> None:
     false = {claim.name: claim.failures for claim in analysis.claims if not claim.holds}
     assert false == {"largest": SMALLER[n]}
     check(analysis, n)
+    by_lanes, by_size = (DecisionTable(analysis.matrix, order) for order in ("lanes", "size"))
+    differing = [m for m in by_size if by_lanes.decide(m) != by_size.decide(m)]
+    for claim in analysis.claims:
+        assert claim.example == (None if claim.holds else min(differing, key=len))
+
+
+@pytest.mark.parametrize("order", ["size", "lanes"])
+def test_the_claims_hold_with_given_priorities(order: str) -> None:
+    analysis = analyse(HarmonyMatrix.paper(4), order, (2, 3, 1, 0))
+    assert analysis.priorities == (2, 3, 1, 0)
+    assert {c.name for c in analysis.claims if not c.holds} <= {"largest"}
+    assert analysis.holds == (order == "size")
 
 
 def test_ties_of_the_papers_255_cases() -> None:
@@ -115,6 +129,8 @@ def test_orders() -> None:
     around = list(node_orders(four, 6))
     assert len(set(around)) == 8
     assert {order[0] for order in around} == set(four)
+    a, b, c, d = four
+    assert around[:4] == [(a, b, c, d), (a, d, c, b), (b, c, d, a), (b, a, d, c)]
 
 
 WRONG = {

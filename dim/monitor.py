@@ -1,0 +1,286 @@
+"""The safety monitor: each vehicle's last resort when others do not do what it reads them to want.
+
+The decision protects whoever reads the others' intents right. A monitor does not decide; it looks,
+in one vehicle and at what that vehicle sees, at those who are crossing or can no longer stop:
+
+- *What another may do* is what it was read to want, as long as its motion does not contradict
+  that. A vehicle beside every path that it could be on by that reading, or one that was read to
+  want this and then that, may do whatever its position on the fan of its lane's paths still allows.
+- *Where it matters* is the conflict area of the two paths (`dim.occupancy`). The ego has to be able
+  to stop before it, however far the other goes, unless it is out of it in good time.
+- *Then it brakes*: when the braking that this takes is no longer less than comfortable, as hard as
+  it takes. Where it is too late for that it compares whether going on or braking touches.
+
+Who crosses by unanimous decisions is in harmony with all others who do (the protocol's proof, see
+`dim.protocol`). So with exact perception, and `commit="stoppable"`, nobody is ever in the way of
+anybody as far as a monitor can tell, it never brakes, and a run is the same as without it.
+
+Two who brake for each other must not stand for ever: of two that stand, the one further in goes
+first, of equals the one of the first lane, unless the other stands in its way. Both can see that.
+
+Nor must those who wait for each other: vehicles that read each other differently may each find
+that it is not its turn. Somebody always has a right of way, so where nobody crosses and everybody
+has been standing for a while, somebody has misread. Then the first lane goes, alone, for which no
+intent needs to be known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dim.harmony import HarmonyMatrix
+from dim.occupancy import Area, area, showing
+from dim.perception import UNKNOWN
+from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
+from minisim.errors import number
+
+#: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
+#: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
+TIME_MARGIN = 1.0
+
+#: How far beside a path a vehicle may seem to be while it is on it [m]: the lateral error that
+#: automated driving on local streets must stay below (0.29 m; Reid et al., "Localization
+#: requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv 1906.01061).
+TOLERANCE = 0.3
+
+#: How far ahead motion is predicted where it is too late to stop clear of the area [s]: longer than
+#: a vehicle at 20 km/h takes through the junction.
+LOOK_AHEAD = 4.0
+
+#: Who is slower than this stands [m/s]; SUMO's definition of waiting.
+STANDING = 0.1
+
+#: What a vehicle that stops leaves between itself and where it must not be [m].
+ROOM = 0.25
+
+
+#: How long all who take part stand before the first of them goes alone [s]: what an all-way stop
+#: takes between two vehicles at most, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
+PATIENCE = 2.0
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """A last resort for every vehicle, beside what it decides.
+
+    Attributes:
+        time_margin: least time between leaving a conflict area and another's entering it [s].
+        look_ahead: how far ahead motion is predicted [s].
+        tolerance: how far beside a path a vehicle may seem to be while it is on it [m].
+        deceleration: how hard it brakes at most [m/s²]; None is what the brakes can do.
+        patience: how long all who take part stand before the first of them goes alone [s].
+
+    Raises:
+        InputError: a number out of range.
+    """
+
+    time_margin: float = TIME_MARGIN
+    look_ahead: float = LOOK_AHEAD
+    tolerance: float = TOLERANCE
+    deceleration: float | None = None
+    patience: float = PATIENCE
+
+    def __post_init__(self) -> None:
+        number("time_margin [s]", self.time_margin, low=0, high=10)
+        number("look_ahead [s]", self.look_ahead, low=0.5, high=30)
+        number("tolerance [m]", self.tolerance, above=0, high=1)
+        number("patience [s]", self.patience, low=0.5, high=60)
+        if self.deceleration is not None:
+            number("deceleration of the monitor [m/s²]", self.deceleration, above=0, high=1000)
+
+    def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
+        """Begin a run.
+
+        Args:
+            site: where.
+            matrix: which movements are in harmony.
+            sight: from where on before the junction vehicles take part [m].
+        """
+        return Watch(self, site, matrix, sight)
+
+
+class Watch:
+    """The monitors of all vehicles in one run; each uses what its own vehicle sees.
+
+    Attributes:
+        needed: whether anybody might get in the way of another before the next wake-up.
+    """
+
+    def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
+        self.needed = False
+        self._sight, self._patience = sight, monitor.patience
+        self._since: dict[int, float] = {}
+        self._alone: set[int] = set()
+        self._margin = monitor.time_margin
+        self._site, self._n = site, site.intersection.n
+        self._conflict = ~matrix.values
+        self._shows = showing(site, monitor.tolerance)
+        self._times = np.arange(0.0, monitor.look_ahead, site.dt)
+        vehicle = site.vehicle
+        self._a, self._b = vehicle.acceleration, vehicle.deceleration
+        asked = monitor.deceleration or vehicle.max_deceleration
+        self._b_max = min(asked, vehicle.max_deceleration)
+        self._gentle = min(self._b, self._b_max)
+        self._readings: dict[tuple[int, int], set[int]] = {}
+        self._braking: dict[int, float] = {}
+
+    def goes(
+        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
+    ) -> bool:
+        """Whether a vehicle goes: as it decided, or alone where all stand and wait.
+
+        Args:
+            view: the true one; of others only where they are and how fast is taken from it.
+            seen: what the ego sees.
+            decided: whether it goes by its own decision.
+            ranks: of the lanes, 0 first.
+        """
+        alone = ego.id in self._alone
+        if not alone and (decided or ego.speed >= STANDING):
+            self._since.pop(ego.id, None)
+            return decided
+        ids = {v.id for v in seen.vehicles}
+        near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
+        free = not any(self._crosses(v) for v in near if v.id != ego.id)
+        if alone:
+            if free or self._crosses(ego):
+                return True
+            self._alone.discard(ego.id)
+            return False
+        fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
+        stuck = free and all(v.speed < STANDING for v in fronts.values())
+        if not stuck or fronts.get(ego.lane) != ego:
+            self._since.pop(ego.id, None)
+            return False
+        since = self._since.setdefault(ego.id, view.time)
+        if view.time < since + self._patience or min(fronts, key=ranks.__getitem__) != ego.lane:
+            return False
+        del self._since[ego.id]
+        self._alone.add(ego.id)
+        return True
+
+    def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
+        """Who has to brake, and how hard.
+
+        Args:
+            view: the true one; of others only where they are and how fast is taken from it.
+            seen: what each vehicle in it that can decide sees, by id.
+            going: ids of those who hold a right of way.
+        """
+        crossing = [v for v in view.vehicles if self._crosses(v)]
+        inside = {v.id for v in crossing}
+        egos = [v for v in view.vehicles if v.id in seen and (v.id in going or v.id in inside)]
+        here = seen.keys()
+        self._alone &= here
+        self._since = {vehicle: since for vehicle, since in self._since.items() if vehicle in here}
+        self.needed = (
+            bool(self._since) or len({v.lane for v in crossing} | {v.lane for v in egos}) > 1
+        )
+        readings = self._readings
+        self._readings = {}
+        braking: dict[int, float] = {}
+        for ego in egos:
+            read = {v.id: v.manoeuvre for v in seen[ego.id].vehicles}
+            asked = 0.0
+            for other in crossing:
+                if other.lane == ego.lane or other.id not in read:
+                    continue
+                key = ego.id, other.id
+                known = readings.get(key, set()) | {read[other.id]}
+                self._readings[key] = known
+                asked = max(asked, self._asked(ego, other, known))
+            if asked > 0.0:
+                braking[ego.id] = asked
+        for ego in view.vehicles:
+            if braking.get(ego.id, 0.0) != self._braking.get(ego.id, 0.0):
+                yield Brake(ego.id, braking.get(ego.id, 0.0))
+        self._braking = braking
+
+    def _crosses(self, vehicle: Observed) -> bool:
+        return vehicle.distance < 0.0 or not can_stop(vehicle, self._b)
+
+    def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
+        """How hard the ego has to brake for another, whatever that may do [m/s²]; 0 not at all."""
+        mine = ego.lane * (self._n - 1) + ego.manoeuvre - 1
+        asked = 0.0
+        for theirs in self._possible(other, readings):
+            if self._conflict[mine, theirs]:
+                asked = max(asked, self._asked_by(ego, mine, other, theirs))
+        return asked
+
+    def _possible(self, other: Observed, readings: set[int]) -> list[int]:
+        """The movements that another may take, by index."""
+        first = other.lane * (self._n - 1)
+        shown = self._shows[first + other.manoeuvre - 1]
+        allowed = [k for k in range(first, first + self._n - 1) if -other.distance < shown[k]]
+        if len(readings) == 1 and UNKNOWN not in readings:
+            (reading,) = readings
+            if first + reading - 1 in allowed:
+                return [first + reading - 1]
+        return allowed
+
+    def _asked_by(self, ego: Observed, mine: int, other: Observed, theirs: int) -> float:
+        shared = area(self._site, mine, theirs)
+        mirrored = area(self._site, theirs, mine)
+        if shared is None or mirrored is None:
+            return 0.0
+        x, y = -ego.distance, -other.distance
+        room = shared.room(x, y)
+        if room == math.inf:
+            return 0.0
+        first = _goes_first(ego, other)
+        if other.speed < STANDING and self._open(mine, x, other):
+            stuck = mirrored.way(y, x) < math.inf  # the other, as long as the ego stands
+            if first or stuck:
+                return 0.0
+        if self._passes_first(ego, other, shared, mirrored):
+            return 0.0
+        if not first and stopping_distance(ego.speed, self._b_max) + ROOM <= ego.distance:
+            room = min(room, ego.distance)  # there it keeps nobody from clearing the junction
+        return self._braking_for(ego, other, room - ROOM, shared)
+
+    def _open(self, mine: int, x: float, other: Observed) -> bool:
+        """Whether nobody is in the ego's way as long as the other stands where its body is."""
+        body = other.lane * (self._n - 1) + other.manoeuvre - 1  # a path that it is on
+        shared = area(self._site, mine, body)
+        return shared is None or shared.way(x, -other.distance) == math.inf
+
+    def _passes_first(self, ego: Observed, other: Observed, shared: Area, mirrored: Area) -> bool:
+        """Whether the ego, as fast as now, is out of the area in good time before the other."""
+        if ego.speed < STANDING:
+            return False
+        leaves = (shared.ends(-other.distance) + ego.distance) / ego.speed
+        ahead = mirrored.room(-other.distance, -ego.distance)
+        v, a = other.speed, self._a
+        comes = (math.sqrt(v * v + 2.0 * a * ahead) - v) / a
+        return leaves + self._margin < comes
+
+    def _braking_for(self, ego: Observed, other: Observed, room: float, shared: Area) -> float:
+        v, a, dt = ego.speed, self._a, self._site.dt
+        after = v + a * dt
+        left = room - (v + after) / 2.0 * dt
+        if left > 0.0 and after * after <= 2.0 * self._gentle * left:
+            return 0.0
+        if room > 0.0 and v * v <= 2.0 * self._b_max * room:
+            return max(self._gentle, v * v / (2.0 * room))
+        if self._touches(ego, -self._b_max, other, shared) and not self._touches(
+            ego, a, other, shared
+        ):
+            return 0.0
+        return self._b_max
+
+    def _touches(self, ego: Observed, acceleration: float, other: Observed, shared: Area) -> bool:
+        """Whether the two come too near while the other goes on as it does."""
+        t = self._times
+        stops = ego.speed / -acceleration if acceleration < 0.0 else math.inf
+        driven = np.minimum(t, stops)
+        mine = ego.speed * driven + acceleration * driven * driven / 2.0
+        return shared.touches(mine - ego.distance, other.speed * t - other.distance)
+
+
+def _goes_first(one: Observed, other: Observed) -> bool:
+    return (one.distance, one.lane) < (other.distance, other.lane)

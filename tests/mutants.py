@@ -1,0 +1,178 @@
+"""mutmut, with a faster way to run the tests; `make mutants`.
+
+    python tests/mutants.py run ['dim.zones*' …]   # test the mutants that have no verdict yet
+    python tests/mutants.py results                # those that survived
+    python tests/mutants.py show MUTANT            # what was changed
+    python tests/mutants.py table                  # how many, by module
+    python tests/mutants.py sample 80              # names of mutants drawn at random, to `run`
+
+As it comes, mutmut has pytest collect the tests anew for every mutant, which takes longer than to
+run them. Here they are collected once, and each mutant is tried in a fork of that process: by the
+tests that reach the changed function, fast ones first, up to the first that fails.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import signal
+import sys
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+import mutmut.workers.isolation
+import pytest
+from _pytest.config import _prepareconfig
+from mutmut.__main__ import cli
+from mutmut.runners.harness import PytestRunner
+from mutmut.state import state
+from mutmut.stats import status_by_exit_code
+from mutmut.utils.file_utils import change_cwd
+
+#: A mutant is tried with so many seconds of tests, as they take with the original.
+BUDGET = float(os.environ.get("MUTANTS_BUDGET", "12"))
+
+#: CPU time that a test may take with a mutant [s]: so much, and so many times its usual time.
+LEAST, FACTOR = 4.0, 4.0
+
+#: pytest's exit code when a test fails, and mutmut's for a mutant that hangs.
+FAILS, HANGS = 1, 36
+
+
+class EmptyCaches:
+    """A plugin of pytest: nothing that a function of `dim` once answered outlives a test.
+
+    A cached answer of the original would hide a mutant, and a test that is served from a cache
+    would not be known to reach the function behind it.
+    """
+
+    def pytest_runtest_setup(self) -> None:
+        """Before each test."""
+        for name, module in list(sys.modules.items()):
+            if name.partition(".")[0] == "dim":
+                for value in vars(module).values():
+                    if hasattr(value, "cache_clear"):
+                        value.cache_clear()
+
+
+class Collected(PytestRunner):
+    """Runs tests that were collected once."""
+
+    def warm_up(self) -> None:
+        """Collect all tests, and see in a fork that the original passes them."""
+        # mutmut leaves a file open in each fork, and pytest would blame that on some test.
+        args = ["--rootdir=.", "-q", "-p", "no:unraisableexception", *self._pytest_add_cli_args]
+        with change_cwd("mutants"):
+            config = _prepareconfig(
+                [*args, *self._pytest_add_cli_args_test_selection], [EmptyCaches()]
+            )
+            config._do_configure()
+            self.session = pytest.Session.from_config(config)
+            config.hook.pytest_sessionstart(session=self.session)
+            config.hook.pytest_collection(session=self.session)
+        if not (child := os.fork()):
+            os._exit(self.run_tests(mutant_name="none", tests=state().duration_by_test))
+        if os.waitpid(child, 0)[1]:
+            raise RuntimeError("the original does not pass its tests: every mutant would be killed")
+
+    def execute_pytest(self, params: list[str], **kwargs: Any) -> int:
+        """What has to do with the original, as mutmut does it."""
+        kwargs["plugins"] = [*kwargs.get("plugins", []), EmptyCaches()]
+        return super().execute_pytest(params, **kwargs)
+
+    def run_tests(self, *, mutant_name: str | None, tests: Iterable[str]) -> int:
+        """0 if they pass, `FAILS` after the first that does not, or the end by `HANGS`."""
+        tests = _affordable(tests)
+        if mutant_name is None:
+            return super().run_tests(mutant_name=None, tests=tests)
+        found = {item.nodeid: item for item in self.session.items}
+        items = [found[test] for test in tests]
+        signal.signal(signal.SIGPROF, lambda *_: os._exit(HANGS))
+        with change_cwd("mutants"):
+            for item, following in zip(items, [*items[1:], None], strict=True):
+                limit = LEAST + FACTOR * state().duration_by_test[item.nodeid]
+                signal.setitimer(signal.ITIMER_PROF, limit)
+                item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+                if self.session.testsfailed:
+                    return FAILS
+        return 0
+
+
+def _affordable(tests: Iterable[str]) -> list[str]:
+    """The fastest, as far as `BUDGET` goes."""
+    durations, left, chosen = state().duration_by_test, BUDGET, []
+    for test in sorted(tests, key=lambda test: (durations[test], test)):
+        left -= durations[test]
+        if left >= 0.0:
+            chosen.append(test)
+    return chosen
+
+
+def _verdicts() -> dict[str, dict[str, int | None]]:
+    """Module -> mutant -> exit code of its tests, None for those not tried yet."""
+    return {
+        path.name.removesuffix(".meta"): json.loads(path.read_text(encoding="utf-8"))[
+            "exit_code_by_key"
+        ]
+        for path in sorted(Path("mutants/dim").glob("*.py.meta"))
+    }
+
+
+@cli.command()
+@click.argument("size", type=int)
+def sample(size: int) -> None:
+    """Print so many mutants of each module, drawn at random, always the same."""
+    for module, codes in _verdicts().items():
+        names = sorted(codes)
+        for name in random.Random(module).sample(names, min(size, len(names))):
+            print(name)
+
+
+@cli.command()
+def table() -> None:
+    """Print how many mutants there are, were tried and survived, by module."""
+    print("| module | mutants | tried | killed | survived | score | 95 % interval |")
+    print("|---|---|---|---|---|---|---|")
+    everything: list[int | None] = []
+    for module, codes in _verdicts().items():
+        if codes:
+            print(_row(f"`{module}`", list(codes.values())))
+            everything += codes.values()
+    print(_row("all", everything))
+
+
+def _row(name: str, codes: list[int | None]) -> str:
+    verdicts = Counter(status_by_exit_code[code] for code in codes if code is not None)
+    tried, survived = verdicts.total(), verdicts["survived"] + verdicts["no tests"]
+    killed = tried - survived
+    score = f"{100.0 * killed / tried:.1f} %" if tried else "–"
+    low, high = _interval(killed, tried)
+    return (
+        f"| {name} | {len(codes)} | {tried} | {killed} | {survived} | {score} | "
+        f"{100.0 * low:.0f}–{100.0 * high:.0f} % |"
+    )
+
+
+def _interval(killed: int, tried: int) -> tuple[float, float]:
+    """What share would be killed if all were tried: Wilson's score interval at 95 %.
+
+    Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
+    Assoc. 22 (1927).
+    """
+    if not tried:
+        return 0.0, 1.0
+    z = 1.96
+    share, weight = killed / tried, z * z / tried
+    centre = (share + weight / 2.0) / (1.0 + weight)
+    half = z / (1.0 + weight) * math.sqrt((share * (1.0 - share) + weight / 4.0) / tried)
+    return centre - half, centre + half
+
+
+if __name__ == "__main__":
+    mutmut.workers.isolation.PytestRunner = Collected  # type: ignore[misc]
+    cli()

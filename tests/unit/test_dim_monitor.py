@@ -1,0 +1,330 @@
+"""The safety monitor: what another may do, how hard to brake, who goes on, and whom it saves."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import minisim
+from dim import Dim, HarmonyMatrix, Monitor, NoisyPerception
+from dim.monitor import ROOM, Watch
+from dim.occupancy import STEP, area, showing
+from dim.perception import UNKNOWN, See
+from minisim.control import Brake, Observed, Site, View
+from minisim.errors import InputError
+from minisim.geometry import Movement
+from minisim.run import Run
+from scenarios import Scenario, four_way
+from tests.runs import digest, drained, replayed
+
+SCENARIO = four_way(250, profile="fair", arm_length=150.0)
+SITE = SCENARIO.site(0)
+MATRIX = HarmonyMatrix.from_geometry(SITE.intersection, SITE.vehicle)
+SIGHT = 8.0
+
+
+def car(vehicle: int, movement: str, past: float, speed: float) -> Observed:
+    """A vehicle whose front is so far past the entry [m]."""
+    lane, manoeuvre = MATRIX.movements[MATRIX.index(movement)]
+    return Observed(vehicle, lane, manoeuvre, -past, speed, SITE.vehicle.length)
+
+
+def view(*cars: Observed, time: float = 0.0) -> View:
+    return View(time, tuple(sorted(cars, key=lambda c: (c.lane, c.distance))))
+
+
+def watch(**options: float) -> Watch:
+    return Monitor(**options).start(SITE, MATRIX, SIGHT)
+
+
+def read_as(seen: View, **readings: int) -> View:
+    """What is seen where the vehicles of a lane are read to want this manoeuvre."""
+    return View(
+        seen.time,
+        tuple(v._replace(manoeuvre=readings.get("abcd"[v.lane], v.manoeuvre)) for v in seen[1]),
+    )
+
+
+def braking(
+    watch: Watch, true: View, seen: dict[int, View] | None = None, going: set[int] | None = None
+) -> dict[int, float]:
+    """Who is told to brake at what, if all see everything unless said otherwise."""
+    everything = {v.id: true for v in true.vehicles}
+    ids = set(everything)
+    commands = list(watch.look(true, everything | (seen or {}), ids if going is None else going))
+    assert all(isinstance(command, Brake) for command in commands)
+    return {command.vehicle: command.deceleration for command in commands}
+
+
+# What another may do.
+
+
+def test_a_reading_holds_as_long_as_motion_does_not_contradict_it() -> None:
+    """a3 is read as a2, in harmony with c2, until it is 0.3 m beside that path."""
+    shows = showing(SITE, 0.3)[2, 1]
+    for past in (0.0, 1.0, shows - 0.01, shows + 0.01, 4.0):
+        true = view(car(1, "a3", past, 6.0), car(2, "c2", past, 6.0))
+        told = braking(watch(), true, {2: read_as(true, a=2)})
+        assert (2 in told) == (past > shows), past
+        assert 1 in told, "the other has read c2 right"
+
+
+def test_a_reading_that_changes_is_a_doubt() -> None:
+    monitors = watch()
+    true = view(car(1, "a2", 0.5, 6.0), car(2, "c2", 2.0, 6.0))
+    assert braking(monitors, true) == {}
+    assert 2 in braking(monitors, true, {2: read_as(true, a=3)})
+    assert braking(monitors, true, {2: read_as(true, a=2)}) == {}, "no change: it still brakes"
+
+
+def test_an_unknown_intent_is_every_manoeuvre() -> None:
+    true = view(car(1, "a2", 0.5, 6.0), car(2, "c2", 2.0, 6.0))
+    assert 2 in braking(watch(), true, {2: read_as(true, a=UNKNOWN)})
+
+
+def test_who_is_not_seen_is_not_braked_for() -> None:
+    true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", 2.0, 6.0))
+    blind = view(car(2, "c2", 2.0, 6.0))
+    assert set(braking(watch(), true, {2: blind})) == {1}
+
+
+def test_whoever_can_stop_before_the_junction_is_nobodys_danger() -> None:
+    true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", -4.0, 5.0))
+    assert braking(watch(), true, going=set()) == {}
+
+
+# How hard.
+
+
+def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
+    """v²/2d before the conflict area, and not at all while less than b will do."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared = area(SITE, a2, b2)
+    assert shared is not None
+    room, v, b = shared.room(0.0, 3.0), 5.0, SITE.vehicle.deceleration
+    for left in np.arange(1.75, room, STEP).tolist():
+        true = view(car(1, "a2", room - left, v), car(2, "b2", 3.0, 5.0))
+        needed = v * v / (2.0 * (shared.room(room - left, 3.0) - ROOM))
+        told = braking(watch(), true).get(1, 0.0)
+        if told:
+            assert told == pytest.approx(max(needed, b))
+            assert needed > 0.6 * b, "one step more at full acceleration would take more than b"
+        else:
+            assert needed < b
+
+
+def test_it_brakes_no_harder_than_told() -> None:
+    for weak in (2.0, 5.0):
+        true = view(car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0))
+        told = braking(watch(deceleration=weak), true)
+        assert told
+        assert max(told.values()) <= weak
+
+
+def test_whoever_is_out_in_good_time_goes_on() -> None:
+    """Leaving at its speed, the other coming at full acceleration: the margin is between."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared, mirrored = area(SITE, a2, b2), area(SITE, b2, a2)
+    assert shared is not None
+    assert mirrored is not None
+    x, v, y, w, a = 14.0, 9.0, -2.2, 4.6, SITE.vehicle.acceleration
+    leaves = (shared.ends(y) - x) / v
+    room = mirrored.room(y, x)
+    comes = (math.sqrt(w * w + 2.0 * a * room) - w) / a
+    assert 0.3 < comes - leaves < 2.0
+    true = view(car(1, "a2", x, v), car(2, "b2", y, w))
+    assert 1 not in braking(watch(time_margin=comes - leaves - 0.01), true)
+    assert 1 in braking(watch(time_margin=comes - leaves + 0.01), true)
+
+
+# Who goes on.
+
+
+def conflicting() -> list[tuple[int, int]]:
+    m = MATRIX.movements
+    return [
+        (p, q)
+        for p, q in itertools.product(range(len(m)), repeat=2)
+        if m[p].origin < m[q].origin and not MATRIX.values[p, q]
+    ]
+
+
+@pytest.mark.parametrize(("p", "q"), conflicting())
+def test_of_two_that_stand_one_goes_on_wherever_they_stand(p: int, q: int) -> None:
+    """All positions: one whose way is free goes on, the other no further than it can stop."""
+    shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+    assert shared is not None
+    assert mirrored is not None
+    one, other = str(MATRIX.movements[p]), str(MATRIX.movements[q])
+    rows, columns = shared.close.shape
+    for x, y in itertools.product(range(0, rows, 2), range(0, columns, 2)):
+        s, t = (x + 0.5) * STEP, (y + 0.5) * STEP
+        told = braking(watch(), view(car(1, one, s, 0.0), car(2, other, t, 0.0)))
+        free = {1: shared.way(s, t) == math.inf, 2: mirrored.way(t, s) == math.inf}
+        room = {1: shared.room(s, t), 2: mirrored.room(t, s)}
+        go = {1, 2} - set(told)
+        assert go or not any(free.values()), (s, t)
+        into_the_area = {vehicle for vehicle in go if room[vehicle] <= ROOM}
+        assert len(into_the_area) <= 1, (s, t)
+        assert all(free[vehicle] for vehicle in into_the_area), (s, t)
+
+
+def test_where_all_stand_and_wait_the_first_lane_goes_alone() -> None:
+    monitors, ranks = watch(patience=2.0), (2, 0, 1, 3)
+    cars = [car(k, f"{lane}2", -2.25, 0.0) for k, lane in enumerate("abc")]
+    for tick in range(40):
+        seen = view(*cars, time=tick / 10)
+        going = [monitors.goes(seen, seen, v, False, ranks) for v in seen.vehicles]
+        list(monitors.look(seen, {v.id: seen for v in seen.vehicles}, set()))
+        assert going == [False, tick >= 20, False], "b has rank 0"
+    inside = view(*cars, car(9, "d2", 1.0, 5.0), time=4.0)
+    assert not monitors.goes(inside, inside, cars[1], False, ranks), "its turn is over"
+
+
+def test_nobody_goes_alone_where_somebody_moves_or_crosses() -> None:
+    for moving in (car(9, "d2", -6.0, 2.0), car(9, "d2", 3.0, 0.0)):
+        monitors = watch(patience=1.0)
+        for tick in range(30):
+            seen = view(car(0, "a2", -2.25, 0.0), moving, time=tick / 10)
+            assert not monitors.goes(seen, seen, seen.vehicles[0], False, (0, 1, 2, 3))
+
+
+# Whom it saves.
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Everybody else reads the vehicles of these lanes to want these manoeuvres."""
+
+    read: tuple[tuple[int, int], ...]
+    name: str = "wrong"
+    period: float = 0.1
+
+    def start(self, site: Site) -> See:
+        read = dict(self.read)
+
+        def see(true: View, ego: Observed) -> View:
+            return View(
+                true.time,
+                tuple(
+                    v if v.id == ego.id else v._replace(manoeuvre=read.get(v.lane, v.manoeuvre))
+                    for v in true.vehicles
+                ),
+            )
+
+        return see
+
+
+def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:
+    """Two in conflict, and what each is taken for, such that both see harmony."""
+    n = SITE.intersection.n
+    return [
+        (a, b, as_a, as_b)
+        for a, b in itertools.combinations(MATRIX.movements, 2)
+        if a.origin != b.origin and not MATRIX.harmony(a, b)
+        for as_a, as_b in itertools.product(range(1, n), repeat=2)
+        if MATRIX.harmony(Movement(a.origin, as_a), b)
+        and MATRIX.harmony(a, Movement(b.origin, as_b))
+    ]
+
+
+def meet(
+    pair: tuple[Movement, Movement, int, int], offset: float, monitor: Monitor | None, profile: str
+) -> Run:
+    a, b, as_a, as_b = pair
+    scenario = replayed(
+        four_way(profile=profile, arm_length=150.0),
+        (3.0, *a), (3.0 + offset, *b), horizon=120.0,
+    )  # fmt: skip
+    dim = Dim(perception=Wrong(((a.origin, as_a), (b.origin, as_b))), monitor=monitor)
+    return minisim.simulate(scenario, dim, on_collision="record")
+
+
+@pytest.mark.parametrize("profile", ["fair", "paper"])
+def test_two_that_misread_each_other_do_not_collide_nor_block(profile: str) -> None:
+    """The worst case: neither knows of the conflict until the other's motion shows it."""
+    without = 0
+    for pair in misread_pairs():
+        for offset in (-0.6, 0.0, 0.3):
+            run = meet(pair, offset, Monitor(), profile)
+            assert not run.collisions, (pair, offset)
+            assert run.columns.arrived.all(), (pair, offset)
+        without += len(meet(pair, 0.0, None, profile).collisions)
+    assert without > 0, "the test can fail"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["fair", "paper"])
+def test_two_that_misread_each_other_do_not_collide_whenever_they_come(profile: str) -> None:
+    for pair in misread_pairs():
+        for offset in np.arange(-2.0, 2.01, 0.1):
+            run = meet(pair, round(float(offset), 1), Monitor(), profile)
+            assert not run.collisions, (pair, offset)
+            assert run.columns.arrived.all(), (pair, offset)
+
+
+NOISY = NoisyPerception(intent_error=0.15, kind="symmetric")
+
+
+def test_noisy_intent_collides_without_it_and_not_with_it() -> None:
+    """Some 280 vehicles; nobody waits for ever either."""
+    scenario = drained(four_way(250, profile="fair", horizon=900.0, arm_length=150.0), 3, 3000.0)
+    for options in ({"shared": False}, {"persistent": False}):
+        noisy = dataclasses.replace(NOISY, **options)
+        bare = minisim.simulate(scenario, Dim(perception=noisy), 3, on_collision="record")
+        saved = minisim.simulate(scenario, Dim(perception=noisy, monitor=Monitor()), 3)
+        assert bare.collisions
+        assert saved.columns.arrived.all()
+
+
+def test_it_also_removes_what_the_papers_commit_rule_causes() -> None:
+    scenario = drained(four_way(300, horizon=900.0), 1, 3000.0)
+    bare = minisim.simulate(scenario, Dim(commit="paper"), 1, on_collision="record")
+    saved = minisim.simulate(scenario, Dim(commit="paper", monitor=Monitor()), 1)
+    assert bare.collisions
+    assert saved.columns.arrived.all()
+
+
+def test_it_never_acts_where_perception_is_exact() -> None:
+    for gate in ("clear", "harmonious"):
+        for scenario in (four_way(330, horizon=600.0), SCENARIO):
+            bare = run_of(scenario, Dim(gate=gate))
+            assert digest(run_of(scenario, Dim(gate=gate, monitor=Monitor()))) == digest(bare)
+
+
+def run_of(scenario: Scenario, dim: Dim) -> Run:
+    return minisim.simulate(scenario, dim, seed=2, record="junction")
+
+
+# Errors.
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"time_margin": -1.0}, "time_margin"),
+        ({"look_ahead": 0.0}, "look_ahead"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"tolerance": math.nan}, "tolerance"),
+        ({"deceleration": 0.0}, "deceleration of the monitor"),
+        ({"deceleration": "hard"}, "deceleration of the monitor"),
+        ({"patience": 0.0}, "patience"),
+    ],
+)
+def test_bad_parameters_are_named(options: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Monitor(**options)  # type: ignore[arg-type]
+
+
+def test_what_is_no_monitor_is_refused() -> None:
+    with pytest.raises(InputError, match="monitor"):
+        Dim(monitor=True)  # type: ignore[arg-type]
+
+
+def test_its_name_tells() -> None:
+    assert Dim(monitor=Monitor()).name == "dim-monitored"

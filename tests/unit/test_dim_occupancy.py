@@ -1,0 +1,99 @@
+"""Conflict areas against the bodies themselves, and when a turn shows against the arc's formula."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from dim import HarmonyMatrix
+from dim.occupancy import CLOSE, STEP, area, showing
+from minisim.control import CLEARANCE, Site
+from scenarios import four_way, three_way
+
+SITES = [three_way().site(0), four_way(profile="fair").site(0)]
+SITE = SITES[1]
+
+
+def pairs(site: Site) -> list[tuple[int, int]]:
+    movements = site.intersection.movements
+    return [
+        (p, q)
+        for p, one in enumerate(movements)
+        for q, other in enumerate(movements)
+        if one.origin != other.origin
+    ]
+
+
+@pytest.mark.parametrize("site", SITES, ids=["3", "4"])
+def test_movements_in_harmony_have_no_conflict_area_and_all_others_have(site: Site) -> None:
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    for p, q in pairs(site):
+        assert (area(site, p, q) is None) == matrix.values[p, q], (p, q)
+
+
+def test_outside_its_area_bodies_keep_their_distance() -> None:
+    """The grid promises it for every position, not only for its points."""
+    random = np.random.default_rng(1)
+    paths, vehicle = SITE.intersection.paths, SITE.vehicle
+    tested = 0
+    for p, q in pairs(SITE)[::5]:
+        shared = area(SITE, p, q)
+        if shared is None:
+            continue
+        x = random.uniform(0.0, (shared.close.shape[0] - 1) * STEP, 300)
+        y = random.uniform(0.0, (shared.close.shape[1] - 1) * STEP, 300)
+        one = shapely.polygons(paths[p].bodies(paths[p].entry + x, vehicle))
+        other = shapely.polygons(paths[q].bodies(paths[q].entry + y, vehicle))
+        distance = shapely.distance(one, other)
+        for k in range(len(x)):
+            if shared.way(x[k], y[k]) > 0.0:
+                assert distance[k] > CLOSE
+            if shared.room(x[k], y[k]) > 0.0:
+                assert distance[k] > CLEARANCE
+                tested += 1
+    assert tested > 500
+
+
+def test_an_area_is_the_others_mirrored() -> None:
+    for p, q in pairs(SITE):
+        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        if shared is not None:
+            assert mirrored is not None
+            assert (shared.close == mirrored.close.T).all()
+
+
+def test_whoever_has_stopped_in_time_is_in_nobodys_way() -> None:
+    """However far the other goes: that is what `room` is."""
+    for p, q in pairs(SITE):
+        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        if shared is None or mirrored is None:
+            continue
+        for x in np.arange(0.0, shared.close.shape[0] * STEP, STEP):
+            for y in np.arange(0.0, shared.close.shape[1] * STEP, 4 * STEP):
+                if shared.room(x, y) > 0.0:
+                    assert mirrored.way(y, x) == math.inf
+
+
+def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
+    a2, b2 = 1, 4
+    shared = area(SITE, a2, b2)
+    assert shared is not None
+    assert shared.room(-3.0, -50.0) == pytest.approx(shared.room(0.0, 0.0) + 3.0)
+    assert shared.room(100.0, 0.0) == math.inf
+    assert shared.room(0.0, 100.0) == math.inf
+    assert shared.room(shared.ends(0.0) + STEP, 0.0) == math.inf
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 0.3, 0.6])
+def test_a_turn_shows_where_the_arc_has_left_the_straight_lane(tolerance: float) -> None:
+    """Beside a straight line an arc of radius r is r(1 − cos(s/r)) after s."""
+    shows = showing(SITE, tolerance)
+    for turn in (0, 2):
+        radius = SITE.intersection.paths[turn].radius
+        expected = radius * math.acos(1.0 - tolerance / radius)
+        assert shows[turn, 1] == pytest.approx(expected, abs=0.06)
+    assert shows[0, 0] == math.inf
+    assert (shows[:3, 3:] == 0.0).all()
