@@ -121,6 +121,16 @@ def test_one_wrong_reading_can_stop_everybody() -> None:
     assert tally.counts == {**NONE, "deadlock_s": 2.5, "disagreement_s": 2.5}
 
 
+def test_times_are_rounded_to_a_microsecond() -> None:
+    """0.1 + 0.2 is 0.3; in floating point, a bit more."""
+    tally = session(Told((((1, 4), 2),)))
+    for time in (0.0, 0.1, 0.1 + 0.2):
+        show(tally, time, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 0.3, "disagreement_s": 0.3}
+    show(tally, 1.3000001, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 1.3, "disagreement_s": 1.3}
+
+
 def test_crossings_are_counted_however_rarely_one_looks() -> None:
     tally = session(Told())
     show(tally, 0.0, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1))
