@@ -142,6 +142,86 @@ def test_whoever_is_out_in_good_time_goes_on() -> None:
     assert 1 in braking(watch(time_margin=comes - leaves + 0.01), true)
 
 
+def test_it_brakes_when_one_more_step_would_take_more_than_comfort() -> None:
+    """That step at full acceleration, then v²/2b, and `ROOM`."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared = area(SITE, a2, b2)
+    assert shared is not None
+    a, b, dt, v = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt, 4.0
+    after = v + a * dt
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
+    x = shared.room(0.0, 3.0) - needed
+    assert x > 0.0
+    other = car(2, "b2", 3.0, 5.0)
+    assert 1 not in braking(watch(), view(car(1, "a2", x - 1e-3, v), other))
+    assert braking(watch(), view(car(1, "a2", x + 1e-3, v), other))[1] == b
+    gentle = 0.7 * b
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * gentle) + ROOM
+    x = shared.room(0.0, 3.0) - needed
+    assert 1 not in braking(watch(deceleration=gentle), view(car(1, "a2", x - 1e-3, v), other))
+    assert braking(watch(deceleration=gentle), view(car(1, "a2", x + 1e-3, v), other))[1] == gentle
+
+
+def test_whoever_still_can_stops_before_the_junction() -> None:
+    """There it keeps nobody from clearing it; the conflict area begins later."""
+    a, b, dt, v = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt, 5.0
+    after = v + a * dt
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
+    other = car(2, "b2", 3.0, 5.0)
+    assert 1 not in braking(watch(), view(car(1, "a2", -needed - 1e-3, v), other))
+    told = braking(watch(), view(car(1, "a2", -needed + 1e-3, v), other))[1]
+    assert told == pytest.approx(max(b, v * v / (2.0 * (needed - ROOM))))
+
+
+@pytest.mark.parametrize("look_ahead", [1.0, 4.0])
+def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None:
+    """Brake as hard as possible, unless only going on touches nobody; all positions."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared, mirrored = area(SITE, a2, b2), area(SITE, b2, a2)
+    assert shared is not None
+    assert mirrored is not None
+    a, most = SITE.vehicle.acceleration, SITE.vehicle.max_deceleration
+    v, w, t = 6.0, 5.0, np.arange(0.0, look_ahead, SITE.dt)
+    rolling = np.minimum(t, v / most)
+    answers = set()
+    for x, y in itertools.product(np.arange(0.1, 15.0, 0.5), np.arange(0.1, 15.0, 0.5)):
+        room = shared.room(x, y)
+        comes = (math.sqrt(w * w + 2.0 * a * mirrored.room(y, x)) - w) / a
+        in_time = (shared.ends(y) - x) / v + 1.0 < comes
+        if room == math.inf or in_time or v * v <= 2.0 * most * (room - ROOM):
+            continue
+        brakes = shared.touches(x + v * rolling - most / 2.0 * rolling**2, y + w * t)
+        goes = shared.touches(x + v * t + a / 2.0 * t**2, y + w * t)
+        true = view(car(1, "a2", float(x), v), car(2, "b2", float(y), w))
+        told = braking(watch(look_ahead=look_ahead), true).get(1, 0.0)
+        assert told == (0.0 if brakes and not goes else most), (x, y)
+        answers.add(told)
+    assert answers == {0.0, most}, "both occur"
+
+
+def test_it_is_told_when_it_may_stop_braking_and_nothing_twice() -> None:
+    monitors = watch()
+    ego, other = car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0)
+    assert braking(monitors, view(ego, other))[1] > 0.0
+    assert braking(monitors, view(ego, other)) == {}
+    assert braking(monitors, view(ego)) == {1: 0.0}
+    assert braking(monitors, view(ego)) == {}
+
+
+def test_it_is_needed_where_two_lanes_may_meet() -> None:
+    standing = car(3, "c2", -2.25, 0.0)
+    for cars, going, needed in (
+        ([car(1, "a2", 2.0, 5.0)], set(), False),
+        ([car(1, "a2", 9.0, 5.0), car(2, "a3", 2.0, 5.0)], set(), False),
+        ([car(1, "a2", 2.0, 5.0), car(2, "c2", 2.0, 5.0)], set(), True),
+        ([car(1, "a2", 2.0, 5.0), standing], set(), False),
+        ([car(1, "a2", 2.0, 5.0), standing], {3}, True),
+    ):
+        monitors = watch()
+        braking(monitors, view(*cars), going=going)
+        assert monitors.needed is needed, (cars, going)
+
+
 # Who goes on.
 
 
@@ -192,6 +272,50 @@ def test_nobody_goes_alone_where_somebody_moves_or_crosses() -> None:
         for tick in range(30):
             seen = view(car(0, "a2", -2.25, 0.0), moving, time=tick / 10)
             assert not monitors.goes(seen, seen, seen.vehicles[0], False, (0, 1, 2, 3))
+
+
+def stands(monitors: Watch, seen: View, vehicle: int, decided: bool = False) -> bool:
+    """Whether a vehicle goes that sees everything."""
+    ego = next(v for v in seen.vehicles if v.id == vehicle)
+    return monitors.goes(seen, seen, ego, decided, (0, 1, 2, 3))
+
+
+def test_patience_begins_anew_whenever_anything_happens() -> None:
+    ego, other = car(0, "a2", -2.25, 0.0), car(1, "b2", -2.25, 0.0)
+    happens = {
+        "another moves": (view(ego, other._replace(speed=0.2), time=1.0), False),
+        "another crosses": (view(ego, car(2, "c2", 1.0, 0.0), time=1.0), False),
+        "it moves": (view(ego._replace(speed=0.1), other, time=1.0), False),
+        "it may go": (view(ego, other, time=1.0), True),
+        "somebody is before it": (view(ego, car(3, "a2", -1.0, 0.0), time=1.0), False),
+    }
+    for what, (meanwhile, decided) in happens.items():
+        monitors = watch(patience=2.0)
+        assert not stands(monitors, view(ego, other), 0)
+        assert stands(monitors, meanwhile, 0, decided) is decided
+        assert not stands(monitors, view(ego, other, time=1.5), 0)
+        assert not stands(monitors, view(ego, other, time=3.4), 0), what
+        assert stands(monitors, view(ego, other, time=3.5), 0), what
+
+
+def test_who_is_far_or_not_seen_does_not_matter_to_the_patient() -> None:
+    ego, far = car(0, "a2", -2.25, 0.0), car(1, "b2", -SIGHT - 0.1, 5.0)
+    hidden = car(2, "c2", 1.0, 5.0)
+    monitors = watch(patience=1.0)
+    for time, goes in ((0.0, False), (0.9, False), (1.0, True)):
+        true, seen = view(ego, far, hidden, time=time), view(ego, far, time=time)
+        assert monitors.goes(true, seen, ego, False, (0, 1, 2, 3)) is goes
+
+
+def test_whoever_went_alone_goes_on_once_it_is_inside() -> None:
+    ego, other = car(0, "a2", -2.25, 0.0), car(1, "b2", 1.0, 3.0)
+    monitors = watch(patience=1.0)
+    assert not stands(monitors, view(ego), 0)
+    assert stands(monitors, view(ego, time=1.0), 0)
+    assert stands(monitors, view(ego._replace(distance=2.0, speed=1.0), time=1.2), 0)
+    assert stands(monitors, view(ego._replace(distance=-1.0, speed=3.0), other, time=1.5), 0)
+    assert not stands(monitors, view(ego._replace(distance=2.0, speed=0.5), other, time=1.6), 0)
+    assert not stands(monitors, view(ego, time=1.7), 0), "it gave it back"
 
 
 # Whom it saves.
