@@ -201,10 +201,10 @@ def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None
 
 def test_it_is_told_when_it_may_stop_braking_and_nothing_twice() -> None:
     monitors = watch()
-    ego, other = car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0)
-    assert braking(monitors, view(ego, other))[1] > 0.0
+    other, ego = car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0)
+    assert braking(monitors, view(ego, other))[2] > 0.0
     assert braking(monitors, view(ego, other)) == {}
-    assert braking(monitors, view(ego)) == {1: 0.0}
+    assert braking(monitors, view(ego)) == {2: 0.0}
     assert braking(monitors, view(ego)) == {}
 
 
