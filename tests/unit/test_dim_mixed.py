@@ -16,6 +16,7 @@ from dim import Dim, Humans, Mixed, NoisyPerception
 from dim.agent import GATES
 from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
 from minisim.errors import InputError
+from minisim.geometry import Movement
 from scenarios import four_way
 from scenarios.mixing import driver_means, with_humans
 from scenarios.sweep.experiment import Experiment, run_experiment
@@ -216,6 +217,31 @@ def test_dim_may_believe_an_indicator(trust: str, goes: bool) -> None:
     car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
     scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
     assert (CARS[0] in scene.goes(0.0, car, inside)) is goes
+
+
+@pytest.mark.parametrize("lane", [B, C, D])
+@pytest.mark.parametrize("manoeuvre", [LEFT, RIGHT])
+@pytest.mark.parametrize("distance", [-0.5, 8.0])  # inside; where the yellow zone begins
+def test_an_indicator_that_is_believed_means_its_way(
+    lane: int, manoeuvre: int, distance: float
+) -> None:
+    driver = next(i for i in PEOPLE if MIXED_CARELESS[i] > 0.29)
+    other = seen(driver, lane, manoeuvre, distance, 4.0)
+    matrix = Dim().harmony(SITE)
+    for mine in (LEFT, STRAIGHT, RIGHT):
+        car = seen(CARS[0], A, mine, 6.0, 4.0)
+        harmony = matrix.harmony(Movement(A, mine), Movement(lane, manoeuvre))
+        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust="signals"))
+        assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
+
+
+def test_the_yellow_zone_begins_where_it_is_marked() -> None:
+    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
+    start = MIXED.dim.zones.yellow_start
+    for distance, there in ((start, True), (start + 1e-3, False)):
+        driver = seen(PEOPLE[0], B, LEFT, distance, 4.0)
+        assert Scene().goes(0.0, car, driver) == (set() if there else {CARS[0]})
+        assert bool(wakes(MIXED.start(SITE), 0.0, driver)) is there
 
 
 def _careless() -> dict[int, float]:
