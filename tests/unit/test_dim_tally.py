@@ -140,6 +140,27 @@ def test_crossings_are_counted_however_rarely_one_looks() -> None:
     assert tally.counts["crossings"] == 2
 
 
+def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
+    tally = session(Told())
+    for time, distance, crossings in ((0.0, 2.1, 0), (1.0, 0.5, 0), (2.0, 0.0, 0), (3.0, -0.1, 1)):
+        show(tally, time, seen(1, 0, 2, distance))
+        assert tally.counts["crossings"] == crossings
+
+
+@pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
+def test_who_must_wait_anyway_disagrees_with_nobody(gate: str, lasts: float) -> None:
+    """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
+    views = [
+        (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
+         seen(4, 3, 1, 2.1))
+        for time in (0.0, 2.5)
+    ]  # fmt: skip
+    tally = session(Told((((1, 4), 3),)), gate=gate)
+    for view in views:
+        show(tally, *view)
+    assert tally.counts["disagreement_s"] == lasts
+
+
 def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> None:
     """The experiment can fail: with one reading in four wrong, bodies touch."""
     scenario = small_scenario(4, density=300.0, demand_time=1200.0)
