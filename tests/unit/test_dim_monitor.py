@@ -199,6 +199,16 @@ def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None
     assert answers == {0.0, most}, "both occur"
 
 
+def test_whoever_stands_right_before_the_area_stays_there() -> None:
+    """No division by the room that is left: none."""
+    shared = area(SITE, MATRIX.index("a2"), MATRIX.index("b2"))
+    assert shared is not None
+    ego = car(1, "a2", shared.room(0.0, 3.0) - ROOM, 0.0)
+    assert shared.room(-ego.distance, 3.0) == ROOM
+    told = braking(watch(), view(ego, car(2, "b2", 3.0, 5.0)))
+    assert told[1] == SITE.vehicle.max_deceleration
+
+
 def test_it_is_told_when_it_may_stop_braking_and_nothing_twice() -> None:
     monitors = watch()
     other, ego = car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0)
