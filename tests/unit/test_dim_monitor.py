@@ -15,7 +15,7 @@ from dim import Dim, HarmonyMatrix, Monitor, NoisyPerception
 from dim.monitor import ROOM, Watch
 from dim.occupancy import STEP, area, showing
 from dim.perception import UNKNOWN, See
-from minisim.control import Brake, Observed, Site, View
+from minisim.control import Brake, Go, Observed, Site, View, Wake
 from minisim.errors import InputError
 from minisim.geometry import Movement
 from minisim.run import Run
@@ -333,9 +333,10 @@ def test_whoever_went_alone_goes_on_once_it_is_inside() -> None:
 
 @dataclass(frozen=True)
 class Wrong:
-    """Everybody else reads the vehicles of these lanes to want these manoeuvres."""
+    """Everybody else, or one, reads the vehicles of these lanes to want these manoeuvres."""
 
     read: tuple[tuple[int, int], ...]
+    reader: int | None = None
     name: str = "wrong"
     period: float = 0.1
 
@@ -343,6 +344,8 @@ class Wrong:
         read = dict(self.read)
 
         def see(true: View, ego: Observed) -> View:
+            if self.reader not in (None, ego.id):
+                return true
             return View(
                 true.time,
                 tuple(
@@ -352,6 +355,30 @@ class Wrong:
             )
 
         return see
+
+
+def test_a_session_brakes_as_its_monitors_say_and_looks_again() -> None:
+    session = Dim(monitor=Monitor()).start(SITE)
+    true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", 2.0, 6.0), time=7.0)
+    commands = list(session.decide(true))
+    brakes = {c.vehicle: c.deceleration for c in commands if isinstance(c, Brake)}
+    assert brakes == braking(watch(), true) != {}
+    assert [c.time for c in commands if isinstance(c, Wake)] == [7.0 + SITE.dt]
+
+
+def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
+    """a2, b2 and d3 are in conflict, so it is a's turn; a takes d for d2, and finds it is not."""
+    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
+    wrong = Wrong(((3, 2),), reader=1)
+    session = Dim(perception=wrong, monitor=Monitor(patience=1.5)).start(SITE)
+    for time, commands in ((0.0, []), (1.4, []), (1.5, [Go(1)]), (1.6, [])):
+        found = list(session.decide(view(*waiting, time=time)))
+        assert [c for c in found if not isinstance(c, Wake)] == commands
+        assert Wake(time + SITE.dt) in found
+    bare = Dim(perception=wrong).start(SITE)
+    assert not any(
+        isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*waiting, time=t))
+    )
 
 
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:
