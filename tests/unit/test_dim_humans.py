@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dim import Humans
-from dim.humans import TRUSTS, Drivers, Readings, Turn, turns
+from dim.humans import TRUSTS, Drivers, Readings, Turn, parting, turns
 from minisim.control import Observed, Site
 from minisim.errors import InputError
 from minisim.streams import stream
@@ -128,6 +128,22 @@ def test_motion_shows_the_way_in_the_end_and_never_excludes_it_before(
             assert manoeuvre - 1 in ways
         if distance < -8.0:
             assert ways == [manoeuvre - 1]
+
+
+@pytest.mark.parametrize("apart", [0.3, 1.0, 2.0])
+def test_ways_part_where_the_arc_has_left_the_straight_line(apart: float) -> None:
+    """After s an arc of radius r is at r(1 − cos(s/r)), r·sin(s/r): to the tenth of a metre."""
+    parts = parting(SITE.intersection, apart)
+    for turn in (0, 2):
+        r = SITE.intersection.paths[turn].radius
+        s = np.arange(0.0, 10.0, 1e-4)
+        gaps = np.hypot(r * (1.0 - np.cos(s / r)), s - r * np.sin(s / r))
+        first = float(s[np.argmax(gaps > apart)])
+        for found in (parts[turn][1], parts[1][turn]):
+            assert first - 1e-3 <= found <= first + 0.1 + 1e-3
+    assert [parts[way][way] for way in range(12)] == [math.inf] * 12
+    assert parts[0][3:] == parts[4][:3] + parts[4][6:] == [-math.inf] * 9
+    assert parting(SITE.intersection, 1e3)[0][:3] == [math.inf] * 3  # never so far
 
 
 def test_vehicles_of_dim_always_tell() -> None:
