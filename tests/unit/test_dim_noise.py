@@ -316,6 +316,25 @@ def test_noise_has_the_spread_that_it_says() -> None:
         assert (sum(e * e for e in errors) / 400) ** 0.5 == pytest.approx(spread, rel=4 / 800**0.5)
 
 
+@pytest.mark.parametrize(("noise", "field"), [("position_noise", 3), ("speed_noise", 4)])
+def test_noise_is_new_each_frame_and_one_for_all_or_each_its_own(noise: str, field: int) -> None:
+    def errors(perception: NoisyPerception, ego: int, time: float) -> list[float]:
+        view = View(time, tuple(seen(k, 0, 1, 100.0 * k, 50.0) for k in range(50)))
+        sight = perception.start(SITE)(view, view.vehicles[ego])
+        return [round(a[field] - b[field], 6) for a, b in zip(sight[1], view[1], strict=True)][2:]
+
+    alike, own = (NoisyPerception(**{noise: 0.5}, shared=shared) for shared in (True, False))
+    assert errors(alike, 0, 0.0) == errors(alike, 1, 0.0) == errors(alike, 0, 0.05)
+    assert errors(own, 0, 0.0) == errors(own, 0, 0.05)
+    for one, other in (
+        (errors(own, 0, 0.0), errors(own, 1, 0.0)),
+        (errors(own, 0, 0.0), errors(own, 0, 0.1)),
+        (errors(alike, 0, 0.0), errors(alike, 0, 0.1)),
+    ):
+        assert all(a != b for a, b in zip(one, other, strict=True))
+        assert len(set(one)) == len(one), "vehicles err each for itself"
+
+
 def test_no_vehicle_seems_to_drive_backwards() -> None:
     view = View(0.0, tuple(seen(k, 0, 1, 5.0 * k) for k in range(100)))
     sight = NoisyPerception(speed_noise=2.0).start(SITE)(view, view.vehicles[0])
