@@ -87,6 +87,13 @@ def test_an_unknown_intent_is_every_manoeuvre() -> None:
     assert 2 in braking(watch(), true, {2: read_as(true, a=UNKNOWN)})
 
 
+def test_an_unknown_intent_is_one_of_its_own_lane() -> None:
+    """Whatever comes out of lane d keeps clear of a left turn from c, unlike what comes from a."""
+    for past in (-0.5, 0.5):
+        true = view(car(1, "c1", 2.0, 6.0), car(2, "d1", past, 6.0))
+        assert braking(watch(), true, {1: read_as(true, d=UNKNOWN)}) == {}
+
+
 def test_who_is_not_seen_is_not_braked_for() -> None:
     true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", 2.0, 6.0))
     blind = view(car(2, "c2", 2.0, 6.0))

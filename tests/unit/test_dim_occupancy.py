@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -55,6 +56,24 @@ def test_outside_its_area_bodies_keep_their_distance() -> None:
                 assert distance[k] > CLEARANCE
                 tested += 1
     assert tested > 500
+
+
+def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
+    """And `ever` what is so at this or a later position of the second."""
+    p, q = 1, 4  # a2, b2
+    shared = area(SITE, p, q)
+    assert shared is not None
+    bodies = []
+    for way, count in zip((p, q), shared.close.shape, strict=True):
+        path = SITE.intersection.paths[way]
+        s = path.entry + STEP * np.arange(count)
+        assert s[-2] < path.exit + SITE.vehicle.length <= s[-1]
+        bodies.append(shapely.polygons(path.bodies(s, SITE.vehicle)))
+    distance = shapely.distance(bodies[0][:, None], bodies[1][None, :])
+    for x, y in itertools.product(*map(range, distance.shape)):
+        rows = slice(max(x - 1, 0), x + 2)
+        assert shared.close[x, y] == (distance[rows, max(y - 1, 0) : y + 2] <= CLOSE).any()
+        assert shared.ever[x, y] == (distance[rows, max(y - 1, 0) :] <= CLEARANCE).any()
 
 
 def test_an_area_is_the_others_mirrored() -> None:
