@@ -388,6 +388,16 @@ def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
     )
 
 
+def test_whoever_arrives_at_the_yellow_zone_ends_the_wait() -> None:
+    """As above, with c3, which is in conflict with all; 8 m before the junction it takes part."""
+    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
+    for past, goes in ((-8.0, False), (-8.001, True)):
+        session = Dim(perception=Wrong(((3, 2),), reader=1), monitor=Monitor()).start(SITE)
+        for time in (0.0, 9.0):
+            commands = list(session.decide(view(*waiting, car(3, "c3", past, 1.0), time=time)))
+        assert (Go(1) in commands) is goes
+
+
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:
     """Two in conflict, and what each is taken for, such that both see harmony."""
     n = SITE.intersection.n
