@@ -165,6 +165,15 @@ def test_confidence_by_hand() -> None:
         assert confidence(1.0, right, (0.25, 0.125)) == 0.0
 
 
+@pytest.mark.parametrize("read", [1, 2])
+def test_each_look_has_a_confidence_of_its_own(read: int) -> None:
+    """Whether right or wrong; the same look, the same."""
+    subject = lane(0.25, "symmetric")
+    looks = [subject.confidence(DRAWS, 1, read, 7, observer, 3) for observer in range(20)]
+    assert len(set(looks)) == 20
+    assert looks[5] == subject.confidence(DRAWS, 1, read, 7, 5, 3)
+
+
 def test_what_a_threshold_leaves_by_hand() -> None:
     """e = 1/2: 1/2 − t + t²/2; without errors none are left, without right readings all or none."""
     assert leftover_error(0.5, 0.5) == pytest.approx(0.125)

@@ -235,6 +235,11 @@ def test_an_indicator_that_is_believed_means_its_way(
         assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
 
 
+def test_a_human_at_the_very_entry_may_enter() -> None:
+    car, driver = seen(CARS[0], A, STRAIGHT, 2.0), seen(PEOPLE[0], B, LEFT, 0.0)
+    assert Scene().goes(0.0, car, driver) == set()
+
+
 def test_the_yellow_zone_begins_where_it_is_marked() -> None:
     car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
     start = MIXED.dim.zones.yellow_start

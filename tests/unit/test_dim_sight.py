@@ -101,10 +101,10 @@ def test_hidden_is_what_shapely_says_in_many_scenes() -> None:
                 strict=True,
             )
         )  # fmt: skip
-        eye = at(0, 0)
+        eye = at(*random.uniform(-2, 2, 2))
         blocking = [outline(body) for body in others]
         ends = [*list(outline(target).exterior.coords)[:4], (target.x, target.y)]
-        lines = [shapely.LineString([(0, 0), end]) for end in ends]
+        lines = [shapely.LineString([(eye.x, eye.y), end]) for end in ends]
         hidden = all(any(line.intersects(area) for area in blocking) for line in lines)
         assert BODIES.hidden(eye, target, others) == hidden
         answers.append(hidden)

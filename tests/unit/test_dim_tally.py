@@ -147,6 +147,14 @@ def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
         assert tally.counts["crossings"] == crossings
 
 
+def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
+    for distance, crossings in ((8.0, 1), (8.001, 0)):  # who leaves between two looks
+        tally = session(Told())
+        show(tally, 5.0, seen(1, 0, 2, distance, 5.0))
+        show(tally, 9.0)
+        assert tally.counts == {**NONE, "crossings": crossings}
+
+
 @pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
 def test_who_must_wait_anyway_disagrees_with_nobody(gate: str, lasts: float) -> None:
     """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
