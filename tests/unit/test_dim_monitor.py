@@ -149,12 +149,13 @@ def test_whoever_is_out_in_good_time_goes_on() -> None:
     assert 1 in braking(watch(time_margin=comes - leaves + 0.01), true)
 
 
-def test_it_brakes_when_one_more_step_would_take_more_than_comfort() -> None:
+@pytest.mark.parametrize("v", [1.0, 4.0])
+def test_it_brakes_when_one_more_step_would_take_more_than_comfort(v: float) -> None:
     """That step at full acceleration, then v²/2b, and `ROOM`."""
     a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
     shared = area(SITE, a2, b2)
     assert shared is not None
-    a, b, dt, v = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt, 4.0
+    a, b, dt = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt
     after = v + a * dt
     needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
     x = shared.room(0.0, 3.0) - needed
