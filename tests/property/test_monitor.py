@@ -6,11 +6,11 @@ import dataclasses
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.strategies import scenarios
 
 import minisim
 from dim import Dim, Monitor
 from scenarios import Scenario
+from scenarios.strategies import scenarios
 from tests.runs import digest
 
 seeds = st.integers(0, 2**32 - 1)

@@ -320,3 +320,25 @@ def test_wrong_priorities_are_named() -> None:
 
 def test_default_priorities_are_the_lanes_own_order() -> None:
     assert lane_ranks(None, 4) == lane_ranks([0, 1, 2, 3], 4) == (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_who_surely_goes_does_whatever_the_unknown_want(order: str) -> None:
+    """All cases of three arms, each with any of its participants unknown, and somebody inside."""
+    matrix = HarmonyMatrix.paper(3)
+    table = DecisionTable(matrix, order)
+    for lanes, inside in product(product(range(4), repeat=3), (None, *matrix.movements)):
+        known = [Movement(lane, j) for lane, j in enumerate(lanes) if 0 < j < 3]
+        unknown = [lane for lane, j in enumerate(lanes) if j == 3]
+        goes = []
+        for meant in product((1, 2), repeat=len(unknown)):
+            participants = [*known, *map(Movement, unknown, meant)]
+            admitted = [
+                m
+                for m in participants
+                if inside is None or m.origin == inside.origin or matrix.harmony(m, inside)
+            ]
+            goes.append({m.origin for m in decide(admitted, matrix, order)})
+        crossing = 0 if inside is None else 1 << matrix.index(inside)
+        found = table.surely(table.case(known), sum(1 << lane for lane in unknown), crossing)
+        assert found == sum(1 << lane for lane in set.intersection(*goes))

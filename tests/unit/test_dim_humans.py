@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dim import Humans
-from dim.humans import TRUSTS, Drivers, Readings, Turn, turns
+from dim.humans import TRUSTS, Drivers, Readings, Turn, parting, turns
 from minisim.control import Observed, Site
 from minisim.errors import InputError
 from minisim.streams import stream
@@ -130,6 +130,22 @@ def test_motion_shows_the_way_in_the_end_and_never_excludes_it_before(
             assert ways == [manoeuvre - 1]
 
 
+@pytest.mark.parametrize("apart", [0.3, 1.0, 2.0])
+def test_ways_part_where_the_arc_has_left_the_straight_line(apart: float) -> None:
+    """After s an arc of radius r is at r(1 − cos(s/r)), r·sin(s/r): to the tenth of a metre."""
+    parts = parting(SITE.intersection, apart)
+    for turn in (0, 2):
+        r = SITE.intersection.paths[turn].radius
+        s = np.arange(0.0, 10.0, 1e-4)
+        gaps = np.hypot(r * (1.0 - np.cos(s / r)), s - r * np.sin(s / r))
+        first = float(s[np.argmax(gaps > apart)])
+        for found in (parts[turn][1], parts[1][turn]):
+            assert first - 1e-3 <= found <= first + 0.1 + 1e-3
+    assert [parts[way][way] for way in range(12)] == [math.inf] * 12
+    assert parts[0][3:] == parts[4][:3] + parts[4][6:] == [-math.inf] * 9
+    assert parting(SITE.intersection, 1e3)[0][:3] == [math.inf] * 3  # never so far
+
+
 def test_vehicles_of_dim_always_tell() -> None:
     read = readings(share=0.0)
     for vehicle, manoeuvre, trust in itertools.product(range(20), (1, 2, 3), TRUSTS):
@@ -164,6 +180,18 @@ def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
 def test_bad_parameters_are_named(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         replace(Humans(), **parameters)
+
+
+def test_bounds_are_allowed() -> None:
+    humans = Humans(
+        critical_gaps=(0, 60, 0),
+        follow_up=(0, 60, 0),
+        deviation=1,
+        reaction=0.5,
+        unsignalled=(0, 1),
+    )
+    assert humans.critical_gaps == humans.follow_up == (0.0, 60.0, 0.0)
+    assert Humans(deviation=0, reaction=60).reaction == 60
 
 
 def test_lists_become_tuples() -> None:

@@ -155,6 +155,38 @@ def test_no_threshold_adds_errors(error: float, threshold: float) -> None:
     assert leftover_error(error, 1.0) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_confidence_by_hand() -> None:
+    """U^e where right, times V^(e/(1−e)) where wrong; e = 1/2 and e = 1/4."""
+    assert confidence(0.5, True, (0.25, 0.125)) == pytest.approx(0.5)
+    assert confidence(0.5, False, (0.25, 0.125)) == pytest.approx(0.5 * 0.125)
+    assert confidence(0.25, False, (0.0625, 0.125)) == pytest.approx(0.5 * 0.5)
+    for right in (False, True):
+        assert confidence(0.0, right, (0.25, 0.125)) == 1.0
+        assert confidence(1.0, right, (0.25, 0.125)) == 0.0
+
+
+@pytest.mark.parametrize("read", [1, 2])
+def test_each_look_has_a_confidence_of_its_own(read: int) -> None:
+    """Whether right or wrong; the same look, the same."""
+    subject = lane(0.25, "symmetric")
+    looks = [subject.confidence(DRAWS, 1, read, 7, observer, 3) for observer in range(20)]
+    assert len(set(looks)) == 20
+    assert looks[5] == subject.confidence(DRAWS, 1, read, 7, 5, 3)
+
+
+def test_what_a_threshold_leaves_by_hand() -> None:
+    """e = 1/2: 1/2 − t + t²/2; without errors none are left, without right readings all or none."""
+    assert leftover_error(0.5, 0.5) == pytest.approx(0.125)
+    assert leftover_error(0.0, 0.0) == leftover_error(0.0, 0.5) == 0.0
+    assert leftover_error(1.0, 0.0) == 1.0
+    assert leftover_error(1.0, 0.5) == 0.0
+
+
+def test_what_is_never_read_is_no_doubt() -> None:
+    assert doubts(((1.0, 0.0), (1.0, 0.0))) == (0.5, 0.0)
+    assert doubts(((0.0, 1.0), (1.0, 0.0))) == (1.0, 1.0)
+
+
 @given(st.floats(0.0, 1.0), st.booleans(), st.floats(1e-9, 1 - 1e-9), st.floats(1e-9, 1 - 1e-9))
 def test_confidence_is_a_probability(error: float, right: bool, u: float, v: float) -> None:
     assert 0.0 <= confidence(error, right, (u, v)) <= 1.0

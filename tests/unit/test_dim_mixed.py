@@ -12,10 +12,11 @@ import pytest
 
 import minisim
 from baselines import AllWayStop
-from dim import Dim, Humans, Mixed
+from dim import Dim, Humans, Mixed, NoisyPerception
 from dim.agent import GATES
-from minisim.control import Command, Go, Hold, Observed, View, Wake
+from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
 from minisim.errors import InputError
+from minisim.geometry import Movement
 from scenarios import four_way
 from scenarios.mixing import driver_means, with_humans
 from scenarios.sweep.experiment import Experiment, run_experiment
@@ -127,6 +128,61 @@ def test_a_gap_in_a_stream_that_is_not_in_the_way_needs_no_waiting() -> None:
     assert PEOPLE[0] in scene.goes(1.9, driver, seen(CARS[0], B, LEFT, 6.0, 3.0))
 
 
+def test_what_the_host_has_to_provide() -> None:
+    """DIM's plan, the entry as one more mark, and sight as far as the longest gap at the limit."""
+    alone, plan = MIXED.dim.start(SITE).plan, MIXED.start(SITE).plan
+    assert plan.marks == (*alone.marks, 0.0)
+    assert plan.sight == pytest.approx(7.1 * SITE.speed_limit)
+    assert replace(plan, marks=alone.marks, sight=alone.sight) == alone
+    harmonious = Dim(gate="harmonious")
+    assert Mixed(harmonious).start(SITE).plan.marks == harmonious.start(SITE).plan.marks
+    differing = Mixed(humans=Humans(deviation=0.25)).start(SITE).plan
+    assert differing.sight == pytest.approx(1.75 * 7.1 * SITE.speed_limit)  # 3 deviations
+    hasty = Mixed(humans=Humans(critical_gaps=(0.0, 0.0, 0.0))).start(SITE).plan
+    assert hasty.sight == alone.sight
+    noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
+    assert Mixed(noisy).start(SITE).plan.period == 0.2
+    assert Mixed(noisy).name == "dim-missed-0.15-humans-0.2"
+
+
+def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:
+    return [c.time for c in session.decide(View(time, vehicles)) if isinstance(c, Wake)]
+
+
+def test_drivers_at_the_junction_look_five_times_a_second() -> None:
+    driver = seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    assert wakes(MIXED.start(SITE), 3.0, driver) == [pytest.approx(3.2)]
+    assert wakes(MIXED.start(SITE), 3.0, driver._replace(distance=8.5)) == []
+    slow = replace(SITE, dt=0.5)
+    assert wakes(MIXED.start(slow), 3.0, driver) == [3.5]  # as often as there are steps
+    unseen = seen(CARS[0], B, STRAIGHT, 0.0, 5.0)  # has entered without a right of way
+    assert wakes(MIXED.start(SITE), 3.0, driver, unseen) == [pytest.approx(3.0 + SITE.dt)]
+
+
+def test_a_driver_stands_at_the_line() -> None:
+    """Up to 1 m before it, at no more than 0.1 m/s; what it sees, it sees half a step early."""
+    line = MIXED.dim.zones.hold_distance
+    for distance, speed, goes in (
+        (line + 0.99, 0.0, True), (line + 1.01, 0.0, False), (2.0, 0.09, True), (2.0, 0.11, False)
+    ):  # fmt: skip
+        scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, distance, speed)
+        scene.goes(0.0, driver)
+        assert (scene.goes(1.9, driver) == {PEOPLE[0]}) is goes
+    for early, goes in ((0.4, True), (0.6, False)):
+        scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+        scene.goes(0.0, driver)
+        assert (scene.goes(1.9 - early * SITE.dt, driver) == {PEOPLE[0]}) is goes
+
+
+def test_whoever_rolls_back_from_the_line_begins_anew() -> None:
+    scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    scene.goes(0.0, driver)
+    scene.goes(1.0, driver._replace(speed=0.5))
+    assert scene.goes(2.0, driver) == set()
+    assert scene.goes(3.8, driver) == set()
+    assert scene.goes(3.9, driver) == {PEOPLE[0]}
+
+
 @EVERY_GATE
 def test_dim_yields_to_a_human_in_the_yellow_zone_wherever_it_may_go(gate: str) -> None:
     """Left turns from a and b are in harmony, but b's driver may mean another way."""
@@ -161,6 +217,36 @@ def test_dim_may_believe_an_indicator(trust: str, goes: bool) -> None:
     car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
     scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
     assert (CARS[0] in scene.goes(0.0, car, inside)) is goes
+
+
+@pytest.mark.parametrize("lane", [B, C, D])
+@pytest.mark.parametrize("manoeuvre", [LEFT, RIGHT])
+@pytest.mark.parametrize("distance", [-0.5, 8.0])  # inside; where the yellow zone begins
+def test_an_indicator_that_is_believed_means_its_way(
+    lane: int, manoeuvre: int, distance: float
+) -> None:
+    driver = next(i for i in PEOPLE if MIXED_CARELESS[i] > 0.29)
+    other = seen(driver, lane, manoeuvre, distance, 4.0)
+    matrix = Dim().harmony(SITE)
+    for mine in (LEFT, STRAIGHT, RIGHT):
+        car = seen(CARS[0], A, mine, 6.0, 4.0)
+        harmony = matrix.harmony(Movement(A, mine), Movement(lane, manoeuvre))
+        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust="signals"))
+        assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
+
+
+def test_a_human_at_the_very_entry_may_enter() -> None:
+    car, driver = seen(CARS[0], A, STRAIGHT, 2.0), seen(PEOPLE[0], B, LEFT, 0.0)
+    assert Scene().goes(0.0, car, driver) == set()
+
+
+def test_the_yellow_zone_begins_where_it_is_marked() -> None:
+    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
+    start = MIXED.dim.zones.yellow_start
+    for distance, there in ((start, True), (start + 1e-3, False)):
+        driver = seen(PEOPLE[0], B, LEFT, distance, 4.0)
+        assert Scene().goes(0.0, car, driver) == (set() if there else {CARS[0]})
+        assert bool(wakes(MIXED.start(SITE), 0.0, driver)) is there
 
 
 def _careless() -> dict[int, float]:

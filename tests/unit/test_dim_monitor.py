@@ -15,7 +15,7 @@ from dim import Dim, HarmonyMatrix, Monitor, NoisyPerception
 from dim.monitor import ROOM, Watch
 from dim.occupancy import STEP, area, showing
 from dim.perception import UNKNOWN, See
-from minisim.control import Brake, Observed, Site, View
+from minisim.control import Brake, Go, Observed, Site, View, Wake
 from minisim.errors import InputError
 from minisim.geometry import Movement
 from minisim.run import Run
@@ -87,6 +87,13 @@ def test_an_unknown_intent_is_every_manoeuvre() -> None:
     assert 2 in braking(watch(), true, {2: read_as(true, a=UNKNOWN)})
 
 
+def test_an_unknown_intent_is_one_of_its_own_lane() -> None:
+    """Whatever comes out of lane d keeps clear of a left turn from c, unlike what comes from a."""
+    for past in (-0.5, 0.5):
+        true = view(car(1, "c1", 2.0, 6.0), car(2, "d1", past, 6.0))
+        assert braking(watch(), true, {1: read_as(true, d=UNKNOWN)}) == {}
+
+
 def test_who_is_not_seen_is_not_braked_for() -> None:
     true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", 2.0, 6.0))
     blind = view(car(2, "c2", 2.0, 6.0))
@@ -142,6 +149,97 @@ def test_whoever_is_out_in_good_time_goes_on() -> None:
     assert 1 in braking(watch(time_margin=comes - leaves + 0.01), true)
 
 
+@pytest.mark.parametrize("v", [1.0, 4.0])
+def test_it_brakes_when_one_more_step_would_take_more_than_comfort(v: float) -> None:
+    """That step at full acceleration, then v²/2b, and `ROOM`."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared = area(SITE, a2, b2)
+    assert shared is not None
+    a, b, dt = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt
+    after = v + a * dt
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
+    x = shared.room(0.0, 3.0) - needed
+    assert x > 0.0
+    other = car(2, "b2", 3.0, 5.0)
+    assert 1 not in braking(watch(), view(car(1, "a2", x - 1e-3, v), other))
+    assert braking(watch(), view(car(1, "a2", x + 1e-3, v), other))[1] == b
+    gentle = 0.7 * b
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * gentle) + ROOM
+    x = shared.room(0.0, 3.0) - needed
+    assert 1 not in braking(watch(deceleration=gentle), view(car(1, "a2", x - 1e-3, v), other))
+    assert braking(watch(deceleration=gentle), view(car(1, "a2", x + 1e-3, v), other))[1] == gentle
+
+
+def test_whoever_still_can_stops_before_the_junction() -> None:
+    """There it keeps nobody from clearing it; the conflict area begins later."""
+    a, b, dt, v = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt, 5.0
+    after = v + a * dt
+    needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
+    other = car(2, "b2", 3.0, 5.0)
+    assert 1 not in braking(watch(), view(car(1, "a2", -needed - 1e-3, v), other))
+    told = braking(watch(), view(car(1, "a2", -needed + 1e-3, v), other))[1]
+    assert told == pytest.approx(max(b, v * v / (2.0 * (needed - ROOM))))
+
+
+@pytest.mark.parametrize("look_ahead", [1.0, 4.0])
+def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None:
+    """Brake as hard as possible, unless only going on touches nobody; all positions."""
+    a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
+    shared, mirrored = area(SITE, a2, b2), area(SITE, b2, a2)
+    assert shared is not None
+    assert mirrored is not None
+    a, most = SITE.vehicle.acceleration, SITE.vehicle.max_deceleration
+    v, w, t = 6.0, 5.0, np.arange(0.0, look_ahead, SITE.dt)
+    rolling = np.minimum(t, v / most)
+    answers = set()
+    for x, y in itertools.product(np.arange(0.1, 15.0, 0.5), np.arange(0.1, 15.0, 0.5)):
+        room = shared.room(x, y)
+        comes = (math.sqrt(w * w + 2.0 * a * mirrored.room(y, x)) - w) / a
+        in_time = (shared.ends(y) - x) / v + 1.0 < comes
+        if room == math.inf or in_time or v * v <= 2.0 * most * (room - ROOM):
+            continue
+        brakes = shared.touches(x + v * rolling - most / 2.0 * rolling**2, y + w * t)
+        goes = shared.touches(x + v * t + a / 2.0 * t**2, y + w * t)
+        true = view(car(1, "a2", float(x), v), car(2, "b2", float(y), w))
+        told = braking(watch(look_ahead=look_ahead), true).get(1, 0.0)
+        assert told == (0.0 if brakes and not goes else most), (x, y)
+        answers.add(told)
+    assert answers == {0.0, most}, "both occur"
+
+
+def test_whoever_stands_right_before_the_area_stays_there() -> None:
+    """No division by the room that is left: none."""
+    shared = area(SITE, MATRIX.index("a2"), MATRIX.index("b2"))
+    assert shared is not None
+    ego = car(1, "a2", shared.room(0.0, 3.0) - ROOM, 0.0)
+    assert shared.room(-ego.distance, 3.0) == ROOM
+    told = braking(watch(), view(ego, car(2, "b2", 3.0, 5.0)))
+    assert told[1] == SITE.vehicle.max_deceleration
+
+
+def test_it_is_told_when_it_may_stop_braking_and_nothing_twice() -> None:
+    monitors = watch()
+    other, ego = car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0)
+    assert braking(monitors, view(ego, other))[2] > 0.0
+    assert braking(monitors, view(ego, other)) == {}
+    assert braking(monitors, view(ego)) == {2: 0.0}
+    assert braking(monitors, view(ego)) == {}
+
+
+def test_it_is_needed_where_two_lanes_may_meet() -> None:
+    standing = car(3, "c2", -2.25, 0.0)
+    for cars, going, needed in (
+        ([car(1, "a2", 2.0, 5.0)], set(), False),
+        ([car(1, "a2", 9.0, 5.0), car(2, "a3", 2.0, 5.0)], set(), False),
+        ([car(1, "a2", 2.0, 5.0), car(2, "c2", 2.0, 5.0)], set(), True),
+        ([car(1, "a2", 2.0, 5.0), standing], set(), False),
+        ([car(1, "a2", 2.0, 5.0), standing], {3}, True),
+    ):
+        monitors = watch()
+        braking(monitors, view(*cars), going=going)
+        assert monitors.needed is needed, (cars, going)
+
+
 # Who goes on.
 
 
@@ -194,14 +292,59 @@ def test_nobody_goes_alone_where_somebody_moves_or_crosses() -> None:
             assert not monitors.goes(seen, seen, seen.vehicles[0], False, (0, 1, 2, 3))
 
 
+def stands(monitors: Watch, seen: View, vehicle: int, decided: bool = False) -> bool:
+    """Whether a vehicle goes that sees everything."""
+    ego = next(v for v in seen.vehicles if v.id == vehicle)
+    return monitors.goes(seen, seen, ego, decided, (0, 1, 2, 3))
+
+
+def test_patience_begins_anew_whenever_anything_happens() -> None:
+    ego, other = car(0, "a2", -2.25, 0.0), car(1, "b2", -2.25, 0.0)
+    happens = {
+        "another moves": (view(ego, other._replace(speed=0.2), time=1.0), False),
+        "another crosses": (view(ego, car(2, "c2", 1.0, 0.0), time=1.0), False),
+        "it moves": (view(ego._replace(speed=0.1), other, time=1.0), False),
+        "it may go": (view(ego, other, time=1.0), True),
+        "somebody is before it": (view(ego, car(3, "a2", -1.0, 0.0), time=1.0), False),
+    }
+    for what, (meanwhile, decided) in happens.items():
+        monitors = watch(patience=2.0)
+        assert not stands(monitors, view(ego, other), 0)
+        assert stands(monitors, meanwhile, 0, decided) is decided
+        assert not stands(monitors, view(ego, other, time=1.5), 0)
+        assert not stands(monitors, view(ego, other, time=3.4), 0), what
+        assert stands(monitors, view(ego, other, time=3.5), 0), what
+
+
+def test_who_is_far_or_not_seen_does_not_matter_to_the_patient() -> None:
+    ego, far = car(0, "a2", -2.25, 0.0), car(1, "b2", -SIGHT - 0.1, 5.0)
+    hidden = car(2, "c2", 1.0, 5.0)
+    monitors = watch(patience=1.0)
+    for time, goes in ((0.0, False), (0.9, False), (1.0, True)):
+        true, seen = view(ego, far, hidden, time=time), view(ego, far, time=time)
+        assert monitors.goes(true, seen, ego, False, (0, 1, 2, 3)) is goes
+
+
+def test_whoever_went_alone_goes_on_once_it_is_inside() -> None:
+    ego, other = car(0, "a2", -2.25, 0.0), car(1, "b2", 1.0, 3.0)
+    monitors = watch(patience=1.0)
+    assert not stands(monitors, view(ego), 0)
+    assert stands(monitors, view(ego, time=1.0), 0)
+    assert stands(monitors, view(ego._replace(distance=2.0, speed=1.0), time=1.2), 0)
+    assert stands(monitors, view(ego._replace(distance=-1.0, speed=3.0), other, time=1.5), 0)
+    assert not stands(monitors, view(ego._replace(distance=2.0, speed=0.5), other, time=1.6), 0)
+    assert not stands(monitors, view(ego, time=1.7), 0), "it gave it back"
+
+
 # Whom it saves.
 
 
 @dataclass(frozen=True)
 class Wrong:
-    """Everybody else reads the vehicles of these lanes to want these manoeuvres."""
+    """Everybody else, or one, reads the vehicles of these lanes to want these manoeuvres."""
 
     read: tuple[tuple[int, int], ...]
+    reader: int | None = None
     name: str = "wrong"
     period: float = 0.1
 
@@ -209,6 +352,8 @@ class Wrong:
         read = dict(self.read)
 
         def see(true: View, ego: Observed) -> View:
+            if self.reader not in (None, ego.id):
+                return true
             return View(
                 true.time,
                 tuple(
@@ -218,6 +363,40 @@ class Wrong:
             )
 
         return see
+
+
+def test_a_session_brakes_as_its_monitors_say_and_looks_again() -> None:
+    session = Dim(monitor=Monitor()).start(SITE)
+    true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", 2.0, 6.0), time=7.0)
+    commands = list(session.decide(true))
+    brakes = {c.vehicle: c.deceleration for c in commands if isinstance(c, Brake)}
+    assert brakes == braking(watch(), true) != {}
+    assert [c.time for c in commands if isinstance(c, Wake)] == [7.0 + SITE.dt]
+
+
+def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
+    """a2, b2 and d3 are in conflict, so it is a's turn; a takes d for d2, and finds it is not."""
+    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
+    wrong = Wrong(((3, 2),), reader=1)
+    session = Dim(perception=wrong, monitor=Monitor(patience=1.5)).start(SITE)
+    for time, commands in ((0.0, []), (1.4, []), (1.5, [Go(1)]), (1.6, [])):
+        found = list(session.decide(view(*waiting, time=time)))
+        assert [c for c in found if not isinstance(c, Wake)] == commands
+        assert Wake(time + SITE.dt) in found
+    bare = Dim(perception=wrong).start(SITE)
+    assert not any(
+        isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*waiting, time=t))
+    )
+
+
+def test_whoever_arrives_at_the_yellow_zone_ends_the_wait() -> None:
+    """As above, with c3, which is in conflict with all; 8 m before the junction it takes part."""
+    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
+    for past, goes in ((-8.0, False), (-8.001, True)):
+        session = Dim(perception=Wrong(((3, 2),), reader=1), monitor=Monitor()).start(SITE)
+        for time in (0.0, 9.0):
+            commands = list(session.decide(view(*waiting, car(3, "c3", past, 1.0), time=time)))
+        assert (Go(1) in commands) is goes
 
 
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:
@@ -307,18 +486,28 @@ def run_of(scenario: Scenario, dim: Dim) -> Run:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"time_margin": -1.0}, "time_margin"),
-        ({"look_ahead": 0.0}, "look_ahead"),
-        ({"tolerance": 0.0}, "tolerance"),
-        ({"tolerance": math.nan}, "tolerance"),
-        ({"deceleration": 0.0}, "deceleration of the monitor"),
-        ({"deceleration": "hard"}, "deceleration of the monitor"),
-        ({"patience": 0.0}, "patience"),
+        ({"time_margin": -1.0}, "time_margin .s. must be at least 0 and at most 10"),
+        ({"time_margin": 10.5}, "time_margin .s. must be at least 0 and at most 10,"),
+        ({"look_ahead": 0.0}, "look_ahead .s. must be at least 0.5 and at most 30"),
+        ({"look_ahead": 30.5}, "look_ahead .s. must be at least 0.5 and at most 30,"),
+        ({"tolerance": 0.0}, "tolerance .m. must be above 0 and at most 1"),
+        ({"tolerance": 1.5}, "tolerance .m. must be above 0 and at most 1,"),
+        ({"tolerance": math.nan}, "tolerance .m. must be"),
+        ({"deceleration": 0.0}, "deceleration of the monitor .m/s². must be above 0"),
+        ({"deceleration": 1001}, "deceleration of the monitor .m/s². must be .* at most 1000"),
+        ({"deceleration": "hard"}, "deceleration of the monitor .m/s². must be a number"),
+        ({"patience": 0.0}, "patience .s. must be at least 0.5 and at most 60"),
+        ({"patience": 61.0}, "patience .s. must be at least 0.5 and at most 60,"),
     ],
 )
 def test_bad_parameters_are_named(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Monitor(**options)  # type: ignore[arg-type]
+
+
+def test_bounds_are_allowed() -> None:
+    Monitor(time_margin=0, look_ahead=0.5, tolerance=1, deceleration=1000, patience=0.5)
+    Monitor(time_margin=10, look_ahead=30, tolerance=1e-3, deceleration=0.1, patience=60)
 
 
 def test_what_is_no_monitor_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from dataclasses import replace
 from itertools import pairwise
@@ -12,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dim import Dim, NoisyPerception, Perception
-from dim.noise import UNSIGNALLED, in_order
+from dim.noise import UNSIGNALLED, in_order, with_ego
 from dim.perception import UNKNOWN, See, see_all
+from dim.sight import Bodies
 from minisim import simulate
 from minisim.control import Observed, View
 from minisim.errors import InputError
@@ -83,11 +85,45 @@ def test_without_errors_the_runs_are_those_of_exact_perception() -> None:
         ({"position_noise": float("nan")}, "position_noise .m. must be"),
         ({"speed_noise": 21}, "speed_noise .m/s. must be at least 0 and at most 20"),
         ({"frame": 0.0}, "frame .s. must be at least 0.01"),
+        ({"sensor_range": 1000.5}, "sensor_range .m. must be .* at most 1000"),
+        ({"delay": 10.5}, "delay .s. must be .* at most 10"),
+        ({"position_noise": -0.1}, "position_noise .m. must be at least 0 and at most 20"),
+        ({"speed_noise": -0.1}, "speed_noise .m/s. must be at least 0"),
+        ({"frame": 1.5}, "frame .s. must be .* at most 1,"),
     ],
 )
 def test_bad_values(given: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         NoisyPerception(**given)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"intent_error": 0, "delay": 0, "position_noise": 0, "speed_noise": 0, "frame": 0.01},
+        {"intent_error": 1, "delay": 10, "position_noise": 20, "speed_noise": 20, "frame": 1},
+        {"unsignalled": (0, 1), "confidence": 1, "sensor_range": 1},
+        {"unsignalled": (1, 0), "sensor_range": 1000},
+    ],
+)
+def test_bounds_are_allowed(given: dict[str, Any]) -> None:
+    perception = NoisyPerception(**given)
+    assert all(getattr(perception, name) == value for name, value in given.items())
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"intent_error": 0.1}, {"unsignalled": (0.1, 0.0)}, {"unsignalled": (0.0, 0.1)},
+        {"sensor_range": 50.0}, {"occlusion": True}, {"delay": 0.1}, {"position_noise": 0.1},
+        {"speed_noise": 0.1},
+    ],
+)  # fmt: skip
+def test_whoever_may_err_in_anything_looks_every_frame(given: dict[str, Any]) -> None:
+    assert NoisyPerception(**given).period == 0.1
+    assert NoisyPerception(**given, frame=0.2).period == 0.2
+    assert NoisyPerception(**given).name != "exact"
+    assert NoisyPerception(confidence=0.9).period is None, "nothing to be unsure of"
 
 
 def test_names_tell_what_errs() -> None:
@@ -135,6 +171,23 @@ def test_persistent_errors_last_and_fleeting_ones_do_not() -> None:
     assert 110 <= sum(now[v] != later[v] for v in now) <= 190
 
 
+def test_a_frame_begins_on_time() -> None:
+    """Also where 0.3 / 0.1 is less than 3, in floating point."""
+    see = NoisyPerception(0.25, persistent=False).start(SITE)
+    before, at, after = (intents(see, crowd(400, t), 0) for t in (0.25, 0.3, 0.35))
+    assert before != at == after
+    see = NoisyPerception(0.25, persistent=False, frame=0.5).start(SITE)
+    start, end, following = (intents(see, crowd(400, t), 0) for t in (0.0, 0.45, 0.5))
+    assert start == end != following
+
+
+def test_a_late_reading_is_that_of_then() -> None:
+    fleeting = NoisyPerception(0.25, persistent=False)
+    see, late = fleeting.start(SITE), replace(fleeting, delay=0.2).start(SITE)
+    intents(late, crowd(400, 0.0), 0)
+    assert intents(late, crowd(400, 0.2), 0) == intents(see, crowd(400, 0.0), 0)
+
+
 def test_it_does_not_matter_who_looks_when() -> None:
     """Readings belong to vehicles and frames, not to the order in which they are asked for."""
     perception = replace(ALL, delay=0.0)
@@ -177,6 +230,25 @@ def test_out_of_range_is_out_of_sight() -> None:
     assert {v.id for v in far(WAITING, WAITING.vehicles[0]).vehicles} == {1, 5, 2, 3, 4}
 
 
+def test_at_the_end_of_its_range_a_vehicle_is_seen() -> None:
+    ego, other = WAITING.vehicles[0], WAITING.vehicles[3]
+    bodies = Bodies(SITE)
+    one, two = bodies.body(ego), bodies.body(other)
+    reach = math.hypot(one.x - two.x, one.y - two.y)
+    for less, seen_by_ego in ((0.0, True), (1e-9, False)):
+        see = NoisyPerception(sensor_range=reach - less).start(SITE)
+        assert (other in see(WAITING, ego).vehicles) is seen_by_ego
+
+
+def test_a_newcomer_sees_from_where_it_is() -> None:
+    """Its own older view has no place for it; 6 m behind one, 14 m from the other."""
+    see = NoisyPerception(delay=0.2, sensor_range=10.0).start(SITE)
+    before = View(0.0, (seen(1, 0, 2, 2.0), seen(2, 1, 2, 2.0)))
+    see(before, before.vehicles[0])
+    now = View(0.2, (seen(1, 0, 2, 2.0), seen(3, 0, 1, 8.0), seen(2, 1, 2, 2.0)))
+    assert [v.id for v in see(now, now.vehicles[1]).vehicles] == [1, 3]
+
+
 def test_a_vehicle_inside_hides_those_behind_it() -> None:
     """Who goes straight on from b stands across the way between a and c."""
     ego, behind, across = seen(1, 0, 2, 2.0), seen(2, 2, 1, 6.0), seen(3, 1, 2, -9.0)
@@ -213,6 +285,15 @@ def test_a_newcomer_is_the_last_of_its_lane_in_an_older_view() -> None:
     assert [v.id for v in see(now, now.vehicles[1]).vehicles] == [1, 3, 2]
 
 
+def test_an_older_view_with_the_ego_in_its_place() -> None:
+    a, b, d = seen(1, 0, 1, 2.0), seen(2, 1, 1, 2.0), seen(4, 3, 1, 2.0)
+    older = (a, b, d)
+    assert with_ego(older, b._replace(distance=1.0)) == older
+    for lane, where in ((0, 1), (1, 2), (2, 2), (3, 3)):
+        ego = seen(9, lane, 1, 9.0)
+        assert with_ego(older, ego) == (*older[:where], ego, *older[where:])
+
+
 @given(st.lists(st.tuples(st.integers(0, 3), floats(-20, 10)), min_size=1, max_size=8), st.data())
 def test_lanes_stay_in_order(places: list[tuple[int, float]], data: st.DataObject) -> None:
     """Nobody is invented, dropped or put before its leader; the ego stays where it is."""
@@ -233,6 +314,25 @@ def test_noise_has_the_spread_that_it_says() -> None:
     for spread, k in ((0.5, 3), (2.0, 4)):
         errors = [a[k] - b[k] for a, b in zip(sight.vehicles, view.vehicles, strict=True)]
         assert (sum(e * e for e in errors) / 400) ** 0.5 == pytest.approx(spread, rel=4 / 800**0.5)
+
+
+@pytest.mark.parametrize(("noise", "field"), [("position_noise", 3), ("speed_noise", 4)])
+def test_noise_is_new_each_frame_and_one_for_all_or_each_its_own(noise: str, field: int) -> None:
+    def errors(perception: NoisyPerception, ego: int, time: float) -> list[float]:
+        view = View(time, tuple(seen(k, 0, 1, 100.0 * k, 50.0) for k in range(50)))
+        sight = perception.start(SITE)(view, view.vehicles[ego])
+        return [round(a[field] - b[field], 6) for a, b in zip(sight[1], view[1], strict=True)][2:]
+
+    alike, own = (NoisyPerception(**{noise: 0.5}, shared=shared) for shared in (True, False))
+    assert errors(alike, 0, 0.0) == errors(alike, 1, 0.0) == errors(alike, 0, 0.05)
+    assert errors(own, 0, 0.0) == errors(own, 0, 0.05)
+    for one, other in (
+        (errors(own, 0, 0.0), errors(own, 1, 0.0)),
+        (errors(own, 0, 0.0), errors(own, 0, 0.1)),
+        (errors(alike, 0, 0.0), errors(alike, 0, 0.1)),
+    ):
+        assert all(a != b for a, b in zip(one, other, strict=True))
+        assert len(set(one)) == len(one), "vehicles err each for itself"
 
 
 def test_no_vehicle_seems_to_drive_backwards() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import shapely
 
 from dim import HarmonyMatrix
-from dim.occupancy import CLOSE, STEP, area, showing
+from dim.occupancy import CLOSE, STEP, Area, area, showing
 from minisim.control import CLEARANCE, Site
 from scenarios import four_way, three_way
 
@@ -57,6 +58,24 @@ def test_outside_its_area_bodies_keep_their_distance() -> None:
     assert tested > 500
 
 
+def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
+    """And `ever` what is so at this or a later position of the second."""
+    p, q = 1, 4  # a2, b2
+    shared = area(SITE, p, q)
+    assert shared is not None
+    bodies = []
+    for way, count in zip((p, q), shared.close.shape, strict=True):
+        path = SITE.intersection.paths[way]
+        s = path.entry + STEP * np.arange(count)
+        assert s[-2] < path.exit + SITE.vehicle.length <= s[-1]
+        bodies.append(shapely.polygons(path.bodies(s, SITE.vehicle)))
+    distance = shapely.distance(bodies[0][:, None], bodies[1][None, :])
+    for x, y in itertools.product(*map(range, distance.shape)):
+        rows = slice(max(x - 1, 0), x + 2)
+        assert shared.close[x, y] == (distance[rows, max(y - 1, 0) : y + 2] <= CLOSE).any()
+        assert shared.ever[x, y] == (distance[rows, max(y - 1, 0) :] <= CLEARANCE).any()
+
+
 def test_an_area_is_the_others_mirrored() -> None:
     for p, q in pairs(SITE):
         shared, mirrored = area(SITE, p, q), area(SITE, q, p)
@@ -85,6 +104,53 @@ def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
     assert shared.room(100.0, 0.0) == math.inf
     assert shared.room(0.0, 100.0) == math.inf
     assert shared.room(shared.ends(0.0) + STEP, 0.0) == math.inf
+
+
+#: Five positions of the first vehicle, three of the second.
+BY_HAND = Area(
+    close=np.array([[0, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+    ever=np.array([[0, 0, 0], [1, 1, 0], [1, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "room", "way"),
+    [
+        (-3.0, -9.0, 3.0 + STEP, 3.0 + 4 * STEP),
+        (0.0, 0.0, STEP, 4 * STEP),
+        (0.1, 1.5 * STEP, STEP - 0.1, STEP - 0.1),
+        (1.5 * STEP, STEP, 0.0, 0.0),  # in it
+        (2.0 * STEP, 1.9 * STEP, 0.0, 0.0),
+        (3.0 * STEP, STEP, math.inf, math.inf),  # past it
+        (3.0 * STEP, 0.0, STEP, STEP),
+        (0.0, 2.0 * STEP, math.inf, math.inf),  # the other is past it
+        (5.0 * STEP, 0.0, math.inf, math.inf),  # off the grid
+        (0.0, 3.0 * STEP, math.inf, math.inf),
+    ],
+)
+def test_how_far_it_is_to_an_area_by_hand(
+    first: float, second: float, room: float, way: float
+) -> None:
+    assert BY_HAND.room(first, second) == pytest.approx(room)
+    assert BY_HAND.way(first, second) == pytest.approx(way)
+
+
+def test_where_an_area_ends_by_hand() -> None:
+    ends = [BY_HAND.ends(second * STEP) for second in (-9.0, 0.0, 0.9, 1.0, 2.0, 3.0)]
+    assert ends == [5 * STEP, 5 * STEP, 5 * STEP, 3 * STEP, 0.0, 0.0]
+
+
+def test_when_bodies_touch_by_hand() -> None:
+    """Before the entry is the entry; beyond the grid there is nothing to touch."""
+    for first, second, touching in (
+        (4.5, -2.0, True), (4.0, 0.9, True), (4.0, 1.0, False), (1.0, 1.0, True), (0.9, 1.0, False),
+        (2.9, 1.9, True), (-1.0, 1.0, False), (5.0, 0.0, False), (1.0, 3.0, False),
+    ):  # fmt: skip
+        at = np.array([first]) * STEP, np.array([second]) * STEP
+        assert BY_HAND.touches(*at) is touching, (first, second)
+    there, then = np.array([0.0, 1.0, 2.0]) * STEP, np.array([1.0, 2.0, 1.0]) * STEP
+    assert BY_HAND.touches(there, then)
+    assert not BY_HAND.touches(there[:2], then[:2])
 
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.3, 0.6])

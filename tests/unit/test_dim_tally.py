@@ -121,6 +121,16 @@ def test_one_wrong_reading_can_stop_everybody() -> None:
     assert tally.counts == {**NONE, "deadlock_s": 2.5, "disagreement_s": 2.5}
 
 
+def test_times_are_rounded_to_a_microsecond() -> None:
+    """0.1 + 0.2 is 0.3; in floating point, a bit more."""
+    tally = session(Told((((1, 4), 2),)))
+    for time in (0.0, 0.1, 0.1 + 0.2):
+        show(tally, time, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 0.3, "disagreement_s": 0.3}
+    show(tally, 1.3000001, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 1.3, "disagreement_s": 1.3}
+
+
 def test_crossings_are_counted_however_rarely_one_looks() -> None:
     tally = session(Told())
     show(tally, 0.0, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1))
@@ -128,6 +138,35 @@ def test_crossings_are_counted_however_rarely_one_looks() -> None:
     assert tally.counts["crossings"] == 1
     show(tally, 9.0)  # both have left
     assert tally.counts["crossings"] == 2
+
+
+def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
+    tally = session(Told())
+    for time, distance, crossings in ((0.0, 2.1, 0), (1.0, 0.5, 0), (2.0, 0.0, 0), (3.0, -0.1, 1)):
+        show(tally, time, seen(1, 0, 2, distance))
+        assert tally.counts["crossings"] == crossings
+
+
+def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
+    for distance, crossings in ((8.0, 1), (8.001, 0)):  # who leaves between two looks
+        tally = session(Told())
+        show(tally, 5.0, seen(1, 0, 2, distance, 5.0))
+        show(tally, 9.0)
+        assert tally.counts == {**NONE, "crossings": crossings}
+
+
+@pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
+def test_who_must_wait_anyway_disagrees_with_nobody(gate: str, lasts: float) -> None:
+    """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
+    views = [
+        (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
+         seen(4, 3, 1, 2.1))
+        for time in (0.0, 2.5)
+    ]  # fmt: skip
+    tally = session(Told((((1, 4), 3),)), gate=gate)
+    for view in views:
+        show(tally, *view)
+    assert tally.counts["disagreement_s"] == lasts
 
 
 def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> None:
