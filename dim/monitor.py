@@ -33,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
-from dim.occupancy import Area, area, showing
+from dim.occupancy import Area, area, passes, showing
 from dim.perception import UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
 from minisim.errors import number
@@ -234,7 +234,7 @@ class Watch:
             return 0.0
         first = _goes_first(ego, other)
         if other.speed < STANDING and self._open(mine, x, other):
-            stuck = mirrored.way(y, x) < math.inf  # the other, as long as the ego stands
+            stuck = not self._open(theirs, y, ego)  # the other, as long as the ego stands
             if first or stuck:
                 return 0.0
         if self._passes_first(ego, other, shared, mirrored):
@@ -246,8 +246,7 @@ class Watch:
     def _open(self, mine: int, x: float, other: Observed) -> bool:
         """Whether nobody is in the ego's way as long as the other stands where its body is."""
         body = other.lane * (self._n - 1) + other.manoeuvre - 1  # a path that it is on
-        shared = area(self._site, mine, body)
-        return shared is None or shared.way(x, -other.distance) == math.inf
+        return passes(self._site, mine, x, body, -other.distance)
 
     def _passes_first(self, ego: Observed, other: Observed, shared: Area, mirrored: Area) -> bool:
         """Whether the ego, as fast as now, is out of the area in good time before the other."""

@@ -25,6 +25,10 @@ STEP = 0.25
 #: of 0.25 m around one of the two (see `minisim.control.CLEARANCE`).
 CLOSE = 0.25
 
+#: Room that has to do where two would stand for ever otherwise, and the step in which it is
+#: measured [m].
+TIGHT = 0.1
+
 
 class Area(NamedTuple):
     """The conflict area of two movements, on a grid of `STEP` from the junction entry on.
@@ -70,6 +74,20 @@ def area(site: Site, first: int, second: int) -> Area | None:
     return _area(site.intersection, vehicle.length, vehicle.width, first, second)
 
 
+def passes(site: Site, first: int, x: float, second: int, y: float) -> bool:
+    """Whether a vehicle on one path gets past another that stands on another, bodies apart.
+
+    Args:
+        site: where.
+        first, second: movements by index.
+        x, y: how far past the entry their fronts are [m].
+    """
+    shared = area(site, first, second)
+    if shared is None or shared.way(x, y) == math.inf:
+        return True
+    return _squeezes(site.intersection, site.vehicle, first, round(x, 2), second, round(y, 2))
+
+
 def showing(site: Site, tolerance: float) -> Floats:
     """From where on a vehicle is seen not to take another manoeuvre of its lane, shape (m, m) [m].
 
@@ -103,6 +121,18 @@ def _area(
     if first > second:
         near, close = near.T, close.T
     return Area(close, np.logical_or.accumulate(near[:, ::-1], axis=1)[:, ::-1])
+
+
+@lru_cache(maxsize=4096)
+def _squeezes(
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
+) -> bool:
+    """`passes`, measured: the grid is too coarse to tell the last decimetres."""
+    one, other = intersection.paths[first], intersection.paths[second]
+    stands = shapely.polygons(other.bodies(np.array([other.entry + y]), vehicle))
+    s = np.arange(x, one.exit - one.entry + vehicle.length, TIGHT)
+    moves = shapely.polygons(one.bodies(one.entry + s, vehicle))
+    return bool((shapely.distance(moves, stands) > TIGHT).all())
 
 
 @lru_cache(maxsize=4096)
