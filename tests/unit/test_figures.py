@@ -352,6 +352,8 @@ def test_decision_figure_names_everyone() -> None:
     strong = [line for line in graph.lines if line.get_color() == style.RIGHT_OF_WAY]
     assert (len(graph.lines), len(strong)) == (len(explanation.edges), 1)
     assert any(t.get_text() == "Right of way: a1, b2" for t in figure.texts)
+    (zones,) = figure.legends
+    assert [t.get_text() for t in zones.get_texts()] == ["red zone", "yellow zone", "green zone"]
 
 
 def test_decision_figure_texts_do_not_overlap() -> None:
