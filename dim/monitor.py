@@ -99,7 +99,15 @@ class Monitor:
             site: where.
             matrix: which movements are in harmony.
             sight: from where on before the junction vehicles take part [m].
+
+        Raises:
+            InputError: a last resort that brakes less than vehicles do for comfort.
         """
+        if self.deceleration is not None:
+            number(
+                "deceleration of the monitor [m/s²]", self.deceleration,
+                low=site.vehicle.deceleration,
+            )  # fmt: skip
         return Watch(self, site, matrix, sight)
 
 

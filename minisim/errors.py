@@ -122,8 +122,9 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Raise `InputError` unless `value` is a `kind`."""
-    if not isinstance(value, kind):
+    """Raise `InputError` unless `value` is a `kind`; a class where one of its objects belongs is
+    none, though it has the methods that a protocol asks for."""
+    if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         wanted = " or ".join(k.__name__ for k in kinds)
         article = "an" if wanted[0] in "AEIOaeio" else "a"

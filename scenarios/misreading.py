@@ -14,14 +14,19 @@ def with_perception(controller: Controller, perception: Perception) -> Controlle
     """The controller, but its vehicles see like this; exact perception leaves it as it is.
 
     Raises:
-        InputError: senses that err where the controller is not DIM.
+        InputError: senses that err where the controller is not DIM, or has some already.
     """
     if perception.period is None:
         return controller
     if not isinstance(controller, Dim):
         raise InputError(
-            f"vehicles of DIM (dim, dim-harmonious, …) can misread each other, not those of "
-            f"{controller.name!r}"
+            f"vehicles of DIM (dim, dim-harmonious, … in profiles other than as_run) can misread "
+            f"each other, not those of {controller.name!r}"
+        )
+    if controller.perception.period is not None:
+        raise InputError(
+            f"{controller.name!r} has a perception of its own; misread intents go with those that "
+            "have none, such as dim or dim-monitored"
         )
     return replace(controller, perception=perception)
 

@@ -60,11 +60,11 @@ IntentError = Annotated[
     ),
 ]
 ErrorKind = Annotated[
-    str,
+    str | None,
     typer.Option(
         metavar="missed|symmetric",
-        help="What --intent-error does: miss the signal of a turn, or take any manoeuvre for each "
-        "other one alike. Everybody errs alike, for as long as they meet.",
+        help="What --intent-error does: miss the signal of a turn (default), or take any manoeuvre "
+        "for each other one alike. Everybody errs alike, for as long as they meet.",
     ),
 ]
 Density = Annotated[

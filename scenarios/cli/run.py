@@ -64,7 +64,7 @@ def run(
     controller: ControllerName = "dim",
     humans: Humans = 0.0,
     intent_error: IntentError = 0.0,
-    error_kind: ErrorKind = "missed",
+    error_kind: ErrorKind = None,
     density: Density = None,
     split: Split = None,
     turns: Turns = None,
@@ -132,7 +132,9 @@ def run(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    senses = NoisyPerception(intent_error, error_kind)
+    senses = NoisyPerception(intent_error, error_kind or "missed")
+    if error_kind is not None and senses.period is None:
+        raise InputError(f"--error-kind {error_kind} needs --intent-error P above 0")
     dim = with_perception(controller_named(controller, profile), senses)
     who = counted(with_humans(dim, humans))
     everything = fcd is not None or trajectories is not None

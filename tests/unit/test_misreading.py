@@ -164,6 +164,8 @@ def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
         (("--intent-error", "1.5"), "intent_error must be at least 0 and at most 1, got 1.5"),
         (("--intent-error", "nan"), "intent_error must be"),
         (("--error-kind", "mised"), "did you mean 'missed'"),
+        (("--error-kind", "symmetric"), "--error-kind symmetric needs --intent-error P above 0"),
+        (("-c", "dim-occlusion", "--intent-error", "0.1"), "has a perception of its own"),
         (("--intent-error", "0.1", "-c", "fixed-time"), "not those of 'fixed-time'"),
     ],
 )
