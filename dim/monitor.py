@@ -90,7 +90,8 @@ class Monitor:
         number("tolerance [m]", self.tolerance, above=0, high=1)
         number("patience [s]", self.patience, low=0.5, high=60)
         if self.deceleration is not None:
-            number("deceleration of the monitor [m/s²]", self.deceleration, above=0, high=1000)
+            # Less than 1 m/s² is no braking even on ice.
+            number("deceleration of the monitor [m/s²]", self.deceleration, low=1, high=1000)
 
     def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
         """Begin a run.
@@ -99,15 +100,7 @@ class Monitor:
             site: where.
             matrix: which movements are in harmony.
             sight: from where on before the junction vehicles take part [m].
-
-        Raises:
-            InputError: a last resort that brakes less than vehicles do for comfort.
         """
-        if self.deceleration is not None:
-            number(
-                "deceleration of the monitor [m/s²]", self.deceleration,
-                low=site.vehicle.deceleration,
-            )  # fmt: skip
         return Watch(self, site, matrix, sight)
 
 

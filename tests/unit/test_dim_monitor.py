@@ -493,7 +493,7 @@ def run_of(scenario: Scenario, dim: Dim) -> Run:
         ({"tolerance": 0.0}, "tolerance .m. must be above 0 and at most 1"),
         ({"tolerance": 1.5}, "tolerance .m. must be above 0 and at most 1,"),
         ({"tolerance": math.nan}, "tolerance .m. must be"),
-        ({"deceleration": 0.0}, "deceleration of the monitor .m/s². must be above 0"),
+        ({"deceleration": 0.0}, "deceleration of the monitor .m/s². must be at least 1"),
         ({"deceleration": 1001}, "deceleration of the monitor .m/s². must be .* at most 1000"),
         ({"deceleration": "hard"}, "deceleration of the monitor .m/s². must be a number"),
         ({"patience": 0.0}, "patience .s. must be at least 0.5 and at most 60"),
