@@ -507,7 +507,7 @@ def test_bad_parameters_are_named(options: dict[str, object], message: str) -> N
 
 def test_bounds_are_allowed() -> None:
     Monitor(time_margin=0, look_ahead=0.5, tolerance=1, deceleration=1000, patience=0.5)
-    Monitor(time_margin=10, look_ahead=30, tolerance=1e-3, deceleration=0.1, patience=60)
+    Monitor(time_margin=10, look_ahead=30, tolerance=1e-3, deceleration=1, patience=60)
 
 
 def test_what_is_no_monitor_is_refused() -> None:
