@@ -39,9 +39,10 @@ def human_figure(archive: Archive) -> Figure:
     (results,) = archive.need("humans")
     rows = results.good
     figure = style.new_figure(11.0, 4.9)
-    panels = figure.subplots(1, len(HUMAN_DENSITIES), sharey=True)
+    run = [density for density in HUMAN_DENSITIES if (rows["density"] == density).any()]
+    panels = figure.subplots(1, len(run), sharey=True, squeeze=False)[0]
     figure.subplots_adjust(left=0.062, right=0.985, top=0.735, bottom=0.145, wspace=0.06)
-    for axes, density in zip(panels, HUMAN_DENSITIES, strict=True):
+    for axes, density in zip(panels, run, strict=True):
         chosen = rows[rows["density"] == density]
         for gate in HUMAN_GATES:
             for group in GROUPS:
@@ -49,7 +50,7 @@ def human_figure(archive: Archive) -> Figure:
         _draw_stop(axes, chosen[chosen["series"] == STOP])
         style.plot_axes(axes, f"{density:g} veh/h/lane", "human drivers [%]", "")
         axes.set_xticks([100.0 * share for share in HUMAN_SHARES])
-        lines.log_time(axes, 2.0, 1000.0)
+        lines.log_time(axes, 1.0, 1000.0)
     panels[0].set_ylabel(
         "mean delay of all vehicles [s], logarithmic", fontsize=9.5, color=style.INK
     )
