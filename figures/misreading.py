@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -153,8 +154,7 @@ _NOTE = (
 def _measures() -> dict[str, Measure]:
     """Title of a panel -> what it shows."""
     counts: dict[str, Measure] = {
-        title: lambda rows, column=column: _rate(rows, column)  # type: ignore[misc]
-        for title, column in EVENTS.items()
+        title: partial(_rate, column=column) for title, column in EVENTS.items()
     }
     return {**counts, "Mean delay": _delay}
 

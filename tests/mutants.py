@@ -174,5 +174,5 @@ def _interval(killed: int, tried: int) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    mutmut.workers.isolation.PytestRunner = Collected  # type: ignore[misc]
+    mutmut.workers.isolation.PytestRunner = Collected  # type: ignore[misc]  # ours in its place
     cli()
