@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     "[bold]How long[/bold]\n\n"
     "Processor time with 10 seeds, on a machine that simulates an hour under DIM in 0.1 s: text, "
     "the paper's grid of 700 hours and the first to be run, 2.5 minutes; fair 6; gate and fairness "
-    "1; perception 14 and confidence 4, with 5 seeds at most; capacity 10; as-run, with its step "
+    "1; perception 26 and confidence 3, with 5 seeds at most; capacity 10; as-run, with its step "
     "of 0.01 s, some 25. Two processes halve it. To have the paper's grid alone: "
     "[bold]minisim reproduce --only text[/bold].\n\n"
     "The report says what each study took, and CPU seconds a simulated hour by controller."
