@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from baselines.phases import PhaseSession, Verdict, following
+from baselines.phases import PhaseSession, Verdict, check_greens, following
 from baselines.signals import full_order, lane_order
 from minisim.control import Site, View
-from minisim.errors import InputError, instance, number
+from minisim.errors import instance, number
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -58,13 +58,7 @@ class Actuated:
         number("max_gap [s]", self.max_gap, low=0, high=3600)
         number("detector_gap [s]", self.detector_gap, above=0, high=3600)
         number("passing_time [s]", self.passing_time, low=0.1, high=60)
-        number("min_green [s]", self.min_green, low=0.5, high=3600)
-        number("max_green [s]", self.max_green, low=0.5, high=3600)
-        if self.max_green < self.min_green:
-            raise InputError(
-                f"max_green must be at least min_green, {self.min_green:g} s, "
-                f"got {self.max_green:g} s"
-            )
+        check_greens(self.min_green, self.max_green)
         number("amber [s]", self.amber, low=0, high=60)
         object.__setattr__(self, "order", lane_order(self.order))
         instance("name", self.name, str)

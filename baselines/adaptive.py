@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from baselines.phases import PhaseSession, Verdict, following, on_detector
+from baselines.phases import PhaseSession, Verdict, check_greens, following, on_detector
 from baselines.signals import full_order, lane_order
 from minisim.control import Observed, Site, View
-from minisim.errors import InputError, instance, number
+from minisim.errors import instance, number
 
 #: An idle signal looks again after so long [s]; fixed in SUMO's code.
 IDLE = 1.0
@@ -53,13 +53,7 @@ class Adaptive:
     def __post_init__(self) -> None:
         number("detector_range [m]", self.detector_range, low=1, high=1000)
         number("min_time_loss [s]", self.min_time_loss, low=0, high=3600)
-        number("min_green [s]", self.min_green, low=0.5, high=3600)
-        number("max_green [s]", self.max_green, low=0.5, high=3600)
-        if self.max_green < self.min_green:
-            raise InputError(
-                f"max_green must be at least min_green, {self.min_green:g} s, "
-                f"got {self.max_green:g} s"
-            )
+        check_greens(self.min_green, self.max_green)
         instance("extend_max_green", self.extend_max_green, bool)
         number("amber [s]", self.amber, low=0, high=60)
         object.__setattr__(self, "order", lane_order(self.order))

@@ -75,7 +75,9 @@ def area(site: Site, first: int, second: int) -> Area | None:
 
 
 def passes(site: Site, first: int, x: float, second: int, y: float) -> bool:
-    """Whether a vehicle on one path gets past another that stands on another, bodies apart.
+    """Whether a vehicle on one path gets past another that stands on another.
+
+    With `CLOSE` between the bodies by the grid or, measured, more than `TIGHT` all the way.
 
     Args:
         site: where.

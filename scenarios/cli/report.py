@@ -126,7 +126,7 @@ def gallery_table(items: Iterable[Item]) -> Table:
     return table
 
 
-#: Column of `scenarios.cells.cells` -> heading.
+#: Column of `scenarios.studies.cells.cells` -> heading.
 CELL_HEADINGS = {
     "waiting_time_s": "waiting [s]",
     "complete_waiting_time_s": "with unfinished",

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from dim import HarmonyMatrix
-from dim.occupancy import CLOSE, STEP, Area, area, showing
+from dim.occupancy import CLOSE, STEP, Area, area, passes, showing
 from minisim.control import CLEARANCE, Site
 from scenarios import four_way, three_way
 
@@ -163,3 +163,14 @@ def test_a_turn_shows_where_the_arc_has_left_the_straight_lane(tolerance: float)
         assert shows[turn, 1] == pytest.approx(expected, abs=0.06)
     assert shows[0, 0] == math.inf
     assert (shows[:3, 3:] == 0.0).all()
+
+
+def test_who_has_a_decimetre_gets_past_who_has_none_does_not() -> None:
+    """Where two once stood in each other's way for ever: 13 cm for one, a touch for the other."""
+    names = [str(movement) for movement in SITE.intersection.movements]
+    a2, b3 = names.index("a2"), names.index("b3")
+    assert passes(SITE, b3, 4.94, a2, 3.56)
+    assert not passes(SITE, a2, 3.56, b3, 4.94)
+    shared = area(SITE, b3, a2)
+    assert shared is not None
+    assert shared.way(4.94, 3.56) < math.inf, "the grid alone does not show it"
