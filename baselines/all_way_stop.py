@@ -12,9 +12,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from minisim.clearing import clearing_distances
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.errors import instance, number
+from minisim.junction.clearing import clearing_distances
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
 STANDING = 0.1

@@ -3,7 +3,7 @@
 Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
 passage; the manager looks ahead how it would drive, and grants the passage if the space that it
 needs is free at the time. Theirs is a grid of tiles, ours the conflict zones of the movements
-(`baselines.zones`): only pairs matter, and for a pair their stretches are exact.
+(`minisim.junction.zones`): only pairs matter, and for a pair their stretches are exact.
 
 The protocol
 - The first vehicle of a lane asks, and whoever follows a holder; from `reach` before the junction
@@ -32,7 +32,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from baselines.prediction import NOBODY, Floats, Leader, Motion, predict, ways
-from baselines.zones import conflict_zones
 from minisim.control import (
     Command,
     Go,
@@ -46,6 +45,7 @@ from minisim.control import (
     stopping_distance,
 )
 from minisim.errors import InputError, instance, number
+from minisim.junction.zones import conflict_zones
 from minisim.vehicle import EngineVehicle
 
 #: Differences from the prediction that are none [m], [m/s].

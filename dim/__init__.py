@@ -4,11 +4,11 @@ from dim.as_run import AsRunDim
 from dim.controller import Dim
 from dim.decision import DecisionTable, Explanation, decide, explain
 from dim.harmony import HarmonyMatrix
-from dim.humans import Humans
-from dim.mixed import Mixed
+from dim.humans.drivers import Humans
+from dim.humans.mixed import Mixed
 from dim.monitor import Monitor
-from dim.noise import NoisyPerception
 from dim.perception import ExactPerception, Perception
+from dim.senses.noise import NoisyPerception
 from dim.zones import Zones
 
 __all__ = [

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from minisim.control import CLEARANCE
 from minisim.errors import FileError, InputError, instance, integer, show
-from minisim.geometry import ARM_NAMES, Bools, Intersection, Movement
+from minisim.junction.geometry import ARM_NAMES, Bools, Intersection, Movement
 from minisim.vehicle import VehicleType
 
 #: Arm counts for which the authors published a matrix.

@@ -6,14 +6,14 @@ in one vehicle and at what that vehicle sees, at those who are crossing or can n
 - *What another may do* is what it was read to want, as long as its motion does not contradict
   that. A vehicle beside every path that it could be on by that reading, or one that was read to
   want this and then that, may do whatever its position on the fan of its lane's paths still allows.
-- *Where it matters* is the conflict area of the two paths (`dim.occupancy`). The ego has to be able
-  to stop before it, however far the other goes, unless it is out of it in good time.
+- *Where it matters* is the conflict area of the two paths (`minisim.junction.occupancy`). The ego
+  has to be able to stop before it, however far the other goes, unless it is out of it in good time.
 - *Then it brakes*: when the braking that this takes is no longer less than comfortable, as hard as
   it takes. Where it is too late for that it compares whether going on or braking touches.
 
 Who crosses by unanimous decisions is in harmony with all others who do (the protocol's proof, see
-`dim.protocol`). So with exact perception, and `commit="stoppable"`, nobody is ever in the way of
-anybody as far as a monitor can tell, it never brakes, and a run is the same as without it.
+`dim.proofs.protocol`). So with exact perception, and `commit="stoppable"`, nobody is ever in the
+way of anybody as far as a monitor can tell, it never brakes, and a run is the same as without it.
 
 Two who brake for each other must not stand for ever: of two that stand, the one further in goes
 first, of equals the one of the first lane, unless the other stands in its way. Both can see that.
@@ -33,10 +33,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
-from dim.occupancy import Area, area, passes, showing
 from dim.perception import UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
 from minisim.errors import number
+from minisim.junction.occupancy import Area, area, passes, showing
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
 #: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).

@@ -1,8 +1,8 @@
 """What one vehicle sees of the others, and how it reads that.
 
 Seeing and reading are apart. A `Perception` says what an ego sees of the true view: everything
-(`ExactPerception`), or less, later, or wrong (`dim.noise`). `Reader` turns what was seen into the
-few facts that Algorithm 1 needs, the same way for every vehicle.
+(`ExactPerception`), or less, later, or wrong (`dim.senses.noise`). `Reader` turns what was seen
+into the few facts that Algorithm 1 needs, the same way for every vehicle.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Figures and animations of decisions, runs and results: the only room that draws."""
 
-from figures.animate import write_animation
-from figures.decision import decision_figure
+from figures.film.animate import write_animation
+from figures.junction.decision import decision_figure
 from figures.performance import performance_figure
 from figures.style import save
 

@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
-from figures import beyond, misreading, mixing, paper_results, paper_tables, schematic
+from figures import beyond, misreading, mixing, paper_results, paper_tables
+from figures.junction import schematic
 from figures.style import FORMATS, save
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import choice

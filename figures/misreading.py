@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from dim.intent import KINDS, RATES
-from dim.noise import CLASSIFIER
+from dim.senses.intent import KINDS, RATES
+from dim.senses.noise import CLASSIFIER
 from figures import lines, style
 from figures.tables import Table
 from scenarios.statistics import mean_interval

@@ -13,7 +13,7 @@ from dim import HarmonyMatrix
 from figures import style
 from figures.beyond import crossing_rows, losses
 from figures.tables import Table
-from minisim.geometry import ARM_NAMES
+from minisim.junction.geometry import ARM_NAMES
 from scenarios.library import MAKERS
 from scenarios.studies.archive import Archive, missing_note, smoke_test
 from scenarios.studies.comparison import causes, compare, labels, score

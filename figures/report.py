@@ -13,7 +13,7 @@ from figures.beyond import GATES, OTHERS, losses
 from figures.gallery import GALLERY, Drawing, write
 from figures.tables import Table
 from minisim.errors import FileError
-from minisim.recording import replacing
+from minisim.results.trajectories import replacing
 from minisim.version import __version__
 from scenarios.studies.archive import Archive, MissingRunsError, make_command, smoke_test
 from scenarios.studies.cells import saturated, too_short

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from minisim.errors import InputError
-from minisim.recording import replacing
+from minisim.results.trajectories import replacing
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from matplotlib.patches import Circle
 
 from dim import explain
 from dim.decision import Movements
-from dim.verification import Analysis
+from dim.proofs.verification import Analysis
 from figures import style
-from minisim.geometry import ARM_NAMES, Floats, Intersection
+from minisim.junction.geometry import ARM_NAMES, Floats, Intersection
 
 #: One colour for each clique that ties; with more cliques they come again, dashed.
 CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
@@ -25,7 +25,7 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
     """Draw an analysis.
 
     Args:
-        analysis: of all cases (`dim.verification.analyse`).
+        analysis: of all cases (`dim.proofs.verification.analyse`).
         intersection: whose arms give the nodes their places.
     """
     worst = list(analysis.worst.items())

@@ -20,18 +20,18 @@ from minisim.version import __version__
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
     from minisim.errors import MinisimError
-    from minisim.geometry import Intersection, Movement
-    from minisim.run import Run
+    from minisim.junction.geometry import Intersection, Movement
+    from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
     from minisim.vehicle import VehicleType
 
 _HOME = {
     "Arrivals": "minisim.arrivals",
     "Demand": "minisim.arrivals",
-    "Intersection": "minisim.geometry",
+    "Intersection": "minisim.junction.geometry",
     "MinisimError": "minisim.errors",
-    "Movement": "minisim.geometry",
-    "Run": "minisim.run",
+    "Movement": "minisim.junction.geometry",
+    "Run": "minisim.results.run",
     "Simulation": "minisim.simulation",
     "VehicleType": "minisim.vehicle",
     "read_arrivals": "minisim.arrivals",

@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from minisim.errors import InputError, instance, integer, number, numbers
-from minisim.geometry import Bools, Intersection, Movement
+from minisim.junction.geometry import Bools, Intersection, Movement
 from minisim.vehicle import VehicleType
 
 #: Room kept between two corridors that may be driven at once [m]: the static buffer of 0.25 m
@@ -29,8 +29,9 @@ CLEARANCE = 0.5
 LATERAL_ACCELERATION = 5.5
 
 #: Margin before a vehicle counts as unable to stop [m]: less than what a held vehicle leaves
-#: before its line (`minisim.state.STOP_MARGIN`), so that a vehicle that brakes for the junction
-#: entry never counts as committed; more than rounding, so that one that can stop always does.
+#: before its line (`minisim.engine.state.STOP_MARGIN`), so that a vehicle that brakes for the
+#: junction entry never counts as committed; more than rounding, so that one that can stop always
+#: does.
 COMMIT_MARGIN = 0.1
 
 

@@ -29,7 +29,7 @@ class CollisionError(MinisimError):
     """Two bodies touched and the caller did not ask to record and go on.
 
     Attributes:
-        collisions: the `minisim.collision.Collision`s of the step at which the run stopped.
+        collisions: the `minisim.engine.collision.Collision`s of the step at which the run stopped.
         replay: call it to run again up to a little after it, with the trajectories of the last
             seconds (10 unless told) recorded; returns a `Run`. None on a copy from another
             process.

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from minisim.arrivals import Arrivals
-from minisim.collision import Collision
 from minisim.control import (
     Advise,
     Brake,
@@ -24,6 +23,10 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.engine.collision import Collision
+from minisim.engine.state import (
+    first_tick,
+)
 from minisim.errors import (
     CollisionError,
     ControllerError,
@@ -34,10 +37,7 @@ from minisim.errors import (
     numbers,
     show,
 )
-from minisim.run import Run, ScenarioLike
-from minisim.state import (
-    first_tick,
-)
+from minisim.results.run import Run, ScenarioLike
 
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")

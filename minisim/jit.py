@@ -76,8 +76,9 @@ def _cache_class() -> Any:
 
 @lru_cache
 def _digest(folder: Path) -> bytes:
-    """Of all Python sources of a folder as they stand on disk now."""
+    """Of all Python sources of a folder, and of those within, as they stand on disk now."""
     found = hashlib.sha256()
-    for file in sorted(folder.glob("*.py")):
-        found.update(file.name.encode() + b"\0" + hashlib.sha256(file.read_bytes()).digest())
+    for file in sorted(folder.rglob("*.py")):
+        name = file.relative_to(folder).as_posix().encode()
+        found.update(name + b"\0" + hashlib.sha256(file.read_bytes()).digest())
     return found.digest()

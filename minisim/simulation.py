@@ -8,8 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from minisim import kernel
-from minisim.collision import Body, Collision, touching
 from minisim.control import (
     Advise,
     Brake,
@@ -22,6 +20,21 @@ from minisim.control import (
     Open,
     View,
     Wake,
+)
+from minisim.engine import kernel
+from minisim.engine.collision import Body, Collision, touching
+from minisim.engine.state import (
+    DRIVING,
+    NEVER,
+    OBSERVED,
+    TRACE,
+    Records,
+    build_engine,
+    build_lanes,
+    build_law,
+    build_road,
+    build_vehicles,
+    first_tick,
 )
 from minisim.errors import (
     choice,
@@ -37,21 +50,8 @@ from minisim.hosting import (
     collision_error,
     counts_of,
 )
-from minisim.run import Run, ScenarioLike
-from minisim.state import (
-    DRIVING,
-    NEVER,
-    OBSERVED,
-    TRACE,
-    Records,
-    build_engine,
-    build_lanes,
-    build_law,
-    build_road,
-    build_vehicles,
-    first_tick,
-)
-from minisim.trips import collect_trips
+from minisim.results.run import Run, ScenarioLike
+from minisim.results.trips import collect_trips
 
 #: `Observed._make` without its check of the number of fields, which is that of `OBSERVED`.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)

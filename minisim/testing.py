@@ -40,8 +40,8 @@ from minisim.errors import (
     number,
     numbers,
 )
-from minisim.geometry import ARM_NAMES, Intersection
-from minisim.run import Run
+from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
 

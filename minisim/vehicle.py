@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from minisim.errors import InputError, choice, number
 
-#: Car-following laws; their order is that of `minisim.state.IDM` and its siblings.
+#: Car-following laws; their order is that of `minisim.engine.state.IDM` and its siblings.
 MODELS = ("idm", "iidm", "krauss", "cc")
 
 

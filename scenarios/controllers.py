@@ -15,7 +15,7 @@ from baselines import (
     V2ICAsRun,
 )
 from dim import AsRunDim, Dim, Monitor, NoisyPerception
-from dim.noise import CLASSIFIER, UNSIGNALLED
+from dim.senses.noise import CLASSIFIER, UNSIGNALLED
 from minisim.control import Controller, Unregulated
 from minisim.errors import choice
 from scenarios.scenario import AS_RUN, Profile, profile_named

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from dim import Dim
-from dim.modelcheck import Path
+from dim.proofs.modelcheck import Path
 from minisim.arrivals import Arrivals
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
@@ -34,7 +34,7 @@ def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> A
     Args:
         scenario: junction and profile; its demand is not used.
         dim: the rules of the paths.
-        paths: to unsafe states (`dim.modelcheck.explore`).
+        paths: to unsafe states (`dim.proofs.modelcheck.explore`).
     """
     for step in range(round(LATEST / scenario.profile.dt)):
         for path in paths:

@@ -12,19 +12,19 @@ from rich import box
 from rich.table import Table
 
 from minisim.errors import InputError, MinisimError, integer, number, numbers
-from minisim.recording import replacing
+from minisim.results.trajectories import replacing
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
-from scenarios.pool import workers
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep import sweep
 from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.pool import workers
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.run import Run
+    from minisim.results.run import Run
 
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {

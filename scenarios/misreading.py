@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dim import Dim, Perception
-from dim.tally import Tallied
+from dim.senses.tally import Tallied
 from minisim.control import Controller
 from minisim.errors import InputError
 
@@ -32,7 +32,7 @@ def with_perception(controller: Controller, perception: Perception) -> Controlle
 
 
 def counted(controller: Controller) -> Controller:
-    """The controller with a tally of its errors (`dim.tally`), where its vehicles' senses err."""
+    """The controller with a tally of its errors (`dim.senses.tally`), where its senses err."""
     if isinstance(controller, Dim) and controller.perception.period is not None:
         return Tallied(controller)
     return controller

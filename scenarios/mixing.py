@@ -7,8 +7,8 @@ from typing import Any
 from dim import Dim, Mixed
 from minisim.control import Controller
 from minisim.errors import InputError, number
-from minisim.run import Run
-from minisim.trips import group_means
+from minisim.results.run import Run
+from minisim.results.trips import group_means
 
 
 def with_humans(controller: Controller, share: float) -> Controller:
@@ -31,7 +31,7 @@ def with_humans(controller: Controller, share: float) -> Controller:
 def driver_means(run: Run) -> dict[str, dict[str, Any]]:
     """Means of human drivers (`human`) and of the others (`automated`) in one run.
 
-    Empty without humans. Keys of each group as in `minisim.trips.group_means`.
+    Empty without humans. Keys of each group as in `minisim.results.trips.group_means`.
     """
     if not isinstance(run.controller, Mixed):
         return {}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
 from minisim.errors import InputError, choice, instance, number, show
-from minisim.geometry import Intersection
+from minisim.junction.geometry import Intersection
 from minisim.vehicle import EngineVehicle, VehicleType
 
 KMH = 1.0 / 3.6

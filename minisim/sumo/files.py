@@ -10,12 +10,12 @@ import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import Site
+from minisim.engine.state import Records, insertion_slack
 from minisim.errors import SumoError
-from minisim.geometry import ARM_NAMES
-from minisim.state import Records, insertion_slack
+from minisim.junction.geometry import ARM_NAMES
+from minisim.results.trips import Trips
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.trips import Trips
 from minisim.vehicle import EngineVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"

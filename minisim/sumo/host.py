@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from minisim.control import Command, Controller, View
+from minisim.engine.state import build_engine, build_law, build_road, build_vehicles, first_tick
 from minisim.errors import (
     FileError,
     InputError,
@@ -38,9 +39,8 @@ from minisim.hosting import (
     collision_error,
     counts_of,
 )
-from minisim.recording import replacing
-from minisim.run import Run, ScenarioLike
-from minisim.state import build_engine, build_law, build_road, build_vehicles, first_tick
+from minisim.results.run import Run, ScenarioLike
+from minisim.results.trajectories import replacing
 from minisim.sumo.files import (
     CONFIGURATION,
     FCD,

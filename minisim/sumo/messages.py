@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from minisim.collision import Collision
 from minisim.control import Observed, Plan
-from minisim.geometry import Movement
-from minisim.state import Engine, Law, Records, Road
+from minisim.engine.collision import Collision
+from minisim.engine.state import Engine, Law, Records, Road
+from minisim.junction.geometry import Movement
 from minisim.sumo.network import Network
 
 
@@ -24,7 +24,7 @@ class Job(NamedTuple):
         engine: of the vehicles, where they have one (model "CC").
         top_speed: no vehicle is faster [m/s].
         network: lengths in SUMO.
-        vehicles: as `minisim.state.build_vehicles` has them.
+        vehicles: as `minisim.engine.state.build_vehicles` has them.
         lanes: how many.
         movements: of the intersection.
         horizon: tick at which to stop.

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from minisim.errors import FileError, SumoError
-from minisim.geometry import ARM_NAMES, Intersection
-from minisim.recording import lane_names
+from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.results.trajectories import lane_names
 
 NODES, EDGES, CONNECTIONS = "minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"
 NETWORK = "minisim.net.xml"

@@ -15,11 +15,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
-from minisim import kernel
 from minisim.carfollowing import cruise_control
-from minisim.engine import follow, realise
-from minisim.geometry import Movement
-from minisim.state import STOP_MARGIN, Engine, Law, Records
+from minisim.engine import kernel
+from minisim.engine.cruise import follow, realise
+from minisim.engine.state import STOP_MARGIN, Engine, Law, Records
+from minisim.junction.geometry import Movement
 from minisim.sumo.messages import Job
 
 #: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
@@ -42,7 +42,7 @@ LEAST_SPEED = 0.01
 
 
 class Car:
-    """A vehicle; `minisim.state.VEHICLE` explains the values.
+    """A vehicle; `minisim.engine.state.VEHICLE` explains the values.
 
     Attributes:
         brake: how hard it was told to brake at least [m/s²]; 0 where it was not.

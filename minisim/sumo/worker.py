@@ -21,7 +21,6 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from minisim.collision import Collision
 from minisim.control import (
     Advise,
     Brake,
@@ -33,7 +32,8 @@ from minisim.control import (
     Open,
     Wake,
 )
-from minisim.state import NEVER, TRACE, Records, first_tick
+from minisim.engine.collision import Collision
+from minisim.engine.state import NEVER, TRACE, Records, first_tick
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, limits, steering_of
 

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import typer
 
 from minisim.errors import CollisionError, MinisimError
-from scenarios.cli.app import app
-from scenarios.cli.terminal import drop_output, prepare_streams
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import drop_output, prepare_streams
 from scenarios.termination import Terminated, terminable
 
 __all__ = ["COMMANDS", "app", "main"]

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from minisim.errors import number
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     Arrivals,
     Bearings,
     ControllerName,
@@ -23,8 +23,8 @@ from scenarios.cli.options import (
     Turns,
     build_scenario,
 )
-from scenarios.cli.simulate import simulate
-from scenarios.cli.terminal import bar
+from scenarios.cli.shared.simulate import simulate
+from scenarios.cli.shared.terminal import bar
 
 
 @app.command(
@@ -56,9 +56,9 @@ def animate(
     arrivals: Arrivals = None,
 ) -> None:  # fmt: skip
     """Write an animation: who waits, who has the right of way, who crosses."""
-    from figures.animate import frame_times, write_animation
-    from figures.encode import animation_format
-    from scenarios.cli.files import check_apart, check_file
+    from figures.film.animate import frame_times, write_animation
+    from figures.film.encode import animation_format
+    from scenarios.cli.shared.files import check_apart, check_file
     from scenarios.controllers import controller_named
     from scenarios.mixing import with_humans
     from scenarios.scenario import profile_named

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from minisim.errors import InputError, integer
-from scenarios.cli.app import app
-from scenarios.cli.terminal import bar
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import bar
 
 if TYPE_CHECKING:
     from scenarios.crossval import Case
@@ -128,7 +128,7 @@ def crossval(
 ) -> None:  # fmt: skip
     """Compare minisim, SUMO and the paper on common arrivals, trip by trip."""
     from minisim.sumo.host import sumo_home
-    from scenarios.cli.files import make_folder
+    from scenarios.cli.shared.files import make_folder
 
     wanted = Wanted(
         scenarios or [], controller or [], density or [], split or [], profile, seeds, horizon,

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     AsJson,
     Bearings,
     Order,
@@ -17,7 +17,7 @@ from scenarios.cli.options import (
     Side,
     build_scenario,
 )
-from scenarios.cli.terminal import show, show_json
+from scenarios.cli.shared.terminal import show, show_json
 
 
 @app.command(
@@ -49,7 +49,7 @@ def decide(
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, HarmonyMatrix, explain
-    from scenarios.cli.files import check_file
+    from scenarios.cli.shared.files import check_file
 
     if plot is not None:
         from figures.style import figure_format
@@ -61,7 +61,7 @@ def decide(
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     explanation = explain(movements, matrix, order)
     if plot is not None:
-        from figures.decision import decision_figure
+        from figures.junction.decision import decision_figure
         from figures.style import save
 
         save(decision_figure(explanation, site, Dim().start(site).plan), plot)
@@ -77,7 +77,7 @@ def decide(
             "reason": explanation.reason,
         })  # fmt: skip
         return
-    from scenarios.cli.report import decision_text
+    from scenarios.cli.shared.report import decision_text
 
     show(decision_text(explanation))
     if plot is not None:

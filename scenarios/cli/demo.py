@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from minisim.errors import integer
-from scenarios.cli.app import app
-from scenarios.cli.terminal import bar, show
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import bar, show
 
 
 @app.command(
@@ -38,7 +38,7 @@ def demo(
     ] = False,
 ) -> None:
     """The tour: DIM beside a fixed-time signal, in under a minute."""
-    from scenarios.cli.files import make_folder
+    from scenarios.cli.shared.files import make_folder
     from scenarios.demo import Tour, demo_table, demo_title, run_tour, write_tables
 
     runs = (2 if quick else 5) if seeds is None else integer("--seeds", seeds, low=2, high=1000)
@@ -49,7 +49,7 @@ def demo(
         film = tour.film()  # first, for it compiles the kernel once for all processes
     with bar("simulating") as progress:
         points = run_tour(tour, processes, progress)
-    from figures.animate import write_animation
+    from figures.film.animate import write_animation
     from figures.performance import performance_figure
     from figures.style import save
 

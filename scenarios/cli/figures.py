@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from minisim.errors import InputError
-from scenarios.cli.app import app
-from scenarios.cli.terminal import bar, show
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import bar, show
 
 
 @app.command(
@@ -48,8 +48,8 @@ def figures(
 ) -> None:  # fmt: skip
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
-    from scenarios.cli.files import make_folder
-    from scenarios.cli.report import gallery_table
+    from scenarios.cli.shared.files import make_folder
+    from scenarios.cli.shared.report import gallery_table
     from scenarios.studies.archive import MissingRunsError
     from scenarios.studies.reproduction import Plan, find_in
     from scenarios.sweep.store import Store

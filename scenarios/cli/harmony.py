@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from minisim.errors import InputError
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     AsJson,
     Bearings,
     ProfileName,
@@ -16,7 +16,7 @@ from scenarios.cli.options import (
     Side,
     build_scenario,
 )
-from scenarios.cli.terminal import show, show_json
+from scenarios.cli.shared.terminal import show, show_json
 
 
 @app.command(
@@ -59,7 +59,7 @@ def harmony(
     else:
         from rich.text import Text
 
-        from scenarios.cli.report import harmony_table
+        from scenarios.cli.shared.report import harmony_table
 
         title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
         show(title, harmony_table(matrix))

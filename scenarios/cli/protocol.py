@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from minisim.errors import InputError, choice
-from minisim.geometry import ARM_NAMES
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from minisim.junction.geometry import ARM_NAMES
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     AsJson,
     Bearings,
     Order,
@@ -19,10 +19,10 @@ from scenarios.cli.options import (
     Side,
     build_scenario,
 )
-from scenarios.cli.terminal import bar, show, show_json
+from scenarios.cli.shared.terminal import bar, show, show_json
 
 if TYPE_CHECKING:
-    from dim.modelcheck import Exploration
+    from dim.proofs.modelcheck import Exploration
     from scenarios.scenario import Scenario
 
 #: Beyond, there are too many states.
@@ -81,9 +81,9 @@ def protocol(
     Is it safe, can it get stuck, who can wait for ever?
     """
     from dim import HarmonyMatrix
-    from dim.modelcheck import explore, starvation
-    from dim.protocol import Protocol
-    from scenarios.cli.files import check_file
+    from dim.proofs.modelcheck import explore, starvation
+    from dim.proofs.protocol import Protocol
+    from scenarios.cli.shared.files import check_file
 
     if counterexample is not None:
         choice("suffix of --counterexample:", counterexample.suffix.lower(), [".csv"])
@@ -122,7 +122,7 @@ def protocol(
             },
         })  # fmt: skip
     else:
-        from scenarios.cli.proof import protocol_text
+        from scenarios.cli.shared.proof import protocol_text
 
         show(protocol_text(what.name, found, lassos))
         if written is not None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from minisim.errors import integer
-from scenarios.cli.app import app
-from scenarios.cli.terminal import bar
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import bar
 
 if TYPE_CHECKING:
     from scenarios.studies.reproduction import Made
@@ -63,7 +63,7 @@ def reproduce(
 ) -> None:  # fmt: skip
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.report import write_report
-    from scenarios.cli.files import make_folder
+    from scenarios.cli.shared.files import make_folder
     from scenarios.studies.reproduction import Plan, find_in
     from scenarios.studies.reproduction import reproduce as run_all
     from scenarios.sweep.store import Store

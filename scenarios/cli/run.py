@@ -10,8 +10,8 @@ import numpy as np
 import typer
 
 from minisim.errors import CollisionError, InputError, choice
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     Arrivals,
     AsJson,
     Bearings,
@@ -33,13 +33,13 @@ from scenarios.cli.options import (
     Turns,
     build_scenario,
 )
-from scenarios.cli.simulate import simulate, simulate_in_sumo
-from scenarios.cli.terminal import bar, show, show_json
+from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
+from scenarios.cli.shared.terminal import bar, show, show_json
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.run import Run
+    from minisim.results.run import Run
 
 HOSTS = ("minisim", "sumo")
 
@@ -111,9 +111,9 @@ def run(
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from dim import NoisyPerception
-    from minisim.recording import write_fcd, write_trajectories, write_trips
-    from minisim.safety import safety_summary
-    from scenarios.cli.files import check_apart, check_fcd, check_table
+    from minisim.results.safety import safety_summary
+    from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
+    from scenarios.cli.shared.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
     from scenarios.misreading import counted, with_perception
     from scenarios.mixing import driver_means, with_humans
@@ -167,7 +167,7 @@ def run(
     if as_json:
         show_json(summary)
         return
-    from scenarios.cli.report import run_table, run_title, safety_line, tally_line
+    from scenarios.cli.shared.report import run_table, run_title, safety_line, tally_line
 
     show(run_title(summary), run_table(summary), safety_line(summary), *tally_line(result.counts))
     for collision in result.collisions[:10]:
@@ -202,8 +202,8 @@ def _near_junction(run: Run) -> pd.DataFrame:
 
     A recording of everything then gives the same safety numbers.
     """
-    from minisim.recording import S, movement_index
-    from minisim.state import RECORD_BEFORE, RECORD_PAST
+    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
+    from minisim.results.trajectories import S, movement_index
 
     frame, paths = run.trajectories, run.site.intersection.paths
     if run.record == "junction":

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from minisim.errors import InputError, choice, integer, number
-from scenarios.cli.app import app
-from scenarios.cli.terminal import bar, show
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.terminal import bar, show
 from scenarios.termination import Terminated
 
 if TYPE_CHECKING:
@@ -106,9 +106,9 @@ def sweep(
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.arrivals import MAX_TIME
-    from minisim.recording import write_table
-    from scenarios.cli.files import check_apart, check_table
-    from scenarios.cli.report import sweep_notes, sweep_table
+    from minisim.results.trajectories import write_table
+    from scenarios.cli.shared.files import check_apart, check_table
+    from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.studies.cells import cells
     from scenarios.sweep.store import Store
 

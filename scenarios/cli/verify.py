@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.app import app
-from scenarios.cli.options import (
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import (
     AsJson,
     Bearings,
     Order,
@@ -18,7 +18,7 @@ from scenarios.cli.options import (
     Side,
     build_scenario,
 )
-from scenarios.cli.terminal import bar, show, show_json
+from scenarios.cli.shared.terminal import bar, show, show_json
 
 
 @app.command(
@@ -41,8 +41,8 @@ def verify(
 ) -> None:
     """Try every case that a junction can decide: the paper's claims, one by one."""
     from dim import HarmonyMatrix
-    from dim.verification import analyse, most_cliques
-    from scenarios.cli.files import check_file
+    from dim.proofs.verification import analyse, most_cliques
+    from scenarios.cli.shared.files import check_file
 
     if plot is not None:
         from figures.style import figure_format
@@ -85,7 +85,7 @@ def verify(
             ],
         })  # fmt: skip
     else:
-        from scenarios.cli.proof import analysis_text, claims_table
+        from scenarios.cli.shared.proof import analysis_text, claims_table
 
         show(claims_table(what.name, analysis), analysis_text(analysis))
         if plot is not None:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from minisim.errors import InputError
-from minisim.geometry import ARM_NAMES, Bools, Floats, Movement
-from minisim.recording import TIME, VEHICLE, S
-from minisim.trips import METRICS, Trips
+from minisim.junction.geometry import ARM_NAMES, Bools, Floats, Movement
+from minisim.results.trajectories import TIME, VEHICLE, S
+from minisim.results.trips import METRICS, Trips
 from scenarios.statistics import Interval, ks_distance, mean_interval
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Row(NamedTuple):
 
     Attributes:
         lane: "all" or a letter.
-        metric: one of `minisim.trips.METRICS`.
+        metric: one of `minisim.results.trips.METRICS`.
         trips: that ended, in minisim and in SUMO, over all seeds.
         minisim, sumo: the mean over seeds of each run's mean [s].
         difference: of the two means of a seed, mean over seeds [s].

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from minisim.errors import FileError
-from minisim.recording import replacing
-from minisim.trips import Trips
+from minisim.results.trajectories import replacing
+from minisim.results.trips import Trips
 from scenarios.crossval.cases import Case
 from scenarios.sweep.experiment import Experiment, key_of, results_version
 

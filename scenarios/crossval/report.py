@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from minisim.recording import replacing
+from minisim.results.trajectories import replacing
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
 from scenarios.crossval.comparison import APART, CLOSE, Divergence, Row

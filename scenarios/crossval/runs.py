@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 from minisim.arrivals import Arrivals
 from minisim.control import Site
 from minisim.errors import MinisimError
-from minisim.recording import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
+from minisim.results.trajectories import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
 from scenarios.crossval.cases import Case
 from scenarios.crossval.comparison import (
     Divergence,
@@ -26,13 +26,13 @@ from scenarios.crossval.comparison import (
 )
 from scenarios.crossval.outcome import Outcome, kept_file, read_outcome, write_outcome
 from scenarios.crossval.results import Failure, Film, Result
-from scenarios.pool import given, pooled, processes
 from scenarios.scenario import Scenario
+from scenarios.sweep.pool import given, pooled, processes
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.run import Run
+    from minisim.results.run import Run
 
 HOSTS: Final = ("minisim", "sumo")
 

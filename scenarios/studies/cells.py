@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.geometry import ARM_NAMES
-from minisim.trips import METRICS
+from minisim.junction.geometry import ARM_NAMES
+from minisim.results.trips import METRICS
 from scenarios.statistics import FILLING, growing, mean_interval, prediction_interval
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ CELL: Final = (
     "controller",
 )
 
-#: Both forms of every mean: over the trips that ended, and over all (`minisim.trips`).
+#: Both forms of every mean: over the trips that ended, and over all (`minisim.results.trips`).
 AVERAGED: Final = (*METRICS, *(f"complete_{metric}" for metric in METRICS))
 
 

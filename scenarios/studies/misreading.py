@@ -7,8 +7,8 @@ from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from dim import NoisyPerception
-from dim.intent import KINDS, RATES
-from dim.noise import CLASSIFIER, UNSIGNALLED
+from dim.senses.intent import KINDS, RATES
+from dim.senses.noise import CLASSIFIER, UNSIGNALLED
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
 from scenarios.misreading import counted, with_perception

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from minisim.errors import choice
-from scenarios.pool import workers
 from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import CASES, Search, capacities
 from scenarios.studies.results import Effort, Find
 from scenarios.studies.study import STUDIES
 from scenarios.sweep.experiment import Experiment, Row
+from scenarios.sweep.pool import workers
 from scenarios.sweep.runner import finished
 from scenarios.sweep.store import Store
 

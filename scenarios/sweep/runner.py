@@ -11,8 +11,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, instance, integer
-from scenarios.pool import given, handed, pooled
 from scenarios.sweep.experiment import Experiment, Row, failed, run_experiment
+from scenarios.sweep.pool import given, handed, pooled
 from scenarios.sweep.store import Store
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from scenarios import four_way
 from scenarios.controllers import controller_named
-from scenarios.pool import workers
 from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.pool import workers
 from scenarios.sweep.store import Store
 
 #: Enough work that the start of the processes (a second or two) does not decide.

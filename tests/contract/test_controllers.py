@@ -32,7 +32,7 @@ from minisim.control import (
     Wake,
 )
 from minisim.errors import InputError
-from minisim.run import Run
+from minisim.results.run import Run
 from minisim.testing import (
     ContractError,
     SmallScenario,
@@ -41,7 +41,7 @@ from minisim.testing import (
     drained,
     small_scenario,
 )
-from tests.runs import as_run
+from tests.builders import as_run
 
 #: Every controller there is, with its variants. A new one is added here.
 CONTROLLERS: tuple[Controller, ...] = (

@@ -23,10 +23,10 @@ from scenarios.sweep import Experiment, sweep
 from scenarios.sweep.cluster import cluster
 from scenarios.sweep.experiment import MEASURED
 from scenarios.sweep.store import Store
+from tests import ROOT
 
 pytest.importorskip("distributed", reason="needs the extra `dask`")
 
-ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.dask
 
 Processes = list[subprocess.Popen[bytes]]

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 import minisim
 from baselines import Actuated, Adaptive, AllWayStop, LongestQueue
 from minisim.control import Controller
-from minisim.safety import encroachments
+from minisim.results.safety import encroachments
 from scenarios.scenario import Scenario
 from scenarios.strategies import emptying, floats
-from tests.examples import share
+from tests.builders import share
 
 
 @st.composite

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import minisim
 from baselines import FixedTime
-from minisim.safety import encroachments
+from minisim.results.safety import encroachments
 from scenarios.scenario import Scenario
 from scenarios.strategies import emptying, floats
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 import minisim
 from baselines import V2IC, Reservation
-from baselines.zones import conflict_zones
 from minisim.control import CLEARANCE, Controller, Site
-from minisim.geometry import Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.zones import conflict_zones
 from minisim.vehicle import VehicleType
 from scenarios.scenario import FAIR, Profile, Scenario
 from scenarios.strategies import demands, floats, intersections, vehicles
-from tests.examples import share
+from tests.builders import share
 
 #: Demand for a minute, then time for any rule to serve it [s].
 DEMAND_TIME, HORIZON = 60.0, 3600.0

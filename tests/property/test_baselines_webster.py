@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.fixed_time import FixedTime
-from baselines.signals import Colour, Phase, Program
-from baselines.webster import MIN_GREEN, webster, webster_delay
+from baselines.signals.fixed_time import FixedTime
+from baselines.signals.heads import Colour, Phase, Program
+from baselines.signals.webster import MIN_GREEN, webster, webster_delay
 from minisim.errors import MinisimError
 from scenarios.strategies import floats
 

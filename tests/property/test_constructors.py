@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 import scenarios
 from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue, webster, webster_delay
-from baselines.signals import Phase, Program
+from baselines.signals.heads import Phase, Program
 from dim import Dim, ExactPerception, HarmonyMatrix, NoisyPerception, Zones, decide, explain
 from minisim import simulate
 from minisim.arrivals import Arrivals, Demand, read_arrivals
 from minisim.control import Marking, Plan, Site, Unregulated
 from minisim.errors import MinisimError
-from minisim.geometry import Intersection
+from minisim.junction.geometry import Intersection
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named

@@ -16,7 +16,7 @@ from dim.decision import ORDERS
 from dim.perception import COMMITS, Reader
 from minisim.control import Go, Hold, Observed, Site, View, can_stop
 from scenarios import Scenario, five_way, four_way, three_way
-from tests.runs import digest
+from tests.builders import digest
 
 SITES = {n: maker().site() for n, maker in [(3, three_way), (4, four_way), (5, five_way)]}
 LENGTH = 4.0

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dim import HarmonyMatrix
-from minisim.geometry import Intersection, Movement
+from minisim.junction.geometry import Intersection, Movement
 from minisim.vehicle import VehicleType
 from scenarios.strategies import intersections, vehicles
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from minisim.control import Site
 from minisim.errors import InputError
-from minisim.geometry import MIN_PATH_RADIUS, Intersection, Movement
+from minisim.junction.geometry import MIN_PATH_RADIUS, Intersection, Movement
 from minisim.vehicle import VehicleType
 from scenarios.strategies import bearings, floats, intersections, vehicles
-from tests.examples import share
+from tests.builders import share
 
 
 def fits(intersection: Intersection, vehicle: VehicleType) -> bool:

@@ -23,14 +23,14 @@ from hypothesis.stateful import (
 
 from dim import Dim
 from dim.agent import GATES
-from dim.conformance import Checked
 from dim.decision import ORDERS
 from dim.perception import See
+from dim.proofs.conformance import Checked
 from minisim.control import Brake, Command, Controller, Observed, Site, View, can_stop
 from minisim.errors import CollisionError
 from minisim.simulation import Simulation
 from scenarios import Scenario, regular
-from tests.runs import replayed
+from tests.builders import replayed
 
 #: Short roads: from insertion to the yellow zone it takes a few seconds.
 ARM_LENGTH = 80.0

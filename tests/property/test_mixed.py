@@ -14,12 +14,11 @@ import minisim
 from dim import Dim, Humans, Mixed
 from dim.agent import GATES
 from dim.decision import ORDERS
-from dim.humans import Drivers
+from dim.humans.drivers import Drivers
 from scenarios import four_way
 from scenarios.scenario import FAIR, PAPER, Scenario
 from scenarios.strategies import demands, intersections
-from tests.examples import share
-from tests.runs import replayed
+from tests.builders import replayed, share
 
 SHARES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
 #: What may be believed without believing in silence, which is unsafe.

@@ -11,7 +11,7 @@ import minisim
 from dim import Dim, Monitor
 from scenarios import Scenario
 from scenarios.strategies import scenarios
-from tests.runs import digest
+from tests.builders import digest
 
 seeds = st.integers(0, 2**32 - 1)
 

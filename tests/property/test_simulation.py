@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 import minisim
 from baselines import FixedTime
 from dim import Dim
-from minisim.collision import touching
 from minisim.control import Controller, Plan, Unregulated
-from minisim.run import Run
+from minisim.engine.collision import touching
+from minisim.results.run import Run
 from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
 from scenarios.strategies import scenarios, vehicles
-from tests.runs import Fixed, digest, drained, replayed
+from tests.builders import Fixed, digest, drained, replayed
 
 #: Time to serve the arrivals of two minutes; far more than any fair share of the junction needs.
 PATIENCE = 3000.0

@@ -11,7 +11,7 @@ from minisim import simulate
 from minisim.control import Controller
 from scenarios import Scenario
 from scenarios.strategies import controllers, scenarios
-from tests.examples import share
+from tests.builders import share
 
 
 @share(0.5)

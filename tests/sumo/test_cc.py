@@ -24,7 +24,7 @@ from scenarios.cli import main
 from scenarios.library import MAKERS
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.scenario import AS_RUN, FAIR, Scenario
-from tests.runs import Fixed, as_run, replayed
+from tests.builders import Fixed, as_run, replayed
 
 AS_RUN_FOUR = four_way(profile="as_run")
 

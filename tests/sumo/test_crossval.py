@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from minisim.trips import METRICS
+from minisim.results.trips import METRICS
 from scenarios.cli import main
 
 

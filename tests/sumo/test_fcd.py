@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from dim import Dim
-from minisim.recording import write_fcd
+from minisim.results.trajectories import write_fcd
 from minisim.sumo import host, simulate
 from scenarios import four_way
 from scenarios.cli import main

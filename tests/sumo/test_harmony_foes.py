@@ -25,7 +25,7 @@ from hypothesis import given, settings
 
 from dim import HarmonyMatrix
 from minisim.control import CLEARANCE
-from minisim.geometry import ARM_NAMES, Intersection, Movement
+from minisim.junction.geometry import ARM_NAMES, Intersection, Movement
 from minisim.sumo import host, network
 from minisim.vehicle import VehicleType
 from scenarios.strategies import intersections

@@ -23,7 +23,7 @@ from hypothesis import given
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim, Mixed, NoisyPerception
-from dim.tally import Tallied
+from dim.senses.tally import Tallied
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -47,8 +47,8 @@ from minisim.errors import (
     InputError,
     SumoError,
 )
-from minisim.geometry import Intersection
-from minisim.run import Run
+from minisim.junction.geometry import Intersection
+from minisim.results.run import Run
 from minisim.sumo import host, network, simulate
 from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType
@@ -56,10 +56,9 @@ from scenarios import four_way
 from scenarios.cli import main
 from scenarios.scenario import FAIR, Scenario
 from scenarios.strategies import intersections
-from tests.examples import share
-from tests.runs import Fixed, replayed
+from tests import ROOT
+from tests.builders import Fixed, replayed, share
 
-ROOT = Path(__file__).parents[2]
 FAIR_FOUR = four_way(100, profile="fair")
 
 

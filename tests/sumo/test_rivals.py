@@ -27,12 +27,12 @@ import pytest
 import minisim
 from baselines import Actuated, Adaptive, AllWayStop, FixedTime, all_way_stop
 from minisim.control import Controller, Site
-from minisim.geometry import ARM_NAMES, Floats
+from minisim.junction.geometry import ARM_NAMES, Floats
 from minisim.sumo.host import sumo_home
 from minisim.sumo.network import run_tool, tag, write_xml
 from scenarios import four_way
 from scenarios.scenario import Scenario
-from tests.runs import replayed
+from tests.builders import replayed
 
 OURS: dict[str, Controller] = {
     "fixed-time": FixedTime(),

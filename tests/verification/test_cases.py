@@ -8,7 +8,7 @@ import networkx as nx
 import pytest
 
 from dim import DecisionTable, HarmonyMatrix, explain
-from dim.verification import (
+from dim.proofs.verification import (
     Analysis,
     Case,
     analyse,
@@ -18,7 +18,7 @@ from dim.verification import (
     preferred,
 )
 from minisim.errors import InputError
-from minisim.geometry import Movement
+from minisim.junction.geometry import Movement
 from scenarios import regular
 
 #: Cases by arms: n^n − 1 (the paper's 255 for 4).
@@ -159,7 +159,7 @@ def test_a_wrong_table_is_found(claim: str) -> None:
 
 def test_answers_that_depend_on_the_order_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper's own way, networkx and the first of the largest: it is not unanimous."""
-    monkeypatch.setattr("dim.verification.choose", lambda cliques, *_: max(cliques, key=len))
+    monkeypatch.setattr("dim.proofs.verification.choose", lambda cliques, *_: max(cliques, key=len))
     analysis = analyse(HarmonyMatrix.paper(4))
     assert [claim.name for claim in analysis.claims if not claim.holds] == ["order"]
 

@@ -13,17 +13,26 @@ from hypothesis import strategies as st
 import minisim
 from dim import DecisionTable, Dim, HarmonyMatrix
 from dim.agent import GATES, Agent, Rules
-from dim.conformance import Checked, ConformanceError
 from dim.decision import ORDERS
-from dim.modelcheck import Lasso, explore, is_stuck, starvation
 from dim.perception import COMMITS, Percept
-from dim.protocol import COMMITTED, PRIORITIES, ROLLING, WAITING, Event, Front, Protocol, State
+from dim.proofs.conformance import Checked, ConformanceError
+from dim.proofs.modelcheck import Lasso, explore, is_stuck, starvation
+from dim.proofs.protocol import (
+    COMMITTED,
+    PRIORITIES,
+    ROLLING,
+    WAITING,
+    Event,
+    Front,
+    Protocol,
+    State,
+)
 from minisim.control import Go, Hold, Site, View
 from minisim.errors import InputError
 from scenarios import Scenario, four_way, three_way
 from scenarios.counterexample import colliding_arrivals
 from scenarios.strategies import scenarios
-from tests.runs import digest, drained
+from tests.builders import digest, drained
 
 
 @cache

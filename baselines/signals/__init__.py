@@ -1,0 +1,1 @@
+"""Traffic signals: fixed-time, adaptive, actuated and longest-queue."""

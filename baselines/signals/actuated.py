@@ -1,0 +1,126 @@
+"""The actuated signal: a green lasts until a gap in the traffic over a detector.
+
+The rule of SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
+has one successor; all constants are its defaults.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from baselines.signals.heads import full_order, lane_order
+from baselines.signals.phases import PhaseSession, Verdict, check_greens, following
+from minisim.control import Site, View
+from minisim.errors import instance, number
+
+#: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
+PLACE = 7.5
+#: Room for rounding where a mark is passed [m], and where an end is a whole second [s].
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Actuated:
+    """A signal that prolongs a green while vehicles follow each other closely enough.
+
+    One phase an approach, in a fixed order; none is left out. Each lane has a loop before the
+    junction. While the last vehicle left it less than `max_gap` ago, the green goes on: for what
+    is left of `detector_gap`, in which that vehicle reaches the line, up to a whole second of the
+    phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
+    beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
+
+    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
+    its way.
+
+    Attributes:
+        max_gap: between two vehicles [s]; a longer one ends the green.
+        detector_gap: from the loop to the line at the speed limit [s]; the loop is nearer where
+            those between it and the line could not all leave within `min_green`.
+        passing_time: of a waiting vehicle over the line [s].
+        min_green: [s]; the authors' network (`minDur`).
+        max_green: [s]; the authors' network (`maxDur`).
+        amber: [s]; the authors' network.
+        order: the lanes in the order of their greens; None is a, b, c…
+        name: short name.
+    """
+
+    max_gap: float = 3.0
+    detector_gap: float = 2.0
+    passing_time: float = 1.9
+    min_green: float = 3.0
+    max_green: float = 50.0
+    amber: float = 2.0
+    order: tuple[int, ...] | None = None
+    name: str = "actuated"
+
+    def __post_init__(self) -> None:
+        number("max_gap [s]", self.max_gap, low=0, high=3600)
+        number("detector_gap [s]", self.detector_gap, above=0, high=3600)
+        number("passing_time [s]", self.passing_time, low=0.1, high=60)
+        check_greens(self.min_green, self.max_green)
+        number("amber [s]", self.amber, low=0, high=60)
+        object.__setattr__(self, "order", lane_order(self.order))
+        instance("name", self.name, str)
+
+    def detector(self, site: Site) -> float:
+        """How far the loops are before the junction entry [m]."""
+        waiting = (self.min_green / self.passing_time + 0.5) * PLACE
+        return min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
+
+    def start(self, site: Site) -> PhaseSession:
+        """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
+        rule = GapRule(self, site)
+        return PhaseSession(
+            site,
+            rule,
+            detector_range=rule.detector,
+            marks=(rule.detector - site.vehicle.length,),
+            min_green=self.min_green,
+            amber=self.amber,
+            first=rule.order[0],
+        )
+
+
+class GapRule:
+    """When the last vehicle left a lane's loop, and whether that was too long ago.
+
+    Attributes:
+        detector: how far the loops are before the junction entry [m].
+        order: the lanes in the order of their greens.
+    """
+
+    def __init__(self, signal: Actuated, site: Site) -> None:
+        self._signal = signal
+        self._dt = site.dt
+        self.detector = signal.detector(site)
+        self.order = full_order(signal.order, site.intersection.n)
+        self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
+        self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
+
+    def see(self, view: View) -> None:
+        """Note who has left a loop since the last view; each mark is passed within one step."""
+        free = self.detector + ROUNDING
+        passed = [v for v in view.vehicles if v.distance + v.length <= free]
+        for v in passed:
+            if v.id not in self._passed:
+                self._left[v.lane] = view.time
+        self._passed = {v.id for v in passed}
+
+    def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
+        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        signal, gap = self._signal, self._gap(view, lane)
+        if elapsed >= signal.max_green or gap >= signal.max_gap:
+            return Verdict(following(self.order, lane), 0.0)
+        more = max(signal.min_green - elapsed, signal.detector_gap - gap, self._dt)
+        end = math.ceil(elapsed + more - ROUNDING)
+        return Verdict(lane, min(end, signal.max_green) - elapsed)
+
+    def _gap(self, view: View, lane: int) -> float:
+        """Time since the lane's loop has been free [s]."""
+        if any(
+            v.lane == lane and v.distance <= self.detector and v.id not in self._passed
+            for v in view.vehicles
+        ):
+            return 0.0
+        return view.time - self._left[lane]

@@ -1,0 +1,235 @@
+"""V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
+
+`baselines.v2ic` is the controller as it is meant. This module holds what the comparison in the
+paper ran instead, quirk by quirk, and nothing else knows of them:
+
+1. *another junction's constants*: the reference point stays 400 m after insertion although the
+   junction begins at 488.7 m; so the "stop line" is 108.7 m before the junction, and vehicles
+   leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
+2. *right-hand conflicts*: the conflicts are those of right-hand traffic, the network is
+   left-hand: of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
+3. *no stop line*: vehicles never stop for one; they are advised speeds, and whoever cannot keep
+   out of the way drives on;
+4. *free for a moment is free*: at its release a vehicle is expected to leave after (v_des − v)/a,
+   though the speed is cut to 20 m/s: 1.3 s instead of 11 s, for one step, in the visit of those
+   behind it in the list;
+5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
+   so vehicles leave at 20 m/s;
+6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
+   advice of 0 stops a vehicle at once.
+
+Vehicles drive the loop of the authors' driver every 0.01 s; what it sets, takes effect in the
+next step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import shapely
+
+from baselines.v2ic import CRAWL
+from minisim.control import Advise, Command, Plan, Site, View, Wake
+from minisim.errors import InputError, instance, number
+from minisim.junction.geometry import Intersection
+
+REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
+RANGE = 200.0  #: how far before it vehicles register [m]
+REGISTRATION = 100.0  #: length of the stretch on which they do [m]
+STOP_LINE = 20.0  #: of the "stop line" before the reference, and of what is cleared behind it [m]
+PLATOON = 4.0  #: length of a platoon of one vehicle [m]
+ACCELERATION = 2.6  #: of the release formula [m/s²]
+TOP_SPEED = 20.0  #: advice is cut to this [m/s]
+NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks nobody [s]
+
+#: Distance driven at which a vehicle leaves the list [m].
+LEFT = REFERENCE + PLATOON + STOP_LINE
+
+#: Distances driven between which a vehicle registers [m].
+FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
+
+#: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
+INSERTION = 0.1
+
+#: Room for rounding where a mark and a distance are compared [m].
+ROUNDING = 1e-9
+
+#: Far from the centre enough that opposite far turns do not meet, as on the junction of several
+#: lanes that the conflicts were written for [m].
+WIDE = 20.0
+
+
+@dataclass(frozen=True)
+class V2ICAsRun:
+    """V2I-C as the authors of the paper ran it, for 4 arms; it may collide.
+
+    Attributes:
+        approach_speed: desired from insertion to the first advice [m/s]: 16.6 in the balanced
+            runs, 14 (the vehicle's own) in the others.
+
+    Raises:
+        InputError: no such speed.
+    """
+
+    approach_speed: float = 16.6
+
+    def __post_init__(self) -> None:
+        number("approach_speed [m/s]", self.approach_speed, above=0, high=100)
+
+    @property
+    def name(self) -> str:
+        """`v2ic-as-run`, and the approach speed where it is not that of the balanced runs."""
+        speed = "" if self.approach_speed == 16.6 else f"-{self.approach_speed:g}"
+        return f"v2ic-as-run{speed}"
+
+    def start(self, site: Site) -> V2ICAsRunSession:
+        """Begin a run; raises `InputError` where the rules do not fit the site."""
+        return V2ICAsRunSession(self, site)
+
+
+@lru_cache
+def right_hand_conflicts() -> tuple[frozenset[int], ...]:
+    """Of each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
+
+    Movements are numbered as `Intersection.movements` does. Only centre lines count.
+    """
+    junction = Intersection((0.0, 90.0, 180.0, 270.0), side="right", junction_radius=WIDE)
+    ways = [shapely.LineString(path.points) for path in junction.paths]
+    return tuple(
+        frozenset(
+            q
+            for q, other in enumerate(junction.movements)
+            if other.origin != movement.origin and ways[p].intersects(ways[q])
+        )
+        for p, movement in enumerate(junction.movements)
+    )
+
+
+class Platoon(NamedTuple):
+    """What the rules know of one vehicle at one moment.
+
+    Attributes:
+        movement: index of its movement.
+        driven: distance since insertion [m].
+        speed: [m/s].
+        order: sorts those who register in the same step, as the authors' driver spawned them.
+    """
+
+    movement: int
+    driven: float
+    speed: float
+    order: tuple[float, ...] = ()
+
+
+class AsRunList:
+    """The authors' loop body: the serving list, and the desired speeds that follow from it.
+
+    Attributes:
+        order: ids in the serving list, in order of registration.
+        granted: ids of those that were released ("priority 0").
+    """
+
+    def __init__(self) -> None:
+        self.order: list[int] = []
+        self.granted: set[int] = set()
+        self._conflicts = right_hand_conflicts()
+
+    def step(self, platoons: dict[int, Platoon]) -> dict[int, float]:
+        """Update the list from what is on the road; the desired speeds that are set now [m/s]."""
+        self._register(platoons)
+        speeds: dict[int, float] = {}
+        leaving: list[tuple[int, float]] = []  # movement and leaving time of those ahead
+        for vehicle in self.order:
+            movement, driven, speed, _ = platoons[vehicle]
+            if vehicle in self.granted:
+                leaving.append((movement, (LEFT - driven) / (speed + CRAWL)))
+                continue
+            foes = self._conflicts[movement]
+            blocked = max([time for q, time in leaving if q in foes], default=0.0)
+            if blocked > NEVER_BLOCKED:
+                crawling, to_line = speed + CRAWL, REFERENCE - STOP_LINE - driven
+                speeds[vehicle] = min(max(2.0 * to_line / blocked - crawling, 0.0), TOP_SPEED)
+                time = (to_line + PLATOON + 2.0 * STOP_LINE) / crawling
+            else:
+                self.granted.add(vehicle)
+                reached = math.sqrt(speed**2 + 2.0 * ACCELERATION * (LEFT - driven))
+                speeds[vehicle] = min(reached, TOP_SPEED)
+                time = (speeds[vehicle] - speed) / ACCELERATION
+            leaving.append((movement, time))
+        return speeds
+
+    def _register(self, platoons: dict[int, Platoon]) -> None:
+        """Append who has come, remove who has left; in most steps it is neither."""
+        if any(v not in platoons or platoons[v].driven >= LEFT for v in self.order):
+            self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
+            self.granted.intersection_update(self.order)
+        if len(self.order) < len(platoons):
+            new = [
+                (platoon.order, vehicle)
+                for vehicle, platoon in platoons.items()
+                if FIRST <= platoon.driven < LAST and vehicle not in self.order
+            ]
+            self.order += [vehicle for _, vehicle in sorted(new)]
+
+
+class V2ICAsRunSession:
+    """One run: reads the host's views, tells what changes.
+
+    Attributes:
+        rules: the authors' loop body.
+        plan: what the host has to provide: a wake-up at insertion, where vehicles register, and
+            where they leave the list; in between every step is asked for while anybody waits.
+    """
+
+    def __init__(self, controller: V2ICAsRun, site: Site) -> None:
+        instance("site", site, Site)
+        junction = site.intersection
+        if junction.n != 4:
+            raise InputError(f"the as-run V2I-C is for 4 arms, the intersection has {junction.n}")
+        self._origin = junction.approach_length - site.vehicle.length - INSERTION
+        if self._origin < LEFT:
+            raise InputError(
+                f"the as-run V2I-C ends {LEFT:g} m after insertion, the approach lanes leave "
+                f"{self._origin:.4g} m"
+            )
+        insertion = self._origin + INSERTION
+        self.rules = AsRunList()
+        self.plan = Plan(
+            marks=(insertion, self._origin - REFERENCE + RANGE, self._origin - LEFT),
+            sight=insertion,
+            lanes_open=True,
+        )
+        self._dt = site.dt
+        self._approach_speed = controller.approach_speed
+        self._desired: dict[int, float] = {}
+
+    def decide(self, view: View) -> Iterable[Command]:
+        """One round of the rules; another one in the next step while anybody waits."""
+        rules, desired = self.rules, self._desired
+        speeds = {v.id: self._approach_speed for v in view.vehicles if v.id not in desired}
+        speeds.update(rules.step(self._platoons(view)))
+        commands: list[Command] = [
+            Advise(vehicle, speed)
+            for vehicle, speed in speeds.items()
+            if desired.get(vehicle) != speed
+        ]
+        desired.update(speeds)
+        if len(desired) > len(view.vehicles):
+            self._desired = {v.id: desired[v.id] for v in view.vehicles}
+        if len(rules.granted) < len(rules.order):
+            commands.append(Wake(view.time + self._dt))
+        return commands
+
+    def _platoons(self, view: View) -> dict[int, Platoon]:
+        """Who may be in the list: the others do not count, and they are most of the view."""
+        platoons = {}
+        for vehicle, lane, manoeuvre, distance, speed, _, demand_time in view.vehicles:
+            driven = self._origin - distance + ROUNDING
+            if FIRST <= driven < LEFT:
+                order = (math.floor(demand_time + ROUNDING), lane, vehicle)
+                platoons[vehicle] = Platoon(lane * 3 + manoeuvre - 1, driven, speed, order)
+        return platoons

@@ -1,0 +1,1 @@
+"""Human drivers among vehicles of DIM."""

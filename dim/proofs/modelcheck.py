@@ -1,0 +1,247 @@
+"""Whether the protocol is safe and live: all its states, visited one by one.
+
+Safe: no two movements in conflict are inside at once. Live: whenever somebody is there, somebody
+can go on once all have looked; and as every move but slowing down takes a vehicle on, the junction
+empties when nobody new comes. Fair: nobody waits for ever while others come and cross.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import networkx as nx
+
+from dim.proofs.protocol import TURN, WAITING, Event, Protocol, State
+from minisim.errors import InputError, instance, integer
+
+#: Visit no more states than this: some gigabyte of memory.
+MAX_STATES = 3_000_000
+
+Path = tuple[Event, ...]
+
+#: States, and what happens in each.
+Steps = tuple[tuple[State, Event], ...]
+
+#: Where each state was first reached from, and by what; nearest first.
+Reached = dict[State, tuple[State, Event] | None]
+
+#: Called with the number of states visited.
+Visited = Callable[[int], object]
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """What a search through the states found.
+
+    Attributes:
+        protocol: what was searched.
+        states, transitions: how many were visited.
+        complete: whether that were all; a search ends with the nearest unsafe states.
+        unsafe: the shortest paths to two conflicting movements inside, one for each such state.
+        stuck: the shortest path to a state in which nobody can go on, or None.
+    """
+
+    protocol: Protocol
+    states: int
+    transitions: int
+    complete: bool
+    unsafe: tuple[Path, ...]
+    stuck: Path | None
+
+
+@dataclass(frozen=True)
+class Lasso:
+    """How one vehicle waits for ever: what leads there, and what then repeats.
+
+    Everybody looks after each event. Nobody dawdles: whoever can go on does at some time.
+
+    Attributes:
+        lane: of the vehicle that waits.
+        stem: what happens before.
+        cycle: what happens again and again.
+    """
+
+    lane: int
+    stem: Path
+    cycle: Path
+
+
+def explore(
+    protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
+) -> Exploration:
+    """Visit every reachable state, nearest first, or stop behind the nearest unsafe ones.
+
+    Raises:
+        InputError: there are more than `max_states`.
+    """
+    instance("protocol", protocol, Protocol)
+    integer("max_states", max_states, low=1)
+    reached: Reached = {protocol.start: None}
+    queue = deque([protocol.start])
+    transitions = 0
+    unsafe: list[Path] = []
+    stuck = None
+    while queue:
+        state = queue.popleft()
+        if unsafe and len(_path(reached, state)) == len(unsafe[0]):
+            break
+        if stuck is None and is_stuck(protocol, state):
+            stuck = _path(reached, state)
+        for event, after in protocol.successors(state):
+            transitions += 1
+            if after in reached:
+                continue
+            reached[after] = state, event
+            queue.append(after)
+            if event.what == "enter" and protocol.conflict(after):
+                unsafe.append(_path(reached, after))
+        if len(reached) > max_states:
+            raise InputError(f"more than {max_states} states: too many to visit them all")
+        if progress is not None and transitions % 1024 < 8:
+            progress(len(reached))
+    return Exploration(protocol, len(reached), transitions, not unsafe, tuple(unsafe), stuck)
+
+
+def is_stuck(protocol: Protocol, state: State) -> bool:
+    """Whether somebody is there and, after all have looked, nobody can go on."""
+    if not state.inside and not any(state.fronts):
+        return False
+    return next(protocol.moves(protocol.look(state)), None) is None
+
+
+def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
+    """Of each lane, the shortest way in which its front vehicle waits for ever; None: it cannot.
+
+    None is a proof over all states. It takes for granted that everybody looks between two events,
+    that whoever can go on does some day, and that a turn of the rotating priority lasts long
+    enough for a decision.
+    """
+    instance("protocol", protocol, Protocol)
+    reached = _reached(protocol)
+    return tuple(_starving(protocol, reached, lane) for lane in range(protocol.matrix.n))
+
+
+def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
+    graph: nx.DiGraph[State] = nx.DiGraph()
+    for state in reached:
+        if _waits(state, lane):
+            for event, after in prompt(protocol, state):
+                if _waits(after, lane):
+                    graph.add_edge(state, after, event=event)
+    for part in list(nx.strongly_connected_components(graph)):
+        if not is_fair(protocol, _steps(graph, part)):
+            graph.remove_nodes_from(part)
+    return _shortest(protocol, graph, reached, lane) if graph else None
+
+
+def prompt(protocol: Protocol, state: State) -> Iterator[tuple[Event, State]]:
+    """What can happen next where everybody looks at once after each event, and nobody slows down
+    again: the fairest circumstances."""
+    for event, after in protocol.successors(state):
+        if event.what not in ("look", "slow"):
+            yield event, protocol.look(after)
+
+
+def _waits(state: State, lane: int) -> bool:
+    front = state.fronts[lane]
+    return front is not None and front.phase == WAITING and not front.goes
+
+
+def _reached(protocol: Protocol) -> Reached:
+    """All states of `prompt`, nearest first, each with where it was first reached from."""
+    reached: Reached = {protocol.start: None}
+    queue = deque([protocol.start])
+    while queue:
+        state = queue.popleft()
+        for event, after in prompt(protocol, state):
+            if after not in reached:
+                reached[after] = state, event
+                queue.append(after)
+    return reached
+
+
+def _shortest(
+    protocol: Protocol,
+    graph: nx.DiGraph[State],
+    reached: Reached,
+    lane: int,
+) -> Lasso:
+    """The fair lasso with the fewest events; `graph` is known to hold a fair cycle."""
+    distance: dict[State, int] = {}
+    for state, came_from in reached.items():
+        distance[state] = 0 if came_from is None else distance[came_from[0]] + 1
+    starts = [state for state in reached if state in graph]
+    total = distance[starts[0]] + 1
+    while True:
+        total += 1
+        for start in starts:
+            if distance[start] + 2 > total:
+                break
+            for cycle in _cycles(graph, start, total - distance[start]):
+                if is_fair(protocol, cycle):
+                    events = tuple(event for _, event in cycle)
+                    return Lasso(lane, _path(reached, start), events)
+
+
+def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Steps]:
+    """Closed walks of so many steps from `start`."""
+    trail: list[tuple[State, Event]] = []
+
+    def walk(state: State, left: int) -> Iterator[Steps]:
+        for after, data in graph[state].items():
+            if left > 1 or after == start:
+                trail.append((state, data["event"]))
+                if left == 1:
+                    yield tuple(trail)
+                else:
+                    yield from walk(after, left - 1)
+                trail.pop()
+
+    return walk(start, length)
+
+
+def is_fair(protocol: Protocol, steps: Steps) -> bool:
+    """Whether what is done in `steps`, for ever, is something, and leaves nobody out.
+
+    Somebody enters; whoever could go on all the time does; whoever is inside all the time leaves
+    (or others follow on the same movement); a turn that could end all the time ends.
+
+    Args:
+        protocol: the rules.
+        steps: states, and what happens in each.
+    """
+    events = {event for _, event in steps}
+    states = [state for state, _ in steps]
+    if not any(event.what == "enter" for event in events):
+        return False
+    if protocol.priorities == "rotating" and TURN not in events and all(s.decided for s in states):
+        return False
+    moving = {event.lane for event in events if event.what in ("roll", "commit", "enter")}
+    passing = {event[1:] for event in events if event.what in ("enter", "leave")}
+    able = set(range(protocol.matrix.n))
+    inside = -1
+    for state in states:
+        inside &= state.inside
+        able &= {lane for lane, f in enumerate(state.fronts) if f and (f.goes or f.phase)}
+    staying = {tuple(m) for k, m in enumerate(protocol.matrix.movements) if inside >> k & 1}
+    return able <= moving and staying <= passing
+
+
+def _steps(graph: nx.DiGraph[State], part: set[State]) -> Steps:
+    """All that is done without leaving `part`."""
+    return tuple(
+        (state, data["event"])
+        for state in part
+        for after, data in graph[state].items()
+        if after in part
+    )
+
+
+def _path(reached: Reached, state: State) -> Path:
+    events: list[Event] = []
+    while (came_from := reached[state]) is not None:
+        state, event = came_from
+        events.append(event)
+    return tuple(reversed(events))

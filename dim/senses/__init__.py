@@ -1,0 +1,1 @@
+"""What vehicles misperceive, and what that does to a run."""

@@ -1,0 +1,172 @@
+"""How a vehicle's intent is shown, how others read it, and how sure they are.
+
+A driver may turn without a signal: then nobody can know better. A shown intent may be misread: that
+happens to each reader, or to all alike. Both are tables of probabilities, true manoeuvre × read
+manoeuvre, and what a reading is worth follows from them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from minisim.control import Site
+from minisim.streams import Draws
+
+#: How a shown intent is misread. "missed": a turn's signal is not seen, so the turn is taken for
+#: straight on, and straight on is always read right. "symmetric": any manoeuvre is taken for each
+#: other one alike, as classifiers of manoeuvres err.
+KINDS = ("missed", "symmetric")
+
+#: Probabilities of an error that are worth comparing: from none to that of drivers who do not
+#: signal; published classifiers of manoeuvres err with about 0.15, see
+#: `dim.senses.noise.CLASSIFIER`.
+RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
+
+#: Two ways whose bearings are this close to each other are equally straight [degrees].
+SAME_ANGLE = 1e-6
+
+#: What a draw is for.
+_SIGNAL, _READ, _SURE, _MISTAKEN = range(4)
+
+Table = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Intents of one approach lane.
+
+    Attributes:
+        straight: the manoeuvre that needs no signal.
+        silent: for each manoeuvre, the probability that it is driven without a signal.
+        error: probability that a shown intent is misread.
+        kind: how, see `KINDS`.
+        doubt: for each manoeuvre, the share of its readings that are wrong where all manoeuvres
+            are driven alike.
+    """
+
+    straight: int
+    silent: tuple[float, ...]
+    error: float
+    kind: str
+    doubt: tuple[float, ...]
+
+    @classmethod
+    def of(
+        cls, site: Site, lane: int, error: float, kind: str, unsignalled: tuple[float, float]
+    ) -> Lane:
+        """The lane of a site; `unsignalled` is the share of turns to the near and the far side."""
+        straight = straight_manoeuvre(site.intersection.bearings, lane)
+        near, far = unsignalled
+        left, right = (near, far) if site.intersection.side == "left" else (far, near)
+        silent = tuple(
+            0.0 if m == straight else left if m < straight else right
+            for m in range(1, site.intersection.n)
+        )
+        table = confusion(straight, silent, error, kind)
+        return cls(straight, silent, error, kind, doubts(table))
+
+    def read(self, draws: Draws, manoeuvre: int, vehicle: int, *when: int) -> int:
+        """What is read; the same for the same vehicle and `when`, such as observer and moment.
+
+        The vehicles that a smaller error misreads are among those of a larger one.
+        """
+        shown = manoeuvre
+        if draws.uniform(_SIGNAL, vehicle) < self.silent[manoeuvre - 1]:
+            shown = self.straight
+        return self._misread(shown, draws.uniform(_READ, vehicle, *when))
+
+    def confidence(
+        self, draws: Draws, manoeuvre: int, read: int, vehicle: int, *when: int
+    ) -> float:
+        """How sure of that reading its reader is: of many such readings, this share is right."""
+        chances = draws.uniform(_SURE, vehicle, *when), draws.uniform(_MISTAKEN, vehicle, *when)
+        return confidence(self.doubt[read - 1], read == manoeuvre, chances)
+
+    def _misread(self, shown: int, chance: float) -> int:
+        if chance >= self.error or (self.kind == "missed" and shown == self.straight):
+            return shown
+        if self.kind == "missed":
+            return self.straight
+        others = [m for m in range(1, len(self.silent) + 1) if m != shown]
+        return others[int(chance / self.error * len(others))]
+
+
+def straight_manoeuvre(bearings: tuple[float, ...], lane: int) -> int:
+    """The manoeuvre that leaves straightest, and so without a signal.
+
+    Where two are equally straight, as on three arms 120° apart, it is the one on the left.
+    """
+    n = len(bearings)
+
+    def turn(manoeuvre: int) -> float:
+        there = bearings[(lane + manoeuvre) % n]
+        return abs((there - bearings[lane]) % 360.0 - 180.0)
+
+    return min(range(1, n), key=lambda m: (round(turn(m) / SAME_ANGLE), m))
+
+
+def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str) -> Table:
+    """Probabilities of what each manoeuvre is read as: rows true, columns read, shape (k, k)."""
+    k = len(silent)
+
+    def reads(shown: int, read: int) -> float:
+        if kind == "missed" and shown == straight:
+            return float(read == shown)
+        if read == shown:
+            return 1.0 - error
+        return error * (read == straight) if kind == "missed" else error / (k - 1)
+
+    every = range(1, k + 1)
+    return tuple(
+        tuple((1.0 - s) * reads(true, read) + s * reads(straight, read) for read in every)
+        for true, s in zip(every, silent, strict=True)
+    )
+
+
+def doubts(table: Table) -> tuple[float, ...]:
+    """For each reading, how likely it is wrong: Bayes' rule, all manoeuvres being as frequent."""
+    columns = list(zip(*table, strict=True))
+    return tuple(
+        1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
+        for m, column in enumerate(columns)
+    )
+
+
+def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:
+    """How sure a reader is, so that of all its readings with confidence c the share c is right.
+
+    That is what calibrated means (Guo, Pleiss, Sun, Weinberger, "On calibration of modern neural
+    networks", ICML 2017, eq. 1). Confidences have the density a·c^(a−1) on (0, 1), a = (1−e)/e for
+    a reading that is wrong with probability e: then their mean is 1−e, and they spread, as those
+    of a classifier do. Calibration makes the density a right reading's times c/(1−e) and a wrong
+    one's times (1−c)/e: Beta(a+1, 1) and Beta(a, 2). The first is the distribution of U^e, the
+    second that of U^e·V^(e/(1−e)) for uniform U and V.
+
+    Args:
+        doubt: e, how likely such a reading is wrong.
+        right: whether this one is right.
+        chances: U and V.
+    """
+    if doubt <= 0.0:
+        return 1.0
+    if doubt >= 1.0:
+        return 0.0
+    u, v = chances
+    sure = math.pow(u, doubt)
+    return sure if right else sure * math.pow(v, doubt / (1.0 - doubt))
+
+
+def leftover_error(doubt: float, threshold: float) -> float:
+    """Share of readings that are wrong and at least as sure as a threshold.
+
+    ∫ (1−c)·a·c^(a−1) dc from t to 1 = e − t^a + (1−e)·t^(a+1), see `confidence`.
+
+    Args:
+        doubt: e, the share of wrong readings, in [0, 1].
+        threshold: t, in [0, 1].
+    """
+    if doubt <= 0.0 or doubt >= 1.0:
+        return float(doubt >= 1.0 and threshold <= 0.0)
+    a = (1.0 - doubt) / doubt
+    return float(doubt - threshold**a + (1.0 - doubt) * threshold ** (a + 1.0))

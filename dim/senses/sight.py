@@ -1,0 +1,110 @@
+"""What can be seen from where: bodies near the junction, and lines of sight between them.
+
+Plain floats, since every vehicle asks about every other ten times a second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from minisim.control import Observed, Site
+from minisim.junction.geometry import Path
+
+Point = tuple[float, float]
+
+
+class Body(NamedTuple):
+    """Where a vehicle is: centre [m] and unit heading."""
+
+    x: float
+    y: float
+    ux: float
+    uy: float
+
+
+class Bodies:
+    """Where observed vehicles are. How a body stands is seen, whatever is thought of its intent.
+
+    Args:
+        site: its geometry and vehicles.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._ways = [_Way(path) for path in site.intersection.paths]
+        self._manoeuvres = site.intersection.n - 1
+        self._length = site.vehicle.length
+        self.half_length = site.vehicle.length / 2.0
+        self.half_width = site.vehicle.width / 2.0
+
+    def body(self, vehicle: Observed) -> Body:
+        """A vehicle's body: the chord of its way between its bumpers (as `Path.pose`)."""
+        way = self._ways[vehicle.lane * self._manoeuvres + vehicle.manoeuvre - 1]
+        x, y = way.point(-vehicle.distance)
+        rear_x, rear_y = way.point(-vehicle.distance - self._length)
+        norm = math.hypot(x - rear_x, y - rear_y)
+        ux, uy = (x - rear_x) / norm, (y - rear_y) / norm
+        return Body(x - ux * self.half_length, y - uy * self.half_length, ux, uy)
+
+    def hidden(self, eye: Body, target: Body, others: Iterable[Body]) -> bool:
+        """Whether bodies block every line of sight from the middle of one roof to a body.
+
+        The lines go to its centre and to its corners.
+        """
+        blocking = tuple(others)
+        start = (eye.x, eye.y)
+        return all(
+            any(self._crosses(start, end, body) for body in blocking)
+            for end in self._outline(target)
+        )
+
+    def _outline(self, body: Body) -> tuple[Point, ...]:
+        x, y, ux, uy = body
+        ax, ay = ux * self.half_length, uy * self.half_length
+        bx, by = -uy * self.half_width, ux * self.half_width
+        return (
+            (x, y),
+            (x + ax + bx, y + ay + by), (x + ax - bx, y + ay - by),
+            (x - ax + bx, y - ay + by), (x - ax - bx, y - ay - by),
+        )  # fmt: skip
+
+    def _crosses(self, start: Point, end: Point, body: Body) -> bool:
+        """Whether a line from one point to another meets a body's rectangle (Liang & Barsky)."""
+        x, y, ux, uy = body
+        sx, sy, dx, dy = start[0] - x, start[1] - y, end[0] - start[0], end[1] - start[1]
+        first, last = 0.0, 1.0
+        for at, step, half in (
+            (sx * ux + sy * uy, dx * ux + dy * uy, self.half_length),
+            (sy * ux - sx * uy, dy * ux - dx * uy, self.half_width),
+        ):
+            if step == 0.0:
+                if abs(at) > half:
+                    return False
+                continue
+            enter, leave = sorted(((-half - at) / step, (half - at) / step))
+            first, last = max(first, enter), min(last, leave)
+        return first <= last
+
+
+class _Way:
+    """A path in plain floats, by distance past the junction entry."""
+
+    def __init__(self, path: Path) -> None:
+        self._points: list[Point] = [(x, y) for x, y in path.points.tolist()]
+        self._length = path.exit - path.entry
+        self._step = self._length / (len(self._points) - 1)
+        self._in: Point = tuple(path.heading_in.tolist())
+        self._out: Point = tuple(path.heading_out.tolist())
+
+    def point(self, past: float) -> Point:
+        if past <= 0.0:
+            (x, y), (ux, uy) = self._points[0], self._in
+            return x + past * ux, y + past * uy
+        if past >= self._length:
+            (x, y), (ux, uy) = self._points[-1], self._out
+            return x + (past - self._length) * ux, y + (past - self._length) * uy
+        k = min(int(past / self._step), len(self._points) - 2)
+        w = past / self._step - k
+        (x, y), (next_x, next_y) = self._points[k : k + 2]
+        return x + w * (next_x - x), y + w * (next_y - y)

@@ -1,0 +1,246 @@
+"""Animations of a run: GIF, MP4 or a web page that plays by itself.
+
+The still ground is drawn once; each frame restores it and draws the few things that move, which
+takes a few milliseconds instead of the fifty that a full figure needs.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+from matplotlib.text import Text
+from PIL import Image
+
+from figures import style
+from figures.film.encode import animation_format, palette_of, write_gif, write_html, write_mp4
+from figures.film.frames import Film
+from figures.junction import drawing
+from minisim.errors import number
+from minisim.junction.geometry import Floats, Intersection
+from minisim.results.run import Run
+from minisim.results.trajectories import replacing
+
+#: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.
+WIDTH, HEIGHT, DPI = 7.2, 8.8, 100
+#: Inches of legend below the junction.
+FOOT = 0.8
+#: What the zones are for, in the legend.
+MEANINGS = {"red": "red: slow down", "yellow": "yellow: decide", "green": "green: buffer"}
+
+Progress = Callable[[int, int], None]
+
+
+def write_animation(
+    run: Run,
+    path: str | os.PathLike[str],
+    *,
+    start: float = 0.0,
+    seconds: float = 60.0,
+    fps: float = 10.0,
+    progress: Progress | None = None,
+) -> None:
+    """Write `seconds` of a run as an animation in the format of the file's suffix.
+
+    Args:
+        run: recorded with `record="all"` over the time shown.
+        path: of the file; it is there whole or not at all.
+        start, seconds: what to show [s].
+        fps: frames a second, at most one a simulation step.
+        progress: called with the frames done and their number.
+
+    Raises:
+        InputError: an unknown suffix, nothing recorded, or a number out of range.
+        MissingExtraError: .mp4 without ffmpeg.
+        FileError: the file cannot be written.
+    """
+    kind = animation_format(path)
+    times = frame_times(start, seconds, fps, run.site.dt)
+    picture = Picture(run, start)
+
+    def frames() -> Iterator[Image.Image]:
+        for done, time in enumerate(times.tolist(), start=1):
+            yield picture.draw(time)
+            if progress is not None:
+                progress(done, len(times))
+
+    with replacing(path) as part:
+        if kind == "gif":
+            write_gif(frames(), picture.palette(), part, fps)
+        elif kind == "mp4":
+            write_mp4(frames(), part, fps)
+        else:
+            write_html(frames(), picture.palette(), part, fps, picture.title)
+
+
+def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
+    """Times of the frames [s]: multiples of the step, as near to 1/fps apart as it allows."""
+    number("start [s]", start, low=0)
+    number("seconds", seconds, above=0, high=3600)
+    number("fps", fps, low=0.1, high=1.0 / dt)
+    ticks = np.round((start + np.arange(max(1, round(seconds * fps))) / fps) / dt)
+    return np.asarray(ticks * dt)
+
+
+class Picture:
+    """The junction of one run at any recorded time.
+
+    Args:
+        run: recorded with `record="all"`.
+        start: the served vehicles are counted from this time [s].
+    """
+
+    def __init__(self, run: Run, start: float = 0.0) -> None:
+        self.run = run
+        self.title = f"{run.scenario.name} · {run.controller.name}"
+        self._film = Film(run, start)
+        self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
+        plan, intersection = run.plan, run.site.intersection
+        reach = view_reach(intersection, max((m.start for m in plan.markings), default=0.0))
+        self._reach = reach
+        self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
+        self._axes.add_patch(Rectangle((-2e3, -2e3), 4e3, 4e3, facecolor=style.GRASS, zorder=0))
+        drawing.draw_junction(self._axes, intersection, plan, reach)
+        self._moving = self._add_moving()
+        self._write_still()
+        self._clock = self._text(0.97, 8.5, 18, "right", weight="bold")
+        self._counts = self._text(0.97, 8.18, 12, "right")
+        for artist in (*self._moving, self._clock, self._counts):
+            artist.set_animated(True)
+        self._canvas = _canvas_of(self._figure)
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+        self._written, self._ground = "", self._still
+
+    def draw(self, time: float) -> Image.Image:
+        """The picture at `time` [s]."""
+        self._write_numbers(time)
+        self._move(time)
+        self._canvas.restore_region(self._ground)
+        for artist in self._moving:
+            self._figure.draw_artist(artist)
+        size = self._canvas.get_width_height()
+        return Image.frombuffer("RGBA", size, self._canvas.buffer_rgba()).convert("RGB")
+
+    def palette(self) -> Image.Image:
+        """An image with every colour of the picture: the legend shows them all."""
+        return palette_of(self.draw(self._film.busiest))
+
+    def _add_moving(self) -> tuple[Artist, ...]:
+        axes, run = self._axes, self.run
+        pixels = axes.transData.transform([(0.0, 0.0), (run.site.vehicle.width, 0.0)])
+        points = (pixels[1, 0] - pixels[0, 0]) * 72.0 / DPI
+        self._ways = LineCollection(
+            [], colors=style.RIGHT_OF_WAY, alpha=0.28, linewidths=points, capstyle="butt", zorder=4
+        )
+        self._bodies = PolyCollection([], edgecolors=style.PAPER, linewidths=0.7, zorder=6)
+        self._glass = PolyCollection([], facecolors=style.PAPER, alpha=0.8, linewidths=0, zorder=7)
+        self._lamps = PolyCollection(
+            [], facecolors="#FFB000", edgecolors=style.INK, linewidths=0.5, zorder=8
+        )
+        self._crashes = LineCollection([], colors=style.BLACK, linewidths=3.0, zorder=9)
+        self._holds = drawing.draw_hold_lines(axes, run.site.intersection, run.plan)
+        for artist in (self._ways, self._bodies, self._glass, self._lamps, self._crashes):
+            axes.add_collection(artist)
+        return (
+            self._ways, self._holds, self._bodies, self._glass, self._lamps, self._crashes,
+        )  # fmt: skip
+
+    def _write_still(self) -> None:
+        scenario = self.run.scenario
+        self._text(0.03, 8.5, 16, "left", weight="bold").set_text(self.title)
+        self._text(0.03, 8.18, 12, "left", colour=style.MUTED).set_text(
+            f"{scenario.density:.0f} veh/h/lane · profile {scenario.profile_name} · "
+            f"seed {self.run.seed}"
+        )
+        vehicles = [
+            (style.RIGHT_OF_WAY, "has the right of way"),
+            (style.WAITING, "waits"),
+            (style.FREE, "drives"),
+        ]
+        if self._film.human.any():
+            vehicles.append((style.INK, "outline: human"))
+        names = dict.fromkeys(marking.name for marking in self.run.plan.markings)
+        zones = [(style.ZONES.get(name, style.SKY), MEANINGS.get(name, name)) for name in names]
+        middle = FOOT / 2.0
+        self._key(middle + (0.17 if zones else 0.0), vehicles, pointed=True)
+        self._key(middle - 0.17, zones, pointed=False)
+
+    def _key(self, y: float, entries: Sequence[tuple[str, str]], *, pointed: bool) -> None:
+        """One line of the legend, `y` inches from below: swatches and what they mean."""
+        x = 0.03
+        for colour, name in entries:
+            tip = 0.012 if pointed else 0.0
+            shoulder = 0.038 - tip
+            corners = [(0, -0.085), (shoulder, -0.085), (0.038, 0), (shoulder, 0.085), (0, 0.085)]
+            self._figure.add_artist(Polygon(
+                [(x + dx, (y + dy) / HEIGHT) for dx, dy in corners], facecolor=colour,
+                linewidth=0, transform=self._figure.transFigure,
+            ))  # fmt: skip
+            label = self._text(x + 0.048, y, 12, "left")
+            label.set_text(name)
+            x += 0.048 + label.get_window_extent().width / (WIDTH * DPI) + 0.04
+
+    def _text(
+        self, x: float, y: float, size: float, align: str, *, colour: str = style.INK, **font: Any
+    ) -> Text:
+        """An empty text, `y` inches from below."""
+        return self._figure.text(
+            x, y / HEIGHT, "", fontsize=size, ha=align, va="center", color=colour, **font
+        )
+
+    def _move(self, time: float) -> None:
+        film, run = self._film, self.run
+        now = film.at(time)
+        near = film.rows(now, 1.1 * self._reach)
+        x, y, angle = film.x[near], film.y[near], film.angle[near]
+        body, glass = drawing.body_shape(run.site.vehicle)
+        colours = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])[film.state[near]]
+        self._bodies.set_verts(list(drawing.place(body, x, y, angle)))
+        self._bodies.set_facecolor(colours.tolist())
+        self._bodies.set_edgecolor(
+            [style.INK if human else style.PAPER for human in film.human[near]]
+        )
+        self._bodies.set_linewidth([1.6 if human else 0.7 for human in film.human[near]])
+        self._glass.set_verts(list(drawing.place(glass, x, y, angle)))
+        self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
+        self._ways.set_segments(film.ways(near))
+        opened = film.open_lanes(near)
+        self._holds.set_color(
+            [style.RIGHT_OF_WAY if i in opened else style.INK for i in range(film.n)]
+        )
+        self._crashes.set_segments(film.crashes(time))
+
+    def _write_numbers(self, time: float) -> None:
+        """Write clock and counters into the ground, only when they change: text is slow."""
+        film = self._film
+        clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
+        counts = f"waiting {film.waiting(film.at(time))}   served {film.served(time)}"
+        if self.run.collisions:
+            counts = f"collisions {film.collided(time)}   {counts}"
+        if clock + counts == self._written:
+            return
+        self._written = clock + counts
+        self._canvas.restore_region(self._still)
+        self._clock.set_text(clock)
+        self._counts.set_text(counts)
+        self._figure.draw_artist(self._clock)
+        self._figure.draw_artist(self._counts)
+        self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
+
+
+def _canvas_of(figure: Figure) -> Any:
+    """A canvas of pixels; its methods carry no types."""
+    return FigureCanvasAgg(figure)
+
+
+def view_reach(intersection: Intersection, zone: float) -> float:
+    """How far from the centre a picture reaches [m]: all markings and a little more."""
+    return max(40.0, intersection.junction_radius + zone + 4.0)

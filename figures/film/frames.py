@@ -1,0 +1,161 @@
+"""The recorded trajectories of a run as arrays, asked by time: what `animate` draws."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from dim import Mixed
+from figures.junction import drawing
+from minisim.engine.kernel import WAITING_SPEED
+from minisim.errors import InputError
+from minisim.junction.geometry import Floats, Intersection, Movement
+from minisim.results.run import Run
+from minisim.results.trajectories import movement_index
+
+Rows = npt.NDArray[np.int64]
+
+#: States of a vehicle.
+DRIVING, STANDING, RELEASED = 0, 1, 2
+#: How long a collision stays marked [s].
+COLLISION_SHOWN = 3.0
+#: Radius of the ring that marks it [m].
+RING = 5.0
+
+
+class Film:
+    """The recorded trajectories as arrays, asked by time."""
+
+    def __init__(self, run: Run, start: float) -> None:
+        frame = run.trajectories
+        if frame.empty:
+            raise InputError(
+                f"no vehicle was recorded from {start:g} s on; start later or raise the density"
+            )
+        site = run.site
+        self.start = start
+        self.run, self.n = run, site.intersection.n
+        self.x, self.y = frame["x_m"].to_numpy(), frame["y_m"].to_numpy()
+        self.angle, self.s = frame["angle_deg"].to_numpy(), frame["s_m"].to_numpy()
+        self.speed = frame["speed_mps"].to_numpy()
+        self.path = movement_index(frame, site)
+        self.lane = self.path // (self.n - 1)
+        paths = site.intersection.paths
+        self.turn = np.array([_turn(site.intersection, p.movement) for p in paths])
+        self.exit = np.array([p.exit for p in paths])
+        self.entry = paths[0].entry
+        clear = self.exit[self.path] + site.vehicle.length
+        released = frame["right_of_way"].to_numpy() & (self.s <= clear)
+        still = self.speed <= WAITING_SPEED
+        self.state = np.where(released, RELEASED, np.where(still, STANDING, DRIVING))
+        self.still = still
+        self.human = _human(run)[frame["vehicle"].to_numpy()]
+        ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
+        self.ticks, first = np.unique(ticks, return_index=True)
+        self.bounds = np.append(first, len(ticks))
+        gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
+        cleared = np.sort(gone.to_numpy())
+        # Who was clear of the junction before the first frame was not served in this film.
+        self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
+        counts = np.diff(self.bounds)
+        self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)
+
+    def at(self, time: float) -> slice:
+        """The rows of one step."""
+        tick = round(time / self.run.site.dt)
+        k = int(np.searchsorted(self.ticks, tick))
+        if k == len(self.ticks) or self.ticks[k] != tick:
+            return slice(0, 0)
+        return slice(int(self.bounds[k]), int(self.bounds[k + 1]))
+
+    def rows(self, now: slice, reach: float) -> Rows:
+        """The rows of one step that are in the picture."""
+        rows = np.arange(now.start, now.stop)
+        inside = np.maximum(np.abs(self.x[now]), np.abs(self.y[now])) <= reach
+        return np.asarray(rows[inside])
+
+    def waiting(self, now: slice) -> int:
+        """How many vehicles stand."""
+        return int(self.still[now].sum())
+
+    def served(self, time: float) -> int:
+        """How many vehicles have cleared the junction since the film began."""
+        return int(np.searchsorted(self.cleared, time, side="right"))
+
+    def collided(self, time: float) -> int:
+        """How many collisions there have been since the film began."""
+        return sum(self.start <= c.time <= time for c in self.run.collisions)
+
+    def open_lanes(self, rows: Rows) -> set[int]:
+        """Lanes whose first vehicle before the junction has the right of way."""
+        first: dict[int, int] = {}
+        for row in rows[self.s[rows] <= self.entry].tolist():
+            lane = int(self.lane[row])
+            if lane not in first or self.s[row] > self.s[first[lane]]:
+                first[lane] = row
+        return {lane for lane, row in first.items() if self.state[row] == RELEASED}
+
+    def ways(self, rows: Rows) -> list[Floats]:
+        """What lies ahead, in the junction, of each vehicle with right of way."""
+        plan, paths = self.run.plan, self.run.site.intersection.paths
+        begin = self.entry - max(plan.hold_distance, 1.0)
+        found = []
+        near = self.s[rows] > self.entry - plan.sight
+        for row in rows[(self.state[rows] == RELEASED) & near].tolist():
+            path = paths[self.path[row]]
+            start = max(begin, float(self.s[row]))
+            if start < path.exit:
+                found.append(path.position(np.linspace(start, path.exit, 16)))
+        return found
+
+    def lamps(self, rows: Rows) -> list[Floats]:
+        """Turn indicators of the vehicles that turn and have not left the junction."""
+        vehicle = self.run.site.vehicle
+        half, size = vehicle.width / 2.0, 0.36
+        front = np.array([(0.1, -size), (0.1, size), (-2 * size, size), (-2 * size, -size)])
+        rear = front - (vehicle.length - 2 * size + 0.2, 0.0)
+        lamps: list[Floats] = []
+        for side in (-1, 1):
+            shown = rows[
+                (self.turn[self.path[rows]] == side) & (self.s[rows] <= self.exit[self.path[rows]])
+            ]
+            for shape in (front, rear):
+                moved = shape - (0.0, side * half)
+                lamps += list(drawing.place(moved, self.x[shown], self.y[shown], self.angle[shown]))
+        return lamps
+
+    def crashes(self, time: float) -> list[Floats]:
+        """A ring around each recent collision."""
+        site = self.run.site
+        angle = np.linspace(0.0, 2.0 * np.pi, 49)
+        ring = RING * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        found: list[Floats] = []
+        for collision in self.run.collisions:
+            if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
+                continue
+            centres = [
+                site.intersection.path(site.intersection.parse(movement)).pose(
+                    s, site.vehicle.length
+                )[0]
+                for movement, s in zip(collision.movements, collision.positions, strict=True)
+            ]
+            found.append(ring + np.mean(centres, axis=0))
+        return found
+
+
+def _human(run: Run) -> npt.NDArray[np.bool_]:
+    """Which vehicles of a run are driven by humans, by id."""
+    count = len(run.columns.lane)
+    if isinstance(run.controller, Mixed):
+        return run.controller.human(run.seed, count)
+    return np.zeros(count, dtype=bool)
+
+
+def _turn(intersection: Intersection, movement: Movement) -> int:
+    """Which indicator a movement sets: −1 left, 1 right, 0 none (less than 30° off straight)."""
+    path = intersection.path(movement)
+    (ax, ay), (bx, by) = path.heading_in, path.heading_out
+    turn = math.degrees(math.atan2(ay * bx - ax * by, ax * bx + ay * by))
+    return 0 if abs(turn) < 30.0 else int(math.copysign(1, turn))

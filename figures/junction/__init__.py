@@ -1,0 +1,1 @@
+"""Drawings of a junction: its map, a decision, schematic views."""

@@ -1,0 +1,129 @@
+"""The paper's two-part figure of a decision: the junction (A) and its harmony graph (B)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, Rectangle
+
+from dim import Explanation
+from figures import style
+from figures.junction import drawing
+from minisim.control import Plan, Site
+from minisim.junction.geometry import ARM_NAMES, Floats, Intersection
+
+#: Metres of approach lane shown before the junction.
+APPROACH = 17.0
+
+
+def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
+    """Draw who may cross and why.
+
+    Args:
+        explanation: of the decision (`dim.explain`).
+        site: the junction and the vehicles' type.
+        plan: whose markings and hold line are drawn (`Dim().start(site).plan`).
+    """
+    figure = style.new_figure(10.0, 6.0)
+    left = figure.add_axes((0.02, 0.13, 0.462, 0.77))
+    right = figure.add_axes((0.518, 0.13, 0.462, 0.77))
+    _draw_scene(left, explanation, site, plan)
+    _draw_graph(right, explanation, site.intersection)
+    for axes, letter, title in (
+        (left, "A", "Vehicles and their movements"),
+        (right, "B", "Harmony graph"),
+    ):
+        x = axes.get_position().x0
+        figure.text(x, 0.945, letter, fontsize=15, fontweight="bold", color=style.INK, va="center")
+        figure.text(x + 0.028, 0.945, title, fontsize=12, color=style.INK, va="center")
+    who = ", ".join(map(str, explanation.right_of_way))
+    figure.text(
+        0.02, 0.08, f"Right of way: {who}", fontsize=12.5, fontweight="bold",
+        color=style.RIGHT_OF_WAY, va="center",
+    )  # fmt: skip
+    figure.text(0.02, 0.035, explanation.reason, fontsize=10, color=style.INK, va="center")
+    _zone_legend(figure, plan)
+    return figure
+
+
+def _zone_legend(figure: Figure, plan: Plan) -> None:
+    """The zones on the lanes, from the outside in."""
+    names = list(dict.fromkeys(m.name for m in plan.markings if m.end < APPROACH))
+    figure.legend(
+        [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in names],
+        [f"{name} zone" for name in names], loc="center right", bbox_to_anchor=(0.98, 0.08),
+        ncols=max(len(names), 1), frameon=False, fontsize=9, labelcolor=style.INK,
+        borderaxespad=0.0, handlelength=1.4, columnspacing=1.4,
+    )  # fmt: skip
+
+
+def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) -> None:
+    intersection, vehicle = site.intersection, site.vehicle
+    reach = intersection.junction_radius + APPROACH
+    axes.add_patch(Rectangle((-reach, -reach), 2 * reach, 2 * reach, facecolor=style.GRASS))
+    drawing.draw_junction(axes, intersection, plan, reach)
+    drawing.draw_hold_lines(axes, intersection, plan)
+    for movement in explanation.participants:
+        path = intersection.path(movement)
+        goes = movement in explanation.right_of_way
+        colour = style.RIGHT_OF_WAY if goes else style.WAITING
+        front = path.entry - plan.hold_distance
+        end = path.exit + (3.0 if goes else 5.5)  # arrowheads in one exit lane stay apart
+        drawing.draw_way(axes, path, front, end, colour, strong=goes)
+        drawing.draw_vehicle(axes, path, front - 0.15, vehicle, colour)
+        middle = plan.hold_distance + vehicle.length / 2.0
+        x, y = _beside(intersection, movement.origin, middle, 0.075 * reach)
+        axes.text(
+            x, y, str(movement), ha="center", va="center", fontsize=13, fontweight="bold",
+            color=colour, zorder=9,
+        )  # fmt: skip
+
+
+def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
+    """Nodes lie as their lanes do around the junction."""
+    places = {
+        m.origin: np.array(intersection.arms[m.origin].outward) for m in explanation.participants
+    }
+    chosen = {m.origin for m in explanation.right_of_way}
+    axes.set(xlim=(-1.5, 1.5), ylim=(-1.5, 1.5), aspect="equal")
+    axes.set_axis_off()
+    for a, b in explanation.edges:
+        strong = {a.origin, b.origin} <= chosen
+        ends = np.array([places[a.origin], places[b.origin]])
+        axes.plot(
+            *ends.T, color=style.RIGHT_OF_WAY if strong else "#A7AEB8",
+            linewidth=7.0 if strong else 2.2, solid_capstyle="round", zorder=2 if strong else 1,
+        )  # fmt: skip
+    for movement in explanation.participants:
+        x, y = places[movement.origin]
+        goes = movement.origin in chosen
+        axes.add_patch(Circle(
+            (x, y), 0.2, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
+            edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
+        ))  # fmt: skip
+        axes.text(
+            x, y - 0.005, rf"$V^{{{ARM_NAMES[movement.origin]}}}_{{{movement.manoeuvre}}}$",
+            ha="center", va="center", fontsize=15, zorder=4,
+            color=style.PAPER if goes else style.WAITING,
+        )  # fmt: skip
+    pairs = math.comb(len(explanation.participants), 2)
+    axes.text(
+        0.0, -1.46, f"{len(explanation.edges)} of {pairs} pairs in harmony (lines); "
+        f"{_count(len(explanation.tied))} of the largest size, {len(explanation.tied[0])}",
+        ha="center", va="bottom", fontsize=9.5, color=style.MUTED,
+    )  # fmt: skip
+
+
+def _count(cliques: int) -> str:
+    return "1 clique" if cliques == 1 else f"{cliques} cliques"
+
+
+def _beside(intersection: Intersection, arm: int, before: float, room: float) -> Floats:
+    """A point `room` metres off an approach lane, `before` metres before the junction."""
+    strip = drawing.lane_strip(intersection, arm, before, before)
+    middle, kerb = strip[0], strip[1]
+    across = (kerb - middle) / intersection.lane_width
+    return np.asarray(kerb + across * room)

@@ -1,0 +1,189 @@
+"""The junction from above: asphalt, lanes, zones, hold lines, vehicles and their way.
+
+All coordinates are metres, x east and y north, as in `minisim.junction.geometry`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.patches import FancyArrowPatch, Polygon
+from matplotlib.path import Path as Outline
+
+from figures import style
+from minisim.control import Plan
+from minisim.junction.geometry import Arm, Floats, Intersection, Path
+from minisim.vehicle import VehicleType
+
+#: Points of the kerb between two arms.
+KERB_POINTS = 24
+
+
+def outline(intersection: Intersection, reach: float) -> Floats:
+    """Edge of the asphalt, shape (k, 2) [m]: every arm as far as `reach` from the centre."""
+    width = intersection.lane_width
+    arms = intersection.arms
+    points: list[Floats] = []
+    for arm, following in zip(arms, (*arms[1:], arms[0]), strict=True):
+        ahead, clockwise = _axes_of(arm)
+        ends = [ahead * reach - clockwise * width, ahead * reach + clockwise * width]
+        points.append(np.array(ends))
+        points.append(_kerb(arm, following, width, intersection.junction_radius))
+    return np.concatenate(points)
+
+
+def lane_strip(intersection: Intersection, arm: int, start: float, end: float) -> Floats:
+    """Corners (4, 2) [m] of the approach lane from `start` to `end` before the junction entry."""
+    ahead, clockwise = _axes_of(intersection.arms[arm])
+    across = clockwise * _keep(intersection) * intersection.lane_width
+    far = ahead * (intersection.junction_radius + start)
+    near = ahead * (intersection.junction_radius + end)
+    return np.array([far, far + across, near + across, near])
+
+
+def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: float) -> None:
+    """Draw everything that does not move, `reach` metres around the centre."""
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    axes.set_axis_off()
+    far = 1.5 * reach
+    axes.add_patch(Polygon(
+        outline(intersection, far), facecolor=style.ASPHALT, edgecolor="#9AA2AD", linewidth=1.0,
+        joinstyle="round", zorder=1,
+    ))  # fmt: skip
+    for marking in plan.markings:
+        strips = [
+            lane_strip(intersection, i, marking.start, marking.end) for i in range(intersection.n)
+        ]
+        colour = style.ZONES.get(marking.name, style.SKY)
+        axes.add_collection(PolyCollection(strips, facecolors=colour, linewidths=0, zorder=2))
+    for i, arm in enumerate(intersection.arms):
+        ahead, _ = _axes_of(arm)
+        middle = np.outer([intersection.junction_radius, far], ahead)
+        axes.plot(*middle.T, color=style.PAINT, linewidth=1.2, dashes=(6, 5), zorder=3)
+        entry = lane_strip(intersection, i, 0.15, -0.15)
+        axes.add_patch(Polygon(entry, facecolor=style.PAINT, linewidth=0, zorder=3))
+    draw_lane_names(axes, intersection, reach)
+
+
+def draw_lane_names(axes: Axes, intersection: Intersection, reach: float) -> None:
+    """The lane identifiers, each beside its approach lane and inside the picture."""
+    for arm in intersection.arms:
+        ahead, clockwise = _axes_of(arm)
+        beside = clockwise * _keep(intersection) * (intersection.lane_width + 0.055 * reach)
+        edge = 0.93 * reach - np.abs(beside)
+        along = min(edge[k] / abs(ahead[k]) for k in (0, 1) if abs(ahead[k]) > 1e-9)
+        x, y = ahead * along + beside
+        axes.text(
+            x, y, arm.name, ha="center", va="center", fontsize=13, fontweight="bold",
+            color=style.PAPER, zorder=9,
+            bbox={"boxstyle": "circle,pad=0.28", "facecolor": style.INK, "linewidth": 0},
+        )  # fmt: skip
+
+
+def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
+    """Where vehicles without right of way stop: one line a lane, shape (n, 2, 2) [m]."""
+    strips = [
+        lane_strip(intersection, i, plan.hold_distance, plan.hold_distance)
+        for i in range(intersection.n)
+    ]
+    return np.array(strips)[:, :2]
+
+
+def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
+    """Body (8, 2) and windscreen (4, 2) of a vehicle at the origin that heads east [m].
+
+    The origin is the middle of the front bumper, as in `Run.trajectories`.
+    """
+    length, half = vehicle.length, vehicle.width / 2.0
+    nose, tail = 0.45 * half, 0.25 * half
+    side = [(0, half - nose), (-nose, half), (-length + tail, half), (-length, half - tail)]
+    body = np.array([*side, *((x, -y) for x, y in reversed(side))], dtype=float)
+    glass_front, glass_back = -0.26 * length, -0.40 * length
+    glass = [
+        (glass_front, 0.72 * half), (glass_front, -0.72 * half),
+        (glass_back, -0.62 * half), (glass_back, 0.62 * half),
+    ]  # fmt: skip
+    return body, np.array(glass)
+
+
+def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.ArrayLike) -> Floats:
+    """Move a shape (k, 2) to n poses, shape (n, k, 2); angles clockwise from north [deg]."""
+    angle = np.radians(np.atleast_1d(np.asarray(angle_deg, dtype=float)))
+    heading = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    left = np.stack([-heading[:, 1], heading[:, 0]], axis=-1)
+    origin = np.stack([np.atleast_1d(x), np.atleast_1d(y)], axis=-1)
+    along = shape[None, :, :1] * heading[:, None, :]
+    across = shape[None, :, 1:] * left[:, None, :]
+    return np.asarray(origin[:, None, :] + along + across)
+
+
+def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour: str) -> None:
+    """Draw one vehicle with its front bumper at `s` on its path."""
+    x, y = path.position(s)
+    _, heading = path.pose(s, vehicle.length)
+    angle = math.degrees(math.atan2(heading[0], heading[1]))
+    body, glass = (place(shape, x, y, angle)[0] for shape in body_shape(vehicle))
+    axes.add_patch(Polygon(body, facecolor=colour, edgecolor=style.PAINT, linewidth=1.0, zorder=6))
+    axes.add_patch(Polygon(glass, facecolor=style.PAINT, alpha=0.75, linewidth=0, zorder=7))
+
+
+def draw_way(
+    axes: Axes, path: Path, start: float, end: float, colour: str, *, strong: bool
+) -> None:
+    """Draw the way of a movement between two `s` as an arrow."""
+    points = path.position(np.linspace(start, end, 48))
+    axes.add_patch(FancyArrowPatch(
+        path=Outline(points), arrowstyle="-|>,head_length=7,head_width=4", color=colour,
+        linewidth=2.6 if strong else 1.5, linestyle="-" if strong else (0, (4, 2.5)),
+        alpha=1.0 if strong else 0.8, shrinkA=0, shrinkB=0, capstyle="butt",
+        joinstyle="miter", zorder=5 if strong else 4,
+    ))  # fmt: skip
+
+
+def draw_hold_lines(axes: Axes, intersection: Intersection, plan: Plan) -> LineCollection:
+    """Draw the hold lines; recolour the answer to show which lanes are open."""
+    lines = LineCollection(
+        list(hold_lines(intersection, plan)), colors=style.INK, linewidths=3.0, zorder=4,
+        capstyle="butt",
+    )  # fmt: skip
+    axes.add_collection(lines)
+    return lines
+
+
+def _axes_of(arm: Arm) -> tuple[Floats, Floats]:
+    """Unit vectors outward along an arm and across it, clockwise."""
+    ahead = np.array(arm.outward)
+    return ahead, np.array([ahead[1], -ahead[0]])
+
+
+def _keep(intersection: Intersection) -> float:
+    """+1 where the approach lane lies clockwise of the middle of its arm (left-hand traffic)."""
+    return 1.0 if intersection.side == "left" else -1.0
+
+
+def _kerb(arm: Arm, following: Arm, width: float, radius: float) -> Floats:
+    """The kerb from one arm to the next clockwise, shape (k, 2): an arc tangent to both.
+
+    It meets both road edges at the distance `radius` from the centre; where the edges cross
+    farther out than that, it is their crossing.
+    """
+    ahead, clockwise = _axes_of(arm)
+    next_ahead, next_clockwise = _axes_of(following)
+    half = math.radians((following.bearing - arm.bearing) % 360.0) / 2.0
+    start = ahead * radius + clockwise * width
+    end = next_ahead * radius - next_clockwise * width
+    if abs(half - math.pi / 2.0) < 1e-3:
+        return np.array([start, end])
+    signed = radius * math.tan(half) - width
+    if half < math.pi / 2.0 and signed <= 0.0:
+        return np.array([ahead * (width / math.tan(half)) + clockwise * width])
+    centre = start + clockwise * signed
+    a, b = start - centre, end - centre
+    turn = math.pi - 2.0 * half
+    t = np.linspace(0.0, 1.0, KERB_POINTS)[:, None]
+    weights = np.sin((1.0 - t) * turn), np.sin(t * turn)
+    return np.asarray(centre + (weights[0] * a + weights[1] * b) / math.sin(turn))

@@ -1,0 +1,341 @@
+"""The arrays that a run consists of.
+
+Vehicles are one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
+simply the row before. Lanes are another. What never changes in a run is in `Road` and `Law`. Few
+arguments keep a call into the compiled kernel cheap: unboxing arrays is most of its cost.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from minisim.arrivals import Arrivals
+from minisim.control import LATERAL_ACCELERATION, Plan, Site
+from minisim.errors import InputError
+from minisim.junction.geometry import Path
+from minisim.junction.meetings import meetings, sagittas
+from minisim.streams import stream
+from minisim.vehicle import MODELS, EngineVehicle, VehicleType
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Records = npt.NDArray[np.void]
+
+#: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
+#: is allowed, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
+STOP_MARGIN = 0.25
+
+#: Values of `Law.model`.
+IDM, IIDM, KRAUSS, CC = range(len(MODELS))
+
+#: Values of the field `status`.
+WAITING, DRIVING, ARRIVED = 0, 1, 2
+
+VEHICLE = np.dtype(
+    [
+        ("id", np.int64),  # row of the trip table
+        ("lane", np.int64),
+        ("path", np.int64),  # index of the movement
+        ("demand_tick", np.int64),
+        ("factor", np.float64),  # the driver's factor on the speed limit
+        ("status", np.int64),
+        ("s", np.float64),  # front bumper, from the road entry [m]
+        ("v", np.float64),  # [m/s]
+        ("a", np.float64),  # of the step just taken [m/s²]
+        ("section", np.int64),  # of the speed profile
+        ("mark", np.int64),  # next wake-up mark
+        ("ahead", np.int64),  # last vehicle before it bound for the same exit lane, or -1
+        ("cleared", np.int64),  # rear bumper has left the junction
+        ("go", np.int64),  # has a right of way of its own
+        ("advice", np.float64),  # cap on its speed [m/s]
+        ("brake", np.float64),  # cap on its acceleration [m/s²]: negative, or infinite
+        ("entered", np.int64),  # tick of entering the junction (engine only)
+        ("stopping", np.int64),  # advised to stand in the step before (engine only)
+        ("depart_tick", np.int64),
+        ("arrival_tick", np.int64),
+        ("waiting_ticks", np.int64),
+        ("lost_ticks", np.float64),
+    ]
+)
+
+LANE = np.dtype(
+    [
+        ("end", np.int64),  # one past its last row
+        ("first", np.int64),  # first row not yet arrived
+        ("next", np.int64),  # next row to be inserted
+        ("front", np.int64),  # first row whose front has not entered the junction
+        ("uncleared", np.int64),  # first row not yet clear of the junction
+        ("open", np.int64),
+        ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
+        ("tail", np.int64),  # last row that entered the exit lane of this arm (engine only)
+    ]
+)
+
+#: One line of a trajectory recording.
+TRACE = np.dtype(
+    [
+        ("tick", np.int64),
+        ("row", np.int64),
+        ("s", np.float64),
+        ("v", np.float64),
+        ("a", np.float64),
+        ("released", np.int64),
+    ]
+)
+
+#: The fields of `minisim.control.Observed`.
+OBSERVED = np.dtype(
+    [
+        ("id", np.int64),
+        ("lane", np.int64),
+        ("manoeuvre", np.int64),
+        ("distance", np.float64),
+        ("speed", np.float64),
+        ("length", np.float64),
+        ("demand_time", np.float64),
+    ]
+)
+
+
+class Road(NamedTuple):
+    """The paths as arrays; p counts movements, k sections of the speed profile.
+
+    Attributes:
+        ends: (p, 3): `s` of the junction exit and of the road's end [m], index of the exit arm.
+        shape: (p, ARC_SEGMENTS + 1, 2): polyline from entry to exit [m].
+        headings: (p, 4): unit vectors in (x, y) and out (x, y).
+        section_start: (p, k) [m], infinite past the last section.
+        section_speed: (p, k) limit from there on [m/s].
+        branch: (p, p) [m], see `Intersection.branch`.
+        marks: (j,) `s` of the wake-up marks, ascending, the last one infinite [m].
+    """
+
+    ends: Floats
+    shape: Floats
+    headings: Floats
+    section_start: Floats
+    section_speed: Floats
+    branch: Floats
+    marks: Floats
+
+
+class Engine(NamedTuple):
+    """What a run of `minisim.vehicle.EngineVehicle` needs beside `Law` (SI units).
+
+    Attributes:
+        meetings: (p, p, 2), see `minisim.junction.meetings.meetings`.
+        waits: (p, 2): waiting position past the junction entry, sagitta [m].
+    """
+
+    cruise_speed: float
+    cruise_gain: float
+    a: float
+    b: float
+    headway: float
+    spacing_gain: float
+    spacing: float
+    lag: float
+    a_max: float
+    radar: float
+    meetings: Floats
+    waits: Floats
+
+
+class Law(NamedTuple):
+    """The scalars of a run: car following, lines and switches (SI units)."""
+
+    dt: float
+    a: float
+    b: float
+    b_max: float
+    headway: float
+    min_gap: float
+    delta: float
+    model: int  # car-following law, `IDM` and its siblings
+    semi_implicit: bool  # how positions follow from speeds: by `semi_implicit`, or ballistic
+    length: float
+    width: float
+    entry: float  # s of the junction entry
+    hold: float  # s of the hold line
+    leave: float  # s until which a vehicle stays in view at least
+    slack: float  # inserted so far past its length, arrived so far before the end of the road
+    sight: float  # how far before the entry a view reaches
+    depart_speed: float  # negative: the highest safe one
+    wake_on_clear: bool
+    record_from: int  # ticks
+    record_to: int
+    record_start: float  # s where recording starts
+    record_past: float  # how far past the junction exit it goes on
+
+
+def build_road(site: Site, plan: Plan) -> Road:
+    """Lay out the paths with the speed profile of the site and the plan's markings."""
+    intersection = site.intersection
+    paths = intersection.paths
+    profiles = [_speed_profile(path, site, plan) for path in paths]
+    width = max(len(profile) for profile in profiles) + 1
+    start = np.full((len(paths), width), np.inf)
+    speed = np.full((len(paths), width), site.speed_limit)
+    for p, profile in enumerate(profiles):
+        for k, (s, limit) in enumerate(profile):
+            start[p, k], speed[p, k] = s, limit
+    marks = sorted(intersection.approach_length - distance for distance in plan.marks)
+    return Road(
+        ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
+        shape=np.array([p.points for p in paths]),
+        headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
+        section_start=start,
+        section_speed=speed,
+        branch=np.array(intersection.branch(site.vehicle)),
+        marks=np.array([*marks, np.inf]),
+    )
+
+
+def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
+    """Piecewise-constant limit along a path: ascending (start [m], speed [m/s])."""
+    road = site.speed_limit
+    turn = min(road, site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION))
+    stretches = [(path.entry, path.exit, turn)]
+    stretches += [
+        (path.entry - m.start, path.entry - m.end, m.speed)
+        for m in plan.markings
+        if m.speed is not None
+    ]
+    edges = sorted({0.0, *(max(s, 0.0) for start, end, _ in stretches for s in (start, end))})
+    profile: list[tuple[float, float]] = []
+    for edge in edges:
+        inside = [speed for start, end, speed in stretches if start <= edge < end]
+        limit = min([road, *inside])
+        if not profile or profile[-1][1] != limit:
+            profile.append((edge, limit))
+    return profile
+
+
+def build_law(
+    site: Site,
+    plan: Plan,
+    *,
+    depart_speed: float | None,
+    record: str | None,
+    record_window: tuple[float, float],
+) -> Law:
+    """Collect the scalars of a run."""
+    vehicle = site.vehicle
+    entry = site.intersection.approach_length
+    if plan.hold_distance > entry - vehicle.length:
+        raise InputError(
+            f"the hold line, {plan.hold_distance:g} m before the junction, is not on the approach "
+            f"lane of {entry:g} m"
+        )
+    near = record == "junction"
+    return Law(
+        dt=site.dt,
+        a=vehicle.acceleration,
+        b=vehicle.deceleration,
+        b_max=vehicle.max_deceleration,
+        headway=vehicle.headway,
+        min_gap=vehicle.min_gap,
+        delta=vehicle.exponent,
+        model=MODELS.index(vehicle.model),
+        semi_implicit=vehicle.model in ("krauss", "cc"),
+        length=vehicle.length,
+        width=vehicle.width,
+        entry=entry,
+        hold=entry - plan.hold_distance,
+        leave=entry + plan.reach,
+        slack=insertion_slack(vehicle),
+        sight=plan.sight,
+        depart_speed=-1.0 if depart_speed is None else depart_speed,
+        wake_on_clear=plan.wake_on_clear,
+        record_from=first_tick(record_window[0], site.dt) if record else NEVER,
+        record_to=first_tick(record_window[1], site.dt) if record else NEVER,
+        record_start=entry - RECORD_BEFORE if near else -math.inf,
+        record_past=RECORD_PAST if near else math.inf,
+    )
+
+
+def build_engine(site: Site) -> Engine | None:
+    """Collect what vehicles with an engine need; None where they have none."""
+    vehicle, intersection = site.vehicle, site.intersection
+    if not isinstance(vehicle, EngineVehicle):
+        return None
+    waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
+    return Engine(
+        cruise_speed=vehicle.cruise_speed,
+        cruise_gain=vehicle.cruise_gain,
+        a=vehicle.cruise_acceleration,
+        b=vehicle.cruise_deceleration,
+        headway=vehicle.headway,
+        spacing_gain=vehicle.spacing_gain,
+        spacing=vehicle.spacing,
+        lag=vehicle.lag,
+        a_max=vehicle.engine_acceleration,
+        radar=vehicle.radar,
+        meetings=meetings(intersection),
+        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
+    )
+
+
+#: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
+#: and counts it as arrived this far before the end of the road.
+POSITION_EPS = 0.1
+
+
+def insertion_slack(vehicle: VehicleType) -> float:
+    """How far past its length a vehicle is inserted, and how far before the road's end it ends."""
+    return POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0
+
+
+#: Reach of a recording of the junction alone, before its entry and past its exit [m].
+RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
+
+#: A tick that never comes.
+NEVER = 2**62
+
+
+def first_tick(time: float, dt: float) -> int:
+    """First tick at or after `time` [s]."""
+    return NEVER if time / dt >= NEVER else math.ceil(time / dt - 1e-6)
+
+
+def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
+    """All vehicles of an arrival table, sorted by (lane, demand time), none on the road yet."""
+    n = site.intersection.n
+    order = np.lexsort((arrivals.time, arrivals.lane))
+    vehicles = np.zeros(len(order), VEHICLE)
+    vehicles["id"] = order
+    vehicles["lane"] = arrivals.lane[order]
+    vehicles["path"] = arrivals.lane[order] * (n - 1) + arrivals.manoeuvre[order] - 1
+    vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
+    vehicles["factor"] = _speed_factors(site, len(order))[order]
+    vehicles["ahead"] = -1
+    vehicles["advice"] = np.inf
+    vehicles["brake"] = np.inf
+    vehicles["depart_tick"] = -1
+    vehicles["arrival_tick"] = -1
+    return vehicles
+
+
+def _speed_factors(site: Site, count: int) -> Floats:
+    deviation = site.vehicle.speed_deviation
+    if deviation == 0.0:
+        return np.ones(count)
+    return np.clip(stream(site.seed, "drivers").normal(1.0, deviation, count), 0.2, 2.0)
+
+
+def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
+    """The lanes, with their rows of the vehicle array."""
+    n = site.intersection.n
+    starts = np.searchsorted(vehicles["lane"], np.arange(n + 1))
+    lanes = np.zeros(n, LANE)
+    lanes["end"] = starts[1:]
+    for name in ("first", "next", "front", "uncleared"):
+        lanes[name] = starts[:-1]
+    lanes["open"] = lanes_open
+    lanes["last"] = -1
+    lanes["tail"] = -1
+    return lanes

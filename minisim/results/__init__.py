@@ -1,0 +1,1 @@
+"""What a run leaves: trips, metrics, trajectories and how safe it was."""

@@ -1,0 +1,376 @@
+"""Safety monitors on a recording: TTC, DRAC, PET and braking, as SUMO's SSM device defines them.
+
+All are functions of a trajectory frame (`run.trajectories`; record="junction" is enough) and its
+site. They look at bodies on their paths:
+
+* following — a vehicle and the one ahead in its lane, until the latter's rear has left their
+  shared path; or the last one from another arm that is before it on the way to its exit lane.
+  TTC = gap/Δv (Hayward 1972), DRAC = Δv²/(2·gap), both only while closing (Δv > 0).
+* encroachment — two vehicles through the same conflict area of two movements.
+  PET = time the second enters − time the first has left; 0 or less means both were inside.
+* crossing — two vehicles with right of way on conflicting movements, at constant speed: where
+  the second would enter the conflict area before the first has left it, TTC = d/v of the second.
+  A vehicle without right of way is about to stop, so it is on nobody's course.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from minisim.control import Site
+from minisim.errors import instance
+from minisim.junction.geometry import Bools, Floats, Intersection, Path
+from minisim.results.trajectories import (
+    ACCELERATION,
+    RIGHT_OF_WAY,
+    SPEED,
+    TIME,
+    VEHICLE,
+    S,
+    check_trajectories,
+    movement_index,
+)
+from minisim.vehicle import VehicleType
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Ints = npt.NDArray[np.int64]
+
+#: Step along a path at which bodies are tested against a corridor [m], and how many of these
+#: steps the first, coarse search takes at once.
+AREA_STEP, COARSE = 0.1, 5
+#: Longer than any path [m]: keeps the vehicles apart in one ascending array.
+_FAR = 1e6
+
+
+class Rows(NamedTuple):
+    """A trajectory frame as arrays, sorted by time, then vehicle; shape (rows,) each."""
+
+    time: Floats
+    step: Ints
+    vehicle: Ints
+    movement: Ints
+    s: Floats
+    v: Floats
+    goes: Bools
+
+
+class Areas(NamedTuple):
+    """Conflict areas of every two movements, shape (m, m) each [m], NaN where there is none.
+
+    While its front bumper is at `s` in (enter[p, q], leave[p, q]), a body on path p reaches into
+    what bodies on path q sweep inside the junction.
+    """
+
+    enter: Floats
+    leave: Floats
+
+
+def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
+    """The worst of a recording; None where nothing of the kind happened.
+
+    Returns:
+        `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
+        `max_braking_mps2`, the number of encroachments `pets`, and how many of them were shorter
+        than 1, 1.5 and 2 s (`pets_below_1_s`, `pets_below_1_5_s`, `pets_below_2_s`).
+
+    Raises:
+        InputError: a column is missing, or a movement that the site does not have.
+    """
+    rows = _rows(frame, site)
+    follow = _following(rows, site)
+    pets = _encroachments(rows, site)["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], _crossings(rows, site)["ttc_s"]])
+    braking = -frame[ACCELERATION].to_numpy(dtype=float)
+    return {
+        "min_ttc_s": _smallest(ttc),
+        "min_pet_s": _smallest(pets),
+        "max_drac_mps2": _largest(follow["drac_mps2"]),
+        "max_braking_mps2": _largest(np.maximum(braking, 0.0)),
+        "pets": len(pets),
+        "pets_below_1_s": int((pets < 1.0).sum()),
+        "pets_below_1_5_s": int((pets < 1.5).sum()),
+        "pets_below_2_s": int((pets < 2.0).sum()),
+    }
+
+
+def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """Every vehicle behind another at every step.
+
+    Returns:
+        Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN
+        while not closing and 0 where bodies overlap; DRAC needs a gap and is NaN without one.
+    """
+    return _frame(_following(_rows(frame, site), site))
+
+
+def encroachments(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """Every two vehicles one after the other through a conflict area of two movements.
+
+    A vehicle that is inside when its recording ends counts as leaving then; one whose entry was
+    not recorded does not count.
+
+    Returns:
+        Columns `time_s` (the second enters), `first, second, pet_s`, sorted by time.
+    """
+    return _frame(_encroachments(_rows(frame, site), site))
+
+
+def crossings(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """Every step at which two vehicles with right of way are on a crossing course.
+
+    Returns:
+        Columns `time_s, first, second, ttc_s`.
+    """
+    return _frame(_crossings(_rows(frame, site), site))
+
+
+def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
+    """Where on its path a vehicle is in the way of another movement."""
+    return _conflict_areas(intersection, vehicle.length, vehicle.width)
+
+
+@lru_cache(maxsize=64)
+def _conflict_areas(intersection: Intersection, length: float, width: float) -> Areas:
+    vehicle = VehicleType(length=length, width=width)
+    paths = intersection.paths
+    overlap = intersection.separation(vehicle) <= 0.0
+    swept = [_inside(path, vehicle) for path in paths]
+    shapely.prepare(swept)
+    enter, leave = (np.full(overlap.shape, np.nan) for _ in range(2))
+    for p, path in enumerate(paths):
+        s = np.arange(path.entry, path.exit + length, AREA_STEP)
+        bodies = np.asarray(shapely.polygons(path.bodies(s, vehicle)))
+        for q in np.flatnonzero(overlap[p]).tolist():
+            if paths[q].movement.origin == path.movement.origin:
+                continue
+            touched = _touched(swept[q], bodies)
+            if touched is not None:
+                enter[p, q], leave[p, q] = s[touched[0]], s[touched[1]]
+    both = np.isfinite(enter) & np.isfinite(enter.T)
+    for array in (enter, leave):
+        array[~both] = np.nan
+        array.setflags(write=False)
+    return Areas(enter, leave)
+
+
+def _touched(area: shapely.Geometry, bodies: npt.NDArray[Any]) -> tuple[int, int] | None:
+    """Indices of the first and last body, in order along a path, that reach into the area."""
+    coarse = np.flatnonzero(shapely.intersects(area, bodies[::COARSE])) * COARSE
+    if not len(coarse):
+        return None
+    first, last = int(coarse[0]), int(coarse[-1])
+    near = np.r_[max(first - COARSE, 0) : first + 1, last : min(last + COARSE, len(bodies))]
+    hits = near[shapely.intersects(area, bodies[near])]
+    return int(hits[0]), int(hits[-1])
+
+
+def _inside(path: Path, vehicle: VehicleType) -> shapely.Geometry:
+    """The corridor up to the exit line; on the exit lane, vehicles follow each other."""
+    heading = path.heading_out
+    across = np.array([-heading[1], heading[0]])
+    start, far = path.points[-1], 1000.0
+    beyond = shapely.polygons(
+        [start + far * (i * across + k * heading) for i, k in ((1, 0), (1, 1), (-1, 1), (-1, 0))]
+    )
+    inside: shapely.Geometry = shapely.difference(path.corridor(vehicle), beyond)
+    return inside
+
+
+def _rows(frame: pd.DataFrame, site: Site) -> Rows:
+    instance("site", site, Site)
+    check_trajectories(frame)
+    time = frame[TIME].to_numpy(dtype=float)
+    vehicle = frame[VEHICLE].to_numpy(dtype=np.int64)
+    order = np.lexsort((vehicle, time))
+    time = time[order]
+    s = frame[S].to_numpy(dtype=float)[order]
+    movement = movement_index(frame, site)[order]
+    entries = np.array([path.entry for path in site.intersection.paths])
+    released = frame[RIGHT_OF_WAY].to_numpy(dtype=bool)[order]
+    return Rows(
+        time=time,
+        step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
+        vehicle=vehicle[order],
+        movement=movement,
+        s=s,
+        v=frame[SPEED].to_numpy(dtype=float)[order],
+        goes=released | (s >= entries[movement]),
+    )
+
+
+def _following(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
+    in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
+    follower, leader, gap = (np.concatenate(both) for both in zip(in_lane, to_exit, strict=True))
+    closing = rows.v[follower] - rows.v[leader]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
+        drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
+    return {
+        "time_s": rows.time[follower],
+        "follower": rows.vehicle[follower],
+        "leader": rows.vehicle[leader],
+        "gap_m": gap,
+        "closing_mps": closing,
+        "ttc_s": ttc,
+        "drac_mps2": drac,
+    }
+
+
+def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
+    """Row pairs of follower and the nearest one ahead in its lane that is in its way; gaps [m]."""
+    n = site.intersection.n
+    branch = site.intersection.branch(site.vehicle)
+    lane = rows.movement // (n - 1)
+    order = np.lexsort((-rows.s, lane, rows.step))
+    group = (rows.step * n + lane)[order]
+    rear = rows.s - site.vehicle.length
+    followers, leaders = [], []
+    pending, back = np.arange(len(order)), 1
+    while len(pending := pending[pending >= back]):
+        pending = pending[group[pending - back] == group[pending]]
+        follower, leader = order[pending], order[pending - back]
+        in_way = rear[leader] < branch[rows.movement[leader], rows.movement[follower]]
+        followers.append(follower[in_way])
+        leaders.append(leader[in_way])
+        pending, back = pending[~in_way], back + 1
+    follower, leader = _join(followers), _join(leaders)
+    return follower, leader, rear[leader] - rows.s[follower]
+
+
+def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
+    """Row pairs in and past the junction: the next one before it on the way to its exit lane.
+
+    Only those from another arm, for the others are leaders in the lane; and only where a gap is
+    left, for two bodies side by side are no followers yet.
+    """
+    paths = site.intersection.paths
+    origin = np.array([path.movement.origin for path in paths])[rows.movement]
+    exit_arm = np.array([path.exit_arm for path in paths])[rows.movement]
+    ends = np.array([(path.entry, path.exit) for path in paths])[rows.movement]
+    inside = np.flatnonzero(rows.s >= ends[:, 0])
+    past = rows.s - ends[:, 1]
+    order = inside[np.lexsort((-past[inside], exit_arm[inside], rows.step[inside]))]
+    follower, leader = order[1:], order[:-1]
+    gap = past[leader] - site.vehicle.length - past[follower]
+    pairs = (
+        (rows.step[follower] == rows.step[leader])
+        & (exit_arm[follower] == exit_arm[leader])
+        & (origin[follower] != origin[leader])
+        & (gap > 0.0)
+    )
+    return follower[pairs], leader[pairs], gap[pairs]
+
+
+def _encroachments(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
+    areas = conflict_areas(site.intersection, site.vehicle)
+    vehicle, movement, enter, leave = _passages(rows, areas)
+    by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
+    times, firsts, seconds, pets = [], [], [], []
+    for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
+        who = np.concatenate([by_movement[p], by_movement[q]])
+        other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
+        start, end = enter[who, other], leave[who, other]
+        order = np.argsort(start, kind="stable")
+        order = order[np.isfinite(start[order])]
+        first, second = order[:-1], order[1:]
+        changes = other[first] != other[second]
+        first, second = first[changes], second[changes]
+        times.append(start[second])
+        firsts.append(vehicle[who[first]])
+        seconds.append(vehicle[who[second]])
+        pets.append(start[second] - end[first])
+    time = _join(times, np.float64)
+    order = np.argsort(time, kind="stable")
+    return {
+        "time_s": time[order],
+        "first": _join(firsts)[order],
+        "second": _join(seconds)[order],
+        "pet_s": _join(pets, np.float64)[order],
+    }
+
+
+def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
+    """Each vehicle's id and movement (k,), and when it enters and leaves the areas (k, m) [s]."""
+    if not len(rows.time):
+        empty = np.empty((0, len(areas.enter)))
+        return np.empty(0, np.int64), np.empty(0, np.int64), empty, empty
+    order = np.lexsort((rows.time, rows.vehicle))
+    vehicle, first, code = np.unique(rows.vehicle[order], return_index=True, return_inverse=True)
+    s, movement = rows.s[order], rows.movement[order][first]
+    last = np.append(first[1:], len(order)) - 1
+    here = code * _FAR + s
+
+    def when(place: Floats) -> Floats:
+        """Time at which each vehicle's front passes its places (k, m)."""
+        known = np.minimum(place, s[last, None])
+        query = np.arange(len(vehicle))[:, None] * _FAR + known
+        return np.asarray(np.interp(query, here, rows.time[order]))
+
+    enter, leave = areas.enter[movement], areas.leave[movement]
+    seen = (enter >= s[first, None]) & (enter <= s[last, None])
+    return vehicle, movement, np.where(seen, when(enter), np.nan), when(leave)
+
+
+def _crossings(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
+    areas = conflict_areas(site.intersection, site.vehicle)
+    clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
+    going = np.flatnonzero(rows.goes & (rows.s < clear[rows.movement]))
+    firsts, seconds, ttcs = [], [], []
+    pending, ahead = np.arange(len(going)), 1
+    while len(pending := pending[pending + ahead < len(going)]):
+        pending = pending[rows.step[going[pending]] == rows.step[going[pending + ahead]]]
+        a, b = going[pending], going[pending + ahead]
+        p, q = rows.movement[a], rows.movement[b]
+        meet = np.isfinite(areas.enter[p, q])
+        a, b, p, q = a[meet], b[meet], p[meet], q[meet]
+        a_in, a_out = _times(rows, a, areas.enter[p, q]), _times(rows, a, areas.leave[p, q])
+        b_in, b_out = _times(rows, b, areas.enter[q, p]), _times(rows, b, areas.leave[q, p])
+        a_first = a_in <= b_in
+        late = np.where(a_first, b_in, a_in)
+        free = np.where(a_first, a_out, b_out)
+        course = (late > 0.0) & (late < free)
+        firsts.append(np.where(a_first, a, b)[course])
+        seconds.append(np.where(a_first, b, a)[course])
+        ttcs.append(late[course])
+        ahead += 1
+    first, second = _join(firsts), _join(seconds)
+    return {
+        "time_s": rows.time[first],
+        "first": rows.vehicle[first],
+        "second": rows.vehicle[second],
+        "ttc_s": _join(ttcs, np.float64),
+    }
+
+
+def _times(rows: Rows, who: Ints, place: Floats) -> Floats:
+    """Time until the fronts pass `place` at their present speeds [s]; 0 where they have."""
+    distance = place - rows.s[who]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(distance <= 0.0, 0.0, distance / rows.v[who])
+
+
+def _join(parts: list[npt.NDArray[Any]], dtype: type = np.int64) -> npt.NDArray[Any]:
+    return np.concatenate([np.empty(0, dtype), *parts])
+
+
+def _smallest(values: Floats) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(values.min()) if len(values) else None
+
+
+def _largest(values: Floats) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(values.max()) if len(values) else None
+
+
+def _frame(columns: dict[str, npt.NDArray[Any]]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.DataFrame(columns)

@@ -1,0 +1,231 @@
+"""Trajectories and trips on disk: column names, and writers that never leave half a file.
+
+A writer writes beside its target and then renames, so a reader sees the old file or the whole
+new one, whatever happens in between.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from minisim.control import Site
+from minisim.errors import FileError, InputError, MissingExtraError, choice, instance
+from minisim.junction.geometry import ARM_NAMES, Floats, Movement
+from minisim.results.trips import TRIP_COLUMNS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns of `run.trajectories`, one row a vehicle and step, sorted by time, then vehicle.
+TIME: Final = "time_s"
+VEHICLE: Final = "vehicle"
+LANE: Final = "lane"
+MANOEUVRE: Final = "manoeuvre"
+S: Final = "s_m"
+X: Final = "x_m"
+Y: Final = "y_m"
+ANGLE: Final = "angle_deg"
+SPEED: Final = "speed_mps"
+ACCELERATION: Final = "acceleration_mps2"
+RIGHT_OF_WAY: Final = "right_of_way"
+
+TRAJECTORY_COLUMNS: Final = (
+    "time_s",
+    "vehicle",
+    "lane",
+    "manoeuvre",
+    "s_m",
+    "x_m",
+    "y_m",
+    "angle_deg",
+    "speed_mps",
+    "acceleration_mps2",
+    "right_of_way",
+)
+
+#: Decimals in CSV: micrometres and microseconds, and 0.3 instead of 0.30000000000000004.
+CSV_DECIMALS: Final = 6
+
+_FCD_HEAD: Final = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<fcd-export xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" '
+    'xsi:noNamespaceSchemaLocation="http://sumo.dlr.de/xsd/fcd_file.xsd">\n'
+)
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path beside `path` to write to, and put it in place at the end.
+
+    When the block raises, `path` stays as it was and the temporary file goes.
+
+    Raises:
+        FileError: the folder cannot be written, or `path` is no ordinary file.
+    """
+    target = _target(path)
+    temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
+    try:
+        try:
+            yield temporary
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write `run.trajectories` as CSV or Parquet, by the suffix of `path`.
+
+    Raises:
+        InputError: a column is missing, or another suffix.
+        MissingExtraError: Parquet without pyarrow.
+        FileError: the file cannot be written; nothing is left behind.
+    """
+    check_trajectories(frame)
+    write_table(frame, path)
+
+
+def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write `run.trips` as CSV or Parquet; raises as `write_trajectories`.
+
+    What is not known of an unfinished trip is an empty cell.
+    """
+    _check_columns(frame, TRIP_COLUMNS)
+    write_table(frame, path)
+
+
+def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> None:
+    """Write `run.trajectories` as SUMO floating-car data (fcd-export), which SUMO's tools read.
+
+    As SUMO has it: x, y are the middle of the front bumper [m], the angle is in degrees clockwise
+    from north, `pos` is the front bumper's distance from the start of its lane [m]. Lanes are
+    named `a_in_0` (approach), `:C_a1_0` (inside the junction, by movement) and `b_out_0` (exit).
+
+    Raises:
+        InputError: a column is missing, or a movement that the site does not have.
+        FileError: the file cannot be written; nothing is left behind.
+    """
+    instance("site", site, Site)
+    check_trajectories(frame)
+    movement = movement_index(frame, site)
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        file.write(_FCD_HEAD)
+        file.writelines(_fcd_lines(frame, site, movement))
+        file.write("</fcd-export>\n")
+
+
+def check_trajectories(frame: pd.DataFrame) -> None:
+    """Raise `InputError` unless `frame` is a DataFrame with all `TRAJECTORY_COLUMNS`."""
+    _check_columns(frame, TRAJECTORY_COLUMNS)
+
+
+def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
+    """Each row's movement as an index into `site.intersection.movements`, shape (rows,).
+
+    Raises:
+        InputError: a lane or manoeuvre that the site does not have.
+    """
+    n = site.intersection.n
+    codes, names = frame[LANE].factorize()
+    known = dict(zip(ARM_NAMES[:n], range(n), strict=True))
+    indices = np.array([known.get(str(name), -1) for name in names], dtype=np.int64)
+    if len(frame) and (codes.min() < 0 or indices.min() < 0):
+        unknown = [str(name) for name in names if str(name) not in known] or ["(missing)"]
+        raise InputError(f"lane {unknown[0]} is not in the geometry (a … {ARM_NAMES[n - 1]})")
+    manoeuvre = frame[MANOEUVRE].to_numpy(dtype=np.int64)
+    outside = (manoeuvre < 1) | (manoeuvre >= n)
+    if outside.any():
+        raise InputError(
+            f"manoeuvre {manoeuvre[outside][0]} does not exist with {n} arms (1 … {n - 1})"
+        )
+    lane = indices[codes] if len(frame) else np.empty(0, dtype=np.int64)
+    return np.asarray(lane * (n - 1) + manoeuvre - 1, dtype=np.int64)
+
+
+def _target(path: str | os.PathLike[str]) -> Path:
+    """The file that `path` names, through symbolic links; raises `FileError`."""
+    instance("output file", path, (str, os.PathLike))
+    try:
+        target = Path(path).resolve()
+        ordinary = target.is_file() or not target.exists()
+    except (OSError, ValueError, RuntimeError) as error:  # a loop of links, a NUL in the name
+        raise FileError(f"cannot write {os.fspath(path)!r}: {error}") from error
+    if not ordinary:
+        raise FileError(f"cannot write {path}: it is not an ordinary file")
+    return target
+
+
+def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
+    import pandas as pd
+
+    instance("frame", frame, pd.DataFrame)
+    missing = [column for column in columns if column not in frame.columns]
+    if missing:
+        raise InputError(f"the frame has no column {', '.join(missing)}")
+
+
+def write_table(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write a table as CSV or Parquet, by the suffix of `path`; raises as `write_trajectories`."""
+    instance("output file", path, (str, os.PathLike))
+    writers: dict[str, Callable[[Path], None]] = {
+        ".csv": lambda file: frame.round(CSV_DECIMALS).to_csv(
+            file, index=False, lineterminator="\n"
+        ),
+        ".parquet": lambda file: frame.to_parquet(file, index=False, engine="pyarrow"),
+    }
+    suffix = choice(f"suffix of {os.fspath(path)}:", Path(path).suffix.lower(), writers)
+    if suffix == ".parquet" and importlib.util.find_spec("pyarrow") is None:
+        raise MissingExtraError(
+            "Parquet needs pyarrow: pip install 'minisim[parquet]' (or write .csv)"
+        )
+    with replacing(path) as temporary:
+        writers[suffix](temporary)
+
+
+def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64]) -> Iterator[str]:
+    """The timesteps, one string a step; rows are sorted by time."""
+    names, positions = _sumo_lanes(frame[S].to_numpy(dtype=float), movement, site)
+    # Rounded as they are printed, so that 359.999 becomes 0.00 and −0.001 does not become −0.00.
+    numbers = [frame[c].to_numpy(dtype=float).round(2) + 0.0 for c in (X, Y, ANGLE, SPEED)]
+    numbers[2] %= 360.0
+    columns = [c.tolist() for c in (*numbers, positions)]
+    times, vehicles = frame[TIME].tolist(), frame[VEHICLE].tolist()
+    now: float | None = None
+    for time, vehicle, x, y, angle, speed, pos, lane in zip(
+        times, vehicles, *columns, names, strict=True
+    ):
+        if time != now:
+            closing = "" if now is None else "    </timestep>\n"
+            yield f'{closing}    <timestep time="{time:.3f}">\n'
+            now = time
+        yield (
+            f'        <vehicle id="{vehicle}" x="{x:.2f}" y="{y:.2f}" angle="{angle:.2f}" '
+            f'type="car" speed="{speed:.2f}" pos="{pos:.2f}" lane="{lane}" slope="0.00"/>\n'
+        )
+    if now is not None:
+        yield "    </timestep>\n"
+
+
+def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple[list[str], Floats]:
+    """Each row's lane in SUMO's style and the position on it [m]."""
+    paths = site.intersection.paths
+    names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
+    starts = np.array([(0.0, p.entry, p.exit) for p in paths])
+    section = (s[:, None] >= starts[movement, 1:]).sum(axis=1)
+    return names[movement, section].tolist(), s - starts[movement, section]
+
+
+def lane_names(movement: Movement, exit_arm: int) -> tuple[str, str, str]:
+    """Names of a movement's approach lane, its way through the junction and its exit lane."""
+    approach, leave = ARM_NAMES[movement.origin], ARM_NAMES[exit_arm]
+    return f"{approach}_in_0", f":C_{movement}_0", f"{leave}_out_0"

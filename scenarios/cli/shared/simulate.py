@@ -1,0 +1,39 @@
+"""Runs with a progress bar."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from scenarios.cli.shared.terminal import bar
+
+if TYPE_CHECKING:
+    from minisim.results.run import Run
+    from scenarios.scenario import Scenario
+
+
+def simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
+    """Run with a progress bar: in parts, which changes nothing in the result."""
+    from minisim.simulation import Simulation
+
+    simulation = Simulation(scenario, controller, seed=seed, **options)
+    parts = 100
+    with bar("simulating") as progress:
+        for part in range(1, parts + 1):
+            simulation.advance(scenario.horizon * part / parts)
+            progress(part, parts)
+    return simulation.run()
+
+
+def simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
+    """The same in SUMO."""
+    from minisim.sumo import simulate as sumo_simulate
+
+    try:
+        with bar("simulating in SUMO") as progress:
+            return sumo_simulate(scenario, controller, seed, progress=progress, **options)
+    except (KeyboardInterrupt, SystemExit) as end:
+        for note in getattr(end, "__notes__", ()):
+            typer.echo(f"minisim: {note}", err=True)
+        raise

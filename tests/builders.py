@@ -1,0 +1,239 @@
+"""Builders that many tests share: runs, views made by hand, rows without a run, examples."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+import os
+import signal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hypothesis import settings
+
+from dim import NoisyPerception
+from dim.senses.tally import Tallied
+from minisim.arrivals import Arrivals
+from minisim.control import (
+    Command,
+    Controller,
+    Observed,
+    Plan,
+    Session,
+    Site,
+    Unregulated,
+    View,
+    Wake,
+)
+from minisim.junction.geometry import ARM_NAMES
+from minisim.results.run import Run
+from minisim.testing import SmallScenario
+from scenarios import Scenario
+from scenarios.scenario import AS_RUN
+from scenarios.sweep.experiment import Experiment
+
+
+def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
+    """The scenario with exactly these (demand time, lane, manoeuvre) and this horizon [s]."""
+    time, lane, manoeuvre = (list(column) for column in zip(*trips, strict=True))
+    recorded = Arrivals(np.array(time, float), np.array(lane, int), np.array(manoeuvre, int))
+    return dataclasses.replace(scenario, recorded=recorded, horizon=horizon)
+
+
+def drained(scenario: Scenario, seed: int, horizon: float) -> Scenario:
+    """The scenario's own arrivals of one seed, with time until `horizon` to serve them all."""
+    arrivals = scenario.arrivals(seed)
+    return dataclasses.replace(scenario, recorded=arrivals, horizon=horizon)
+
+
+def digest(run: Run) -> str:
+    """A hash of every byte of a run's trips and recording."""
+    state = hashlib.sha256()
+    for column in run.columns:
+        state.update(np.ascontiguousarray(column).tobytes())
+    state.update(run.trace.tobytes())
+    state.update(repr(run.collisions).encode())
+    return state.hexdigest()
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A controller that carries out the same plan and commands in every run.
+
+    Attributes:
+        plan: of its session.
+        first: its commands at time 0; none later.
+    """
+
+    plan: Plan = field(default_factory=Plan)
+    first: tuple[Command, ...] = ()
+    name: str = "fixed"
+
+    def start(self, site: Site) -> Session:
+        return _FixedSession(self.plan, self.first)
+
+
+class _FixedSession:
+    def __init__(self, plan: Plan, first: tuple[Command, ...]) -> None:
+        self.plan = plan
+        self.first = first
+
+    def decide(self, view: View) -> Iterable[Command]:
+        commands, self.first = self.first, ()
+        return commands
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """A controller that kills its process, as a bug in compiled code or a lack of memory would.
+
+    Attributes:
+        once: a file: where it is, the controller does nothing; it is made before the kill.
+            Empty kills every time.
+    """
+
+    once: str = ""
+    name: str = "deadly"
+
+    def start(self, site: Site) -> Session:
+        """Kill, or begin a run in which everyone may go (of a scenario without vehicles)."""
+        if not self.once or not Path(self.once).exists():
+            if self.once:
+                Path(self.once).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Unregulated().start(site)
+
+
+def as_run(scenario: SmallScenario) -> SmallScenario:
+    """The same with the vehicle of the published runs, inserted at rest, and steps of 0.02 s."""
+    return dataclasses.replace(scenario, vehicle=AS_RUN.vehicle, dt=0.02, depart_speed=0.0)
+
+
+def killing(once: str) -> int:
+    """A task that kills its process as `Deadly` does: "always", never (""), or where no file is."""
+    if once and not Path(once).exists():
+        if once != "always":
+            Path(once).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 7
+
+
+def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0) -> Observed:
+    """One vehicle of 5 m."""
+    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+
+
+def said(commands: Iterable[Command]) -> list[str]:
+    """Commands in words; as a reader would say it."""
+    return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
+
+
+def show(session: Session, time: float, *vehicles: Observed) -> list[str]:
+    """The answer to a view, but for its wake-ups."""
+    answer = session.decide(View(time, vehicles))
+    return said(command for command in answer if not isinstance(command, Wake))
+
+
+def drive(
+    controller: Controller,
+    site: Site,
+    until: float,
+    vehicles: Callable[[float], tuple[Observed, ...]] = lambda time: (),
+) -> dict[float, list[str]]:
+    """Commands by time of a session that a host wakes when it asked for it, and then only."""
+    session = controller.start(site)
+    answers: dict[float, list[str]] = {}
+    tick = 0
+    while tick * site.dt < until:
+        time = round(tick * site.dt, 6)
+        commands = list(session.decide(View(time, vehicles(time))))
+        (wake,) = [c for c in commands if isinstance(c, Wake)]
+        answers[time] = said(c for c in commands if c is not wake)
+        tick, before = math.ceil(wake.time / site.dt - 1e-6), tick
+        assert tick > before
+    return {time: commands for time, commands in answers.items() if commands}
+
+
+#: Label -> waiting at low demand [s] and capacity on four arms [veh/h/lane].
+CURVES = {
+    "dim": (0.6, 380.0), "dim-harmonious": (0.4, 520.0),
+    "dim-rotating": (0.6, 380.0), "dim-waiting": (0.6, 380.0),
+    "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
+    "all-way-stop": (1.5, 550.0),
+    "reservation": (0.3, 600.0), "longest-queue": (4.0, 460.0),
+}  # fmt: skip
+
+
+def capacity_of(label: str, arms: int) -> float:
+    """The capacity that is built into the rows [veh/h/lane]."""
+    return CURVES[label][1] * 4.0 / arms
+
+
+def synthetic_row(experiment: Experiment) -> dict[str, Any]:
+    """A queue of the M/M/1 kind, with a little noise from the seed."""
+    arms, density = experiment.scenario.intersection.n, experiment.scenario.density
+    horizon = experiment.scenario.horizon
+    # The studies of perception name what errs, not a series; that of humans their share.
+    label, _, share = (experiment.label or "dim").partition("-humans-")
+    base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
+    load = density / capacity_of(label, arms)
+    wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
+    waiting = wobble * base / max(1.0 - load, 0.02)
+    trips = int(density * arms * horizon / 3600.0)
+    excess = max(0.0, 1.0 - 1.0 / load) * trips / 2.0
+    lanes = {
+        f"lanes_{lane}_{key}": value
+        for i, lane in enumerate(ARM_NAMES[:arms])
+        for key, value in {
+            "trips": trips // arms,
+            "queue_growth": excess / arms,
+            "waiting_time_s": waiting * (i + 1) / arms,
+            "complete_waiting_time_s": waiting * (i + 1) / arms,
+        }.items()
+    }
+    times = {
+        "waiting_time_s": waiting,
+        "travel_time_s": 70.0 + 1.5 * waiting,
+        "time_loss_s": 3.0 + 1.5 * waiting,
+        "depart_delay_s": 10.0 * max(load - 1.0, 0.0),
+    }
+    groups = ("human", "automated") if share else ()
+    return {
+        **{
+            f"{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+            for k, group in enumerate(groups)
+            for key, value in times.items()
+        },
+        **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
+        **{f"complete_{key}": value for key, value in times.items()},
+        **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
+        "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
+    }  # fmt: skip
+
+
+def tally(experiment: Experiment, trips: int) -> dict[str, float]:
+    """Counts of `dim.senses.tally`, in proportion to the intent errors; none where none errs."""
+    controller = experiment.controller
+    if not isinstance(controller, Tallied):
+        return {}
+    perception = controller.dim.perception
+    assert isinstance(perception, NoisyPerception)
+    errors = max(perception.intent_error, *perception.unsignalled)
+    return {
+        "collisions": int(errors * 40), "crossings": trips - 9, "false_grants": int(errors * 300),
+        "disagreement_s": 400.0 * errors, "deadlock_s": 0.0 if perception.shared else 50.0,
+    }  # fmt: skip
+
+
+def synthetic_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    """A store that holds everything."""
+    return [synthetic_row(experiment) for experiment in experiments]
+
+
+def share(part: float) -> settings:
+    """Decorator: only this share of the profile's examples, for costly properties."""
+    return settings(max_examples=max(1, round(part * settings().max_examples)))

@@ -1,0 +1,163 @@
+"""The actuated signal: where its loops are, which gap ends a green, and when."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import minisim
+from baselines import Actuated, Adaptive
+from baselines.signals.actuated import GapRule
+from baselines.signals.phases import Verdict
+from minisim.control import Observed, View
+from minisim.errors import InputError
+from minisim.testing import small_scenario
+from scenarios.library import four_way
+from scenarios.scenario import AS_RUN_SIGNALS
+from tests.builders import drive, seen
+
+SITE = four_way(profile="fair").site()
+#: (3/1.9 + 0.5) places of 7.5 m: nearer than two seconds at 14 m/s.
+LOOP = 15.592105
+
+
+def verdict(left: float | None, elapsed: float, *now: Observed, **more: Any) -> Verdict:
+    """Of lane a's phase at 1000 s, when somebody left its loop `left` seconds ago, or nobody."""
+    rule = GapRule(Actuated(**more), SITE)
+    if left is not None:
+        rule.see(View(1000.0 - left, (seen(1, 0, 2, LOOP - 5.1, 10.0),)))
+    view = View(1000.0, now)
+    rule.see(view)
+    return rule.judge(view, 0, elapsed)
+
+
+PASS_ON = Verdict(1, 0.0)
+
+
+# The loop.
+
+
+def test_the_loop_is_two_seconds_before_the_line_or_nearer() -> None:
+    """Where those between it and the line could not all leave in the shortest green."""
+    assert Actuated().detector(SITE) == pytest.approx(LOOP)
+    assert Actuated(min_green=10.0).detector(SITE) == pytest.approx(28.0)
+    short = small_scenario(4, arm_length=30.0).site(0)
+    length = short.intersection.approach_length
+    assert Actuated(min_green=30.0, detector_gap=20.0).detector(short) == pytest.approx(length)
+
+
+def test_it_is_woken_when_a_rear_bumper_leaves_the_loop() -> None:
+    plan = Actuated().start(SITE).plan
+    assert plan.marks == pytest.approx((LOOP - SITE.vehicle.length,))
+    assert plan.sight > LOOP
+
+
+def test_a_vehicle_leaves_the_loop_once() -> None:
+    rule = GapRule(Actuated(), SITE)
+    gone = seen(1, 0, 2, 10.0, 10.0)
+    for time in (10.0, 11.0, 12.0):
+        rule.see(View(time, (gone,)))
+    assert rule.judge(View(12.9, ()), 0, 3.0) == (0, 1.0)  # 2.9 s
+    assert rule.judge(View(13.0, ()), 0, 3.0) == PASS_ON  # 3 s
+
+
+def test_other_lanes_do_not_prolong() -> None:
+    assert verdict(None, 3.0, seen(2, 1, 1, LOOP - 1.0, 10.0)) == PASS_ON
+
+
+# The rule.
+
+
+def test_a_gap_of_three_seconds_ends_the_green() -> None:
+    assert verdict(2.99, 5.0).lane == 0
+    assert verdict(3.0, 5.0) == PASS_ON
+    assert verdict(None, 5.0) == PASS_ON
+    assert verdict(3.0, 5.0, max_gap=4.0).lane == 0
+
+
+@pytest.mark.parametrize(
+    ("left", "elapsed", "end"),
+    [
+        (0.0, 3.0, 5.0),  # two seconds to the line
+        (0.7, 5.0, 7.0),  # 1.3 s, up to a whole second of the phase
+        (1.0, 5.0, 6.0),
+        (2.5, 5.0, 6.0),  # already over the line: one step, up to a whole second
+        (0.5, 49.0, 50.0),  # not beyond the longest
+    ],
+)
+def test_a_green_goes_on_until_the_last_vehicle_is_over_the_line(
+    left: float, elapsed: float, end: float
+) -> None:
+    lane, after = verdict(left, elapsed)
+    assert lane == 0
+    assert elapsed + after == pytest.approx(end)
+
+
+def test_nobody_prolongs_beyond_the_longest_green() -> None:
+    on_loop = seen(2, 0, 1, LOOP - 1.0)
+    assert verdict(None, 49.5, on_loop).after == pytest.approx(0.5)
+    assert verdict(None, 50.0, on_loop) == PASS_ON
+
+
+def test_who_stands_on_the_loop_leaves_no_gap() -> None:
+    for distance in (LOOP - 0.1, LOOP - 4.9):
+        assert verdict(100.0, 5.0, seen(2, 0, 1, distance)) == (0, 2.0)
+    for distance in (LOOP + 0.1, LOOP - 5.1):
+        found = verdict(100.0, 5.0, seen(2, 0, 1, distance))
+        assert found == (PASS_ON if distance > LOOP else (0, 2.0))
+
+
+def test_the_greens_come_in_the_given_order() -> None:
+    rule = GapRule(Actuated(order=(2, 1, 0, 3)), SITE)
+    assert [rule.judge(View(0.0, ()), k, 3.0).lane for k in (2, 1, 0, 3)] == [1, 0, 3, 2]
+
+
+# Whole signals.
+
+
+def test_on_an_empty_junction_every_green_is_the_shortest() -> None:
+    assert drive(Actuated(), SITE, 18.0) == {
+        0: ["Open 0"], 3: ["Close 0"], 5: ["Open 1"], 8: ["Close 1"], 10: ["Open 2"],
+        13: ["Close 2"], 15: ["Open 3"],
+    }  # fmt: skip
+
+
+def test_it_waits_longer_than_the_adaptive_signal_where_one_lane_has_most() -> None:
+    """What "ATS declines" at 4:3:2:1 hangs on (as published: 5.9 to 7.9 s)."""
+    scenario = four_way(350, profile=AS_RUN_SIGNALS, split=(4, 3, 2, 1))
+    actuated, adaptive = (
+        minisim.simulate(scenario, signal, seed=1).summary()["waiting_time_s"]
+        for signal in (Actuated(), Adaptive())
+    )
+    assert actuated > 1.1 * adaptive
+
+
+def test_short_roads_serve_everybody() -> None:
+    scenario = small_scenario(4, arm_length=30.0, density=200.0, demand_time=200.0, drain=400.0)
+    signal = Actuated(min_green=10.0, detector_gap=10.0)
+    assert minisim.simulate(scenario, signal, seed=1).summary()["unfinished"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"max_gap": -1.0}, "max_gap"),
+        ({"detector_gap": 0.0}, "detector_gap"),
+        ({"passing_time": 0.0}, "passing_time"),
+        ({"min_green": math.nan}, "min_green"),
+        ({"min_green": 20.0, "max_green": 10.0}, "max_green must be at least min_green, 20 s"),
+        ({"amber": -1.0}, "amber"),
+        ({"order": 5}, "order must be a sequence of lanes"),
+        ({"name": None}, "name"),
+    ],
+)
+def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Actuated(**arguments)
+
+
+def test_an_order_that_does_not_fit_the_junction_is_refused() -> None:
+    with pytest.raises(InputError, match="order must be the lanes 0 … 3"):
+        Actuated(order=(0, 1, 1, 3)).start(SITE)

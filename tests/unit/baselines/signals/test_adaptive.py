@@ -1,0 +1,243 @@
+"""The adaptive signal: when a green is prolonged, when it ends, and what it costs to know."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import minisim
+from baselines import Adaptive, FixedTime
+from baselines.signals.adaptive import DelayRule, time_loss
+from baselines.signals.phases import PhaseSession, Verdict
+from minisim.control import Observed, View
+from minisim.errors import InputError
+from minisim.testing import small_scenario
+from scenarios.library import four_way
+from tests.builders import drive, replayed, seen, show
+
+SITE = four_way(profile="fair").site()
+LIMIT = 14.0
+#: Far away on lane b: it keeps a green of another lane from going on for want of anybody else.
+OTHER = seen(99, 1, 1, 80.0, 14.0)
+
+
+def verdict(
+    *vehicles: Observed, elapsed: float, lost: float = 2.0, signal: Adaptive | None = None
+) -> Verdict:
+    """Of lane a's phase; everybody came onto a detector so that `lost` seconds are lost by now."""
+    rule = DelayRule(signal or Adaptive(), SITE)
+    now = 1000.0
+    for v in vehicles:
+        since = lost + (100.0 - v.distance) / LIMIT
+        rule.see(View(now - since, (v._replace(distance=100.0),)))
+    return rule.judge(View(now, vehicles), 0, elapsed)
+
+
+PASS_ON = Verdict(1, 0.0)
+
+
+# Time loss.
+
+
+def test_time_loss_is_the_integral_of_its_definition() -> None:
+    dt = 0.001
+    time = np.arange(0.0, 20.0, dt)
+    speed = np.clip(14.0 - 1.4 * time, 0.0, None) + np.clip(2.0 * (time - 12.0), 0.0, 9.0)
+    loss = float(np.sum(1.0 - speed / LIMIT) * dt)
+    driven = float(np.sum(speed) * dt)
+    assert time_loss(5.0, 100.0, 25.0, 100.0 - driven, LIMIT) == pytest.approx(loss, abs=1e-9)
+    assert time_loss(5.0, 100.0, 5.0 + 50.0 / LIMIT, 50.0, LIMIT) == pytest.approx(0.0)
+
+
+def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
+    # One vehicle meets a red light: what it has lost by the time when it stands.
+    watched: list[tuple[float, float]] = []
+
+    class Watching(DelayRule):
+        def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
+            for v in view.vehicles:
+                if v.id in self._entered:
+                    entered = self._entered[v.id]
+                    watched.append((view.time, time_loss(*entered, view.time, v.distance, LIMIT)))
+            return Verdict(3, 0.1)
+
+    class Red:
+        name = "red"
+
+        def start(self, site: Any) -> PhaseSession:
+            return PhaseSession(
+                site, Watching(Adaptive(), site), detector_range=100.0, marks=(100.0,),
+                min_green=0.5, amber=0.0,
+            )  # fmt: skip
+
+    run = minisim.simulate(
+        replayed(four_way(profile="fair"), (0.0, 0, 2), horizon=60.0), Red(), record="all"
+    )
+    (loss,) = run.columns.time_loss.tolist()
+    assert watched[-1][0] > 59.0
+    # Its table counts from insertion on, but nothing was lost before the detector.
+    assert watched[-1][1] == pytest.approx(loss, abs=0.1)
+    assert loss > 20.0
+
+
+# The rule.
+
+
+def test_a_delayed_vehicle_prolongs_by_the_time_to_the_line_at_the_limit() -> None:
+    assert verdict(seen(1, 0, 2, 70.0, 5.0), OTHER, elapsed=10.0) == (0, 70.0 / LIMIT)
+
+
+def test_the_last_of_several_counts() -> None:
+    queue = [seen(1, 0, 2, 0.3), seen(2, 0, 1, 28.0), seen(3, 0, 3, 56.0)]
+    assert verdict(*queue, OTHER, elapsed=10.0) == (0, 56.0 / LIMIT)
+
+
+@pytest.mark.parametrize(("lost", "prolonged"), [(0.99, False), (1.01, True)])
+def test_who_lost_a_second_at_most_prolongs_nothing(lost: float, prolonged: bool) -> None:
+    found = verdict(seen(1, 0, 2, 70.0, 14.0), OTHER, elapsed=10.0, lost=lost)
+    assert (found != PASS_ON) is prolonged
+
+
+def test_who_has_passed_the_line_prolongs_nothing() -> None:
+    assert verdict(seen(1, 0, 2, 0.0, 5.0), OTHER, elapsed=10.0) == PASS_ON
+    assert verdict(seen(1, 0, 2, -3.0, 5.0), OTHER, elapsed=10.0) == PASS_ON
+
+
+def test_who_cannot_pass_before_the_longest_green_prolongs_nothing() -> None:
+    # 56 m are 4 s, 28 m are 2 s: the second can pass before 50 s, the first cannot.
+    queue = [seen(2, 0, 1, 28.0), seen(3, 0, 3, 56.0)]
+    assert verdict(*queue, OTHER, elapsed=46.5) == (0, 2.0)
+    assert verdict(seen(3, 0, 3, 56.0), OTHER, elapsed=46.5) == PASS_ON
+    assert verdict(seen(3, 0, 3, 56.0), OTHER, elapsed=46.0) == (0, 4.0)
+
+
+def test_vehicles_of_other_lanes_prolong_nothing() -> None:
+    assert verdict(seen(1, 2, 2, 70.0), elapsed=10.0) == PASS_ON
+
+
+def test_the_shortest_green_is_kept() -> None:
+    assert verdict(OTHER, elapsed=1.0) == (0, 2.0)
+    assert verdict(OTHER, elapsed=3.0) == PASS_ON
+
+
+def test_a_green_goes_on_while_nobody_else_is_there() -> None:
+    assert verdict(elapsed=3.0) == (0, 1.0)
+    assert verdict(seen(1, 0, 2, 7.0), elapsed=3.0) == (0, 1.0)
+    assert verdict(seen(1, 0, 2, 70.0), elapsed=3.0) == (0, 5.0)
+    # Somebody beyond the detector is nobody; somebody whose rear is still on his lane is not.
+    assert verdict(seen(1, 1, 2, 100.5), elapsed=3.0) == (0, 1.0)
+    assert verdict(seen(1, 1, 2, -4.9), elapsed=3.0) == PASS_ON
+    assert verdict(seen(1, 1, 2, -5.1), elapsed=3.0) == (0, 1.0)
+
+
+def test_the_longest_green_ends_it_but_for_an_idle_signal_that_may_go_on() -> None:
+    queue = seen(1, 0, 2, 0.1)
+    for_ever = Adaptive(extend_max_green=True)
+    assert verdict(queue, OTHER, elapsed=50.0) == PASS_ON
+    assert verdict(elapsed=50.0) == PASS_ON
+    assert verdict(elapsed=50.0, signal=for_ever) == (0, 1.0)
+    assert verdict(queue, elapsed=60.0, signal=for_ever) == (0, 1.0)
+    assert verdict(queue, OTHER, elapsed=60.0, signal=for_ever) == PASS_ON
+
+
+def test_the_last_lane_is_followed_by_the_first() -> None:
+    rule = DelayRule(Adaptive(), SITE)
+    assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in range(4)] == [1, 2, 3, 0]
+
+
+def test_the_greens_come_in_the_given_order() -> None:
+    rule = DelayRule(Adaptive(order=(2, 1, 0, 3)), SITE)
+    assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in (2, 1, 0, 3)] == [1, 0, 3, 2]
+    answers = drive(Adaptive(order=(2, 1, 0, 3)), SITE, 60.0)
+    assert answers == {0: ["Open 2"], 50: ["Close 2"], 52: ["Open 1"]}
+
+
+# The session.
+
+
+def test_on_an_empty_junction_every_green_lasts_as_long_as_it_may() -> None:
+    """As SUMO's does."""
+    assert drive(Adaptive(), SITE, 170.0) == {
+        0: ["Open 0"], 50: ["Close 0"], 52: ["Open 1"], 102: ["Close 1"], 104: ["Open 2"],
+        154: ["Close 2"], 156: ["Open 3"],
+    }  # fmt: skip
+    assert drive(Adaptive(extend_max_green=True), SITE, 500.0) == {0: ["Open 0"]}
+
+
+def test_with_somebody_on_every_lane_each_has_the_shortest_green_in_turn() -> None:
+    # They come onto their detectors at every moment, so nobody has lost a second.
+    def fresh(time: float) -> tuple[Observed, ...]:
+        return tuple(seen(int(time * 10) * 4 + lane, lane, 1, 90.0, 14.0) for lane in range(4))
+
+    assert drive(Adaptive(), SITE, 22.0, fresh) == {
+        0: ["Open 0"], 3: ["Close 0"], 5: ["Open 1"], 8: ["Close 1"], 10: ["Open 2"],
+        13: ["Close 2"], 15: ["Open 3"], 18: ["Close 3"], 20: ["Open 0"],
+    }  # fmt: skip
+
+
+def test_the_time_of_a_phase_runs_from_the_green_that_is_shown() -> None:
+    session = Adaptive().start(SITE)
+    assert show(session, 0.0, OTHER) == ["Open 0"]
+    crossing = seen(7, 0, 2, -2.0, 0.0)
+    assert show(session, 3.0, crossing, OTHER) == ["Close 0"]
+    # The amber is over, but a2 still stands in the way of b.
+    assert show(session, 5.0, crossing, OTHER) == []
+    assert show(session, 9.0, crossing, OTHER) == []
+    assert show(session, 9.5, OTHER) == ["Open 1"]
+    c = seen(98, 2, 1, 80.0, 14.0)
+    assert show(session, 12.0, c) == []
+    assert show(session, 12.5, c) == ["Close 1"]
+
+
+def test_without_amber_the_next_lane_opens_at_once() -> None:
+    session = Adaptive(amber=0.0).start(SITE)
+    assert show(session, 0.0, OTHER) == ["Open 0"]
+    assert show(session, 3.0, OTHER) == ["Close 0", "Open 1"]
+
+
+def test_it_is_never_called_without_need() -> None:
+    plan = Adaptive().start(SITE).plan
+    assert plan.marks == (100.0,)
+    assert plan.period is None
+
+
+def test_short_roads_are_detectors_as_a_whole() -> None:
+    scenario = small_scenario(4, arm_length=80.0, density=200.0, demand_time=200.0, drain=400.0)
+    assert minisim.simulate(scenario, Adaptive(), seed=1).summary()["unfinished"] == 0
+
+
+def test_it_waits_less_than_the_fixed_time_signal() -> None:
+    scenario = four_way(250, profile="fair", horizon=1800.0)
+    adaptive, fixed = (
+        minisim.simulate(scenario, signal, seed=1).summary()["waiting_time_s"]
+        for signal in (Adaptive(), FixedTime())
+    )
+    assert adaptive < 0.6 * fixed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"detector_range": 0.0}, "detector_range"),
+        ({"detector_range": "100"}, "detector_range"),
+        ({"min_time_loss": -1.0}, "min_time_loss"),
+        ({"min_green": 0.0}, "min_green"),
+        ({"max_green": float("nan")}, "max_green"),
+        ({"min_green": 20.0, "max_green": 10.0}, "max_green must be at least min_green, 20 s"),
+        ({"extend_max_green": 1}, "extend_max_green"),
+        ({"amber": -1.0}, "amber"),
+        ({"name": None}, "name"),
+        ({"order": "abc"}, "order must be a sequence of lanes"),
+        ({"order": (0, 1.5)}, "lane in order"),
+    ],
+)
+def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Adaptive(**arguments)
+
+
+def test_an_order_that_does_not_fit_the_junction_is_refused() -> None:
+    with pytest.raises(InputError, match="order must be the lanes 0 … 3"):
+        Adaptive(order=(0, 1, 2)).start(SITE)

@@ -1,0 +1,116 @@
+"""Longest queue first: who is next, ties, and why no two approaches are green together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import minisim
+from baselines import LongestQueue
+from baselines.signals.longest_queue import QueueRule
+from minisim.control import Observed, View
+from minisim.errors import InputError
+from scenarios.library import four_way, regular
+from tests.builders import drive, seen, show
+
+SITE = four_way(profile="fair").site()
+
+
+def queues(*lengths: int) -> list[Observed]:
+    """So many vehicles standing on each lane."""
+    return [
+        seen(100 * lane + k, lane, 1, 0.25 + 7.5 * k)
+        for lane, length in enumerate(lengths)
+        for k in range(length)
+    ]
+
+
+def choices(*views: tuple[int, list[Observed]]) -> list[int]:
+    """The lanes chosen one after the other; each view with the lane that is green in it."""
+    rule = QueueRule(LongestQueue(), SITE)
+    return [
+        rule.judge(View(10.0 * k, tuple(vehicles)), lane, 10.0).lane
+        for k, (lane, vehicles) in enumerate(views, start=1)
+    ]
+
+
+def test_the_longest_queue_goes_next() -> None:
+    assert choices((0, queues(2, 3, 5, 4))) == [2]
+    assert choices((2, queues(2, 3, 5, 4))) == [2]
+
+
+def test_a_queue_is_who_is_before_the_line_and_on_the_detector() -> None:
+    inside = [seen(k, 1, 2, -1.0 - k, 5.0) for k in range(3)]
+    far = [seen(10 + k, 2, 2, 101.0 + 10 * k, 14.0) for k in range(3)]
+    coming = [seen(20, 3, 2, 99.0, 14.0)]
+    assert choices((0, inside + far + coming)) == [3]
+
+
+def test_an_empty_junction_keeps_its_green() -> None:
+    assert choices((2, []), (2, [])) == [2, 2]
+
+
+def test_among_equal_queues_the_one_that_waits_longest_goes() -> None:
+    even = queues(2, 2, 2, 2)
+    # Who was never green comes first, in the order of the arms; then by the last green.
+    assert choices((2, even), (0, even), (1, even), (3, even), (2, even)) == [0, 1, 3, 2, 0]
+
+
+def test_the_present_lane_gives_way_to_an_equal_queue() -> None:
+    assert choices((0, queues(2, 0, 2, 0))) == [2]
+
+
+def test_it_looks_once_an_interval_and_changes_with_an_amber() -> None:
+    def vehicles(time: float) -> tuple[Observed, ...]:
+        return tuple(queues(0, 0, 3, 0) if 12.0 < time < 29.0 else queues(1, 0, 0, 0))
+
+    assert drive(LongestQueue(), SITE, 60.0, vehicles) == {
+        0: ["Open 0"], 20: ["Close 0"], 22: ["Open 2"], 32: ["Close 2"], 34: ["Open 0"],
+    }  # fmt: skip
+
+
+def test_the_interval_runs_from_the_green_that_is_shown() -> None:
+    session = LongestQueue(interval=5.0).start(SITE)
+    show(session, 0.0)
+    crossing = seen(7, 0, 2, -2.0, 0.0)
+    c = tuple(queues(0, 0, 3, 0))
+    assert show(session, 5.0, crossing, *c) == ["Close 0"]
+    assert show(session, 7.0, crossing, *c) == []
+    assert show(session, 8.5, *c) == ["Open 2"]
+    d = tuple(queues(0, 0, 0, 9))
+    assert show(session, 12.0, *d) == []
+    assert show(session, 13.5, *d) == ["Close 2"]
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 6])
+def test_no_two_approaches_could_be_green_together(n: int) -> None:
+    """Why a phase is one approach: a lane that carries all turns conflicts with every other."""
+    site = regular(n, profile="fair").site()
+    conflicts = site.conflicts.reshape(n, n - 1, n, n - 1).any(axis=(1, 3))
+    assert all(conflicts[i, j] for i in range(n) for j in range(n) if i != j)
+
+
+def test_the_busier_lanes_get_more_green() -> None:
+    # At 4:4:1:1 the two busy lanes come to wait less than under equal treatment: all are served.
+    scenario = four_way(200, split=(4, 4, 1, 1), profile="fair", horizon=1800.0)
+    run = minisim.simulate(scenario, LongestQueue(), seed=1, record="all")
+    frame = run.trajectories
+    held = frame[~frame["right_of_way"] & (frame["s_m"] < run.site.intersection.approach_length)]
+    share = held.groupby("lane").size() / frame.groupby("lane").size()
+    assert max(share["a"], share["b"]) < min(share["c"], share["d"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"interval": 0.0}, "interval"),
+        ({"interval": None}, "interval"),
+        ({"detector_range": -1.0}, "detector_range"),
+        ({"amber": float("inf")}, "amber"),
+        ({"name": 5}, "name"),
+    ],
+)
+def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        LongestQueue(**arguments)

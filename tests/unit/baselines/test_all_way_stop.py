@@ -1,0 +1,262 @@
+"""The all-way stop: who stands at the line, who goes next, and when the way is clear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+import minisim
+from baselines import AllWayStop
+from minisim.control import CLEARANCE, Command, Observed, Plan, Session, Site, View, Wake
+from minisim.errors import InputError
+from minisim.junction.clearing import clearing_distances
+from minisim.junction.geometry import Movement
+from scenarios.library import four_way
+from tests.builders import drained, replayed, seen, show
+
+FAIR = four_way(profile="fair")
+SITE = FAIR.site()
+STRAIGHT = 2
+
+
+def standing(id: int, lane: int, manoeuvre: int = STRAIGHT) -> Observed:
+    return seen(id, lane, manoeuvre, 0.25)
+
+
+def session_with(*vehicles: Observed, reaction: float = 1.0) -> Session:
+    """At 10 s all of these have just come to stand, in the order of their ids."""
+    session = AllWayStop(reaction=reaction).start(SITE)
+    for k in range(1, len(vehicles) + 1):
+        there = sorted(vehicles, key=lambda v: v.id)[:k]
+        time = 10.0 - 0.1 * (len(vehicles) - k)
+        assert show(session, time, *sorted(there, key=lambda v: v.lane)) == []
+    return session
+
+
+def in_lanes(*vehicles: Observed) -> list[Observed]:
+    return sorted(vehicles, key=lambda v: v.lane)
+
+
+# Stopping.
+
+
+def test_one_vehicle_goes_after_its_reaction_time() -> None:
+    session = session_with(standing(1, 0))
+    assert show(session, 10.9, standing(1, 0)) == []
+    assert show(session, 11.0, standing(1, 0)) == ["Go 1"]
+    assert show(session, 11.1, standing(1, 0)) == []
+
+
+def test_without_reaction_time_it_goes_at_once() -> None:
+    session = AllWayStop(reaction=0.0).start(SITE)
+    assert show(session, 3.0, seen(1, 0, 2, 0.3, 0.2)) == []
+    assert show(session, 3.1, seen(1, 0, 2, 0.25, 0.1)) == ["Go 1"]
+
+
+@pytest.mark.parametrize(("distance", "speed"), [(1.1, 0.0), (0.3, 0.11), (0.9, 2.0)])
+def test_who_is_not_at_the_line_or_does_not_stand_does_not_queue(
+    distance: float, speed: float
+) -> None:
+    session = AllWayStop().start(SITE)
+    for time in (1.0, 2.0, 3.0, 4.0):
+        assert show(session, time, seen(1, 0, 2, distance, speed)) == []
+
+
+def test_who_starts_to_move_again_has_to_stop_again() -> None:
+    session = session_with(standing(1, 0))
+    assert show(session, 10.5, seen(1, 0, 2, 0.2, 0.3)) == []
+    assert show(session, 11.0, standing(1, 0)) == []
+    assert show(session, 12.0, standing(1, 0)) == ["Go 1"]
+
+
+def test_only_the_first_of_a_lane_queues() -> None:
+    session = session_with(standing(1, 0))
+    second = seen(2, 0, 2, 0.9)
+    assert show(session, 11.0, standing(1, 0), second) == ["Go 1"]
+    # The first is let go: now the second is the head, and stands since now.
+    assert show(session, 11.5, seen(1, 0, 2, -1.0, 1.0), second) == []
+    assert show(session, 12.5, seen(1, 0, 2, -5.0, 3.0), second) == ["Go 2"]
+
+
+# First come, first served.
+
+
+def test_who_stood_first_goes_first() -> None:
+    a, b = standing(2, 0), standing(1, 1)
+    session = session_with(a, b)
+    assert show(session, 10.9, a, b) == ["Go 1"]
+    # b2 is on its way: a waits until b2 has left its way.
+    assert show(session, 11.2, a, seen(1, 1, 2, 0.1, 0.8)) == []
+    assert show(session, 12.0, a, seen(1, 1, 2, -2.0, 3.0)) == []
+    assert show(session, 14.0, a, seen(1, 1, 2, -17.0, 8.0)) == ["Go 2"]
+
+
+def test_equal_times_go_by_arm() -> None:
+    a, b = standing(9, 0), standing(1, 1)
+    session = AllWayStop().start(SITE)
+    assert show(session, 10.0, a, b) == []
+    assert show(session, 11.0, a, b) == ["Go 9"]
+
+
+def test_those_who_do_not_conflict_go_together() -> None:
+    a, c = standing(1, 0), standing(2, 2)
+    session = session_with(a, c)
+    assert show(session, 10.9, a, c) == ["Go 1"]
+    assert show(session, 11.0, seen(1, 0, 2, 0.2, 0.3), c) == ["Go 2"]
+
+
+def test_nobody_overtakes_a_conflicting_vehicle_that_has_waited_longer() -> None:
+    # a2 goes; b2 has to wait for it; c2 does not conflict with a2, but with b2, who was first.
+    a, b, c = standing(1, 0), standing(2, 1), standing(3, 2)
+    session = session_with(a, b, c)
+    assert show(session, 10.8, a, b, c) == ["Go 1"]
+    assert show(session, 12.0, seen(1, 0, 2, -2.0, 3.0), b, c) == []
+    gone = seen(1, 0, 2, -17.0, 8.0)
+    assert show(session, 14.0, gone, b, c) == ["Go 2"]
+    assert show(session, 14.1, b, c) == []
+
+
+def test_a_later_vehicle_that_conflicts_with_nobody_overtakes() -> None:
+    # d1 turns left into a, out of everybody's way but that of who leaves by a.
+    a, b, d = standing(1, 0), standing(2, 1), standing(3, 3, 1)
+    assert not SITE.conflicts[SITE.intersection.index(Movement(3, 1)), [1, 4]].any()
+    session = session_with(a, b, d)
+    assert show(session, 10.8, a, b, d) == ["Go 1"]
+    assert show(session, 11.0, seen(1, 0, 2, 0.1, 0.4), b, d) == ["Go 3"]
+
+
+def test_a_younger_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
+    # Everybody's reaction starts with his own standstill, but the order is that of standing.
+    a, b = standing(1, 0), standing(2, 1)
+    session = AllWayStop().start(SITE)
+    assert show(session, 9.0, a) == []
+    assert show(session, 9.5, a, b) == []
+    assert show(session, 10.0, a, b) == ["Go 1"]
+    assert show(session, 10.5, seen(1, 0, 2, -0.5, 1.0), b) == []
+
+
+# When a way is clear.
+
+
+def test_a_vehicle_is_in_the_way_until_its_body_has_left_it() -> None:
+    """Against a search of its own, far finer, with every pair of movements."""
+    clearing = clearing_distances(SITE)
+    paths = SITE.intersection.paths
+    assert np.array_equal(clearing > -np.inf, SITE.conflicts)
+    checked = 0
+    for p, q in np.argwhere(np.isfinite(clearing)).tolist():
+        corridor = paths[p].corridor(SITE.vehicle)
+        last = paths[q].exit - paths[q].entry + SITE.vehicle.length
+        after = np.arange(clearing[p, q], last, 0.02)
+        bodies = shapely.polygons(paths[q].bodies(paths[q].entry + after, SITE.vehicle))
+        assert shapely.distance(corridor, bodies).min() > CLEARANCE - 0.01
+        before = paths[q].bodies(paths[q].entry + clearing[p, q] - 0.3, SITE.vehicle)
+        assert shapely.distance(corridor, shapely.polygons(before)) < CLEARANCE + 0.01
+        checked += 1
+    assert checked > 20
+
+
+def test_who_leaves_by_the_same_arm_is_in_the_way_until_it_is_out() -> None:
+    clearing, intersection = clearing_distances(SITE), SITE.intersection
+    for p, path in enumerate(intersection.paths):
+        for q, other in enumerate(intersection.paths):
+            if path.exit_arm == other.exit_arm and path.movement.origin != other.movement.origin:
+                assert np.isinf(clearing[p, q])
+
+
+def test_straight_ways_are_clear_where_the_drawing_says() -> None:
+    # Left-hand, lanes of 3.2 m, entries 7.2 m from the centre. a2 drives south on x = 1.6, b2
+    # west on y = -1.6: it has left a2's way when its rear is at x = 1.6 - 0.9 - 0.5, so its front
+    # has driven 7.2 - 0.2 + 5.0 = 12.0 m.
+    clearing, index = clearing_distances(SITE), SITE.intersection.index
+    a2, b2, d2 = (index(Movement(lane, 2)) for lane in (0, 1, 3))
+    assert clearing[a2, b2] == pytest.approx(12.0, abs=0.26)
+    # d2 drives east on y = 1.6 and has to get 3.2 m farther.
+    assert clearing[a2, d2] == pytest.approx(15.2, abs=0.26)
+
+
+# On the road.
+
+
+def test_a_lone_vehicle_stops_for_the_reaction_time() -> None:
+    run = minisim.simulate(replayed(FAIR, (0.0, 0, 2), horizon=120.0), AllWayStop(), record="all")
+    frame = run.trajectories
+    entry = run.site.intersection.approach_length
+    still = frame[(frame["speed_mps"] == 0.0) & (frame["s_m"] > 400.0)]
+    assert entry - 0.3 <= still["s_m"].min() <= still["s_m"].max() < entry
+    # One step more: the wait is noticed at the end of the step in which it is over.
+    assert run.summary()["waiting_time_s"] == pytest.approx(1.1, abs=0.11)
+
+
+def test_followers_stop_each_on_its_own() -> None:
+    trips = [(2.0 * k, 0, 2) for k in range(4)]
+    run = minisim.simulate(replayed(FAIR, *trips, horizon=200.0), AllWayStop(), record="all")
+    frame = run.trajectories
+    entry = run.site.intersection.approach_length
+    at_line = frame[(frame["s_m"] > entry - 1.0) & (frame["s_m"] < entry)]
+    stood = at_line[at_line["speed_mps"] == 0.0].groupby("vehicle").size()
+    assert len(stood) == 4
+    assert stood.min() >= 9
+
+
+@dataclass(frozen=True)
+class EveryStep:
+    """The same rule, looked at in every step."""
+
+    name: str = "all-way-stop-every-step"
+
+    def start(self, site: Site) -> Session:
+        return _EveryStep(AllWayStop().start(site), site.dt)
+
+
+class _EveryStep:
+    def __init__(self, session: Session, dt: float) -> None:
+        self.plan: Plan = replace(session.plan, period=dt)
+        self._session = session
+
+    def decide(self, view: View) -> Iterable[Command]:
+        return [c for c in self._session.decide(view) if not isinstance(c, Wake)]
+
+
+@pytest.mark.parametrize("density", [150.0, 350.0])
+def test_to_look_in_every_step_would_change_nothing(density: float) -> None:
+    scenario = four_way(density, profile="fair", horizon=600.0)
+    some, all_ = (
+        minisim.simulate(scenario, controller, seed=3) for controller in (AllWayStop(), EveryStep())
+    )
+    assert some.trips.equals(all_.trips)
+
+
+def test_it_carries_what_was_measured_in_the_field() -> None:
+    """400–1400 veh/h in all, says Al-Kaisy 2023 of all-way stops of single lanes.
+
+    All lanes have a queue all the time; what leaves in the second half hour is the capacity.
+    """
+    scenario = four_way(500, profile="fair", horizon=3600.0)
+    arrival = minisim.simulate(scenario, AllWayStop(), seed=1).columns.arrival
+    capacity = 2 * int(np.sum(arrival > 1800.0))
+    assert 1200 < capacity < 1600
+
+
+def test_nobody_is_passed_over_for_ever() -> None:
+    run = minisim.simulate(
+        drained(four_way(350, split=(8, 8, 8, 1), profile="fair", horizon=600.0), 1, 2000.0),
+        AllWayStop(),
+    )
+    trips = run.columns
+    assert trips.arrived.all()
+    # Lane d has hardly a queue of its own, so nobody there waits for long.
+    assert trips.waiting_time[trips.lane == 3].max() < 40.0
+
+
+@pytest.mark.parametrize("reaction", [-0.1, float("nan"), "1", None, True, 61.0])
+def test_bad_parameters_are_named(reaction: Any) -> None:
+    with pytest.raises(InputError, match="reaction"):
+        AllWayStop(reaction=reaction)
+    with pytest.raises(InputError, match="name"):
+        AllWayStop(name=3)  # type: ignore[arg-type]

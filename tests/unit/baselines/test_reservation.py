@@ -1,0 +1,254 @@
+"""Reservation on hand-made situations: predictions, zones, grants, refusals, cancellations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import minisim
+from baselines import Reservation
+from baselines.prediction import Leader, Motion, predict, ways
+from baselines.reservation import Manager, ReservationSession
+from minisim.control import Go, Hold, Observed, Unregulated, View, Wake
+from minisim.errors import InputError
+from minisim.junction.zones import conflict_zones
+from minisim.vehicle import VehicleType
+from scenarios import AS_RUN, FAIR, PAPER, four_way
+from scenarios.scenario import Profile
+from tests.builders import replayed
+
+FAIR_FOUR = four_way(100, profile="fair")
+SITE = FAIR_FOUR.site(1)
+ENTRY = SITE.intersection.approach_length
+
+
+def car(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 14.0) -> Observed:
+    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+
+
+def session(**options: Any) -> ReservationSession:
+    return Reservation(**options).start(SITE)
+
+
+def decide(run: ReservationSession, time: float, *cars: Observed) -> list[object]:
+    return [c for c in run.decide(View(time, cars)) if not isinstance(c, Wake)]
+
+
+def index(lane: int, manoeuvre: int) -> int:
+    return lane * 3 + manoeuvre - 1
+
+
+# --- predictions are what the host does -------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)
+@pytest.mark.parametrize("model", ["idm", "iidm"])
+@pytest.mark.parametrize("manoeuvre", [1, 2, 3])
+def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuvre: int) -> None:
+    """Two vehicles of one lane: the second follows, and turns where the first goes straight."""
+    vehicle = VehicleType(
+        length=profile.vehicle.length, deceleration=profile.vehicle.deceleration, model=model
+    )
+    profile = Profile(name="test", vehicle=vehicle, speed_limit=profile.speed_limit)
+    scenario = replayed(
+        four_way(100, profile=profile), (0.0, 0, 2), (0.0, 0, manoeuvre), horizon=100.0
+    )
+    run = minisim.simulate(scenario, Unregulated(), record="all")
+    site, dt = run.site, run.site.dt
+    tracks = [run.trace[run.trace["row"] == row] for row in (0, 1)]
+    now = int(tracks[1]["tick"][0]) + 300
+    first, second = (track[track["tick"] >= now] for track in tracks)
+    motion, lane_ways = Motion.of(site), ways(site)
+    leader = predict(motion, lane_ways[1], first["s"][0] - ENTRY, first["v"][0], beyond=60.0)
+    assert leader is not None
+    assert np.allclose(leader[0], first["s"][: len(leader[0])] - ENTRY, atol=1e-6)
+
+    until = float(site.intersection.branch(site.vehicle)[1, manoeuvre - 1]) - ENTRY
+    follower = predict(
+        motion, lane_ways[manoeuvre - 1], second["s"][0] - ENTRY, second["v"][0],
+        lane=Leader(leader[0], leader[1], until),
+    )  # fmt: skip
+    assert follower is not None
+    assert len(follower[0]) * dt > 3.0
+    assert np.allclose(follower[0], second["s"][: len(follower[0])] - ENTRY, atol=1e-6)
+    assert np.allclose(follower[1], second["v"][: len(follower[1])], atol=1e-6)
+
+
+def test_who_does_not_get_through_is_not_predicted() -> None:
+    motion, way = Motion.of(SITE), ways(SITE)[0]
+    assert predict(motion, way, -400.0, 14.0, horizon=5.0) is None
+
+
+# --- zones ------------------------------------------------------------------------------------
+
+
+def test_zones_of_two_straight_paths() -> None:
+    """Perpendicular corridors of width w, c apart: body within w/2 + c of the other's centre line.
+
+    a2 drives south 1.6 m east of the centre, b2 west 1.6 m south of it: they cross
+    7.2 + 1.6 = 8.8 m past the entry of a2, 7.2 − 1.6 = 5.6 m past that of b2.
+    """
+    zones = conflict_zones(SITE)
+    half, length = SITE.vehicle.width / 2.0 + 0.5, SITE.vehicle.length
+    for p, q, centre in ((1, 4, 8.8), (4, 1, 5.6)):
+        first, last = zones[p, q]
+        assert centre - half - 1.0 <= first <= centre - half
+        assert centre + half + length <= last <= centre + half + length + 1.0
+
+
+def test_zones_of_merging_paths_end_where_the_rear_has_left() -> None:
+    junction = SITE.intersection
+    b1, a2 = index(1, 1), index(0, 2)  # both leave to the south
+    for p, q in ((b1, a2), (a2, b1)):
+        crossing = junction.paths[p].exit - junction.paths[p].entry
+        assert conflict_zones(SITE)[p, q, 1] == pytest.approx(crossing + SITE.vehicle.length)
+
+
+def test_no_zones_without_conflict() -> None:
+    assert np.array_equal(np.isfinite(conflict_zones(SITE)[..., 0]), SITE.conflicts)
+
+
+# --- the protocol -----------------------------------------------------------------------------
+
+
+def test_who_asks_first_gets_it_and_who_would_meet_it_does_not() -> None:
+    run = session()
+    assert decide(run, 0.0, car(1, 0, 2, 28.0)) == [Go(1)]
+    seen = run.manager.slots[1]
+    k = 5
+    again = car(1, 0, 2, -float(seen.s[k]), float(seen.v[k]))
+    assert decide(run, 0.5, again, car(2, 1, 2, 26.0)) == []
+    assert list(run.manager.slots) == [1]
+
+
+def test_harmony_is_granted_at_once() -> None:
+    assert decide(session(), 0.0, car(1, 0, 2, 28.0), car(2, 2, 2, 28.0)) == [Go(1), Go(2)]
+
+
+def test_a_passage_well_before_or_after_is_granted() -> None:
+    run = session(reach=120.0)
+    assert decide(run, 0.0, car(1, 0, 2, 110.0), car(2, 1, 2, 20.0)) == [Go(1), Go(2)]
+    late, early = run.manager.slots[1], run.manager.slots[2]
+    assert late.zones[early.movement][0] >= early.zones[late.movement][1] + 5  # 0.5 s
+
+
+def test_the_buffer_is_kept() -> None:
+    """b2 in ever longer distance behind a2: refused until it comes half a second later."""
+    gaps = []
+    for distance in np.arange(20.0, 80.0, 1.0):
+        run = session(reach=100.0)
+        decide(run, 0.0, car(1, 0, 2, 20.0))
+        if decide(run, 0.0, car(1, 0, 2, 20.0), car(2, 1, 2, float(distance))):
+            first, second = run.manager.slots[1], run.manager.slots[2]
+            gaps.append(second.zones[1][0] - first.zones[4][1])
+    assert 5 <= min(gaps) <= 6
+
+
+def test_into_one_exit_lane_nobody_goes_before_an_earlier_holder() -> None:
+    """b1 could turn south long before a2, which is far away, gets there: it may not overtake."""
+    run = session(reach=150.0)
+    assert decide(run, 0.0, car(1, 0, 2, 140.0)) == [Go(1)]
+    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 1, 5.0, 5.0)) == []
+    run = session(reach=150.0)  # into another exit it goes
+    decide(run, 0.0, car(1, 0, 2, 140.0))
+    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 2, 5.0, 5.0)) == [Go(2)]
+
+
+def test_a_follower_asks_only_behind_a_holder() -> None:
+    run = session()
+    decide(run, 0.0, car(1, 1, 2, 20.0))
+    cars = (car(2, 0, 2, 21.0), car(3, 0, 1, 28.5))
+    assert decide(run, 0.0, *cars, car(1, 1, 2, 20.0)) == []  # a2 is refused, so a1 may not ask
+    assert decide(session(), 0.0, *cars) == [Go(2), Go(3)]
+
+
+def test_requests_are_considered_in_the_order_of_the_first() -> None:
+    run = session()
+    decide(run, 0.0, car(1, 2, 2, 20.0))  # holds
+    blocked = (car(2, 1, 2, 24.0), car(1, 2, 2, 20.0))
+    assert decide(run, 0.0, *blocked) == []
+    # c2 is gone; b2 asked first, a2 (nearer, earlier in the view) conflicts with it.
+    run.manager.slots.clear()
+    assert decide(run, 1.0, car(3, 0, 2, 15.0, 5.0), car(2, 1, 2, 18.0, 5.0)) == [Go(2)]
+
+
+# --- what safety rests on ---------------------------------------------------------------------
+
+
+def test_a_holder_that_differs_is_predicted_anew_and_keeps_what_still_fits() -> None:
+    run = session()
+    decide(run, 0.0, car(1, 0, 2, 28.0))
+    assert decide(run, 0.5, car(1, 0, 2, 23.0, 10.0)) == []
+    assert run.manager.slots[1].start == 5
+    assert run.manager.slots[1].v[0] == 10.0
+
+
+def just_behind(*cars: Observed) -> tuple[ReservationSession, Observed]:
+    """A session in which the cars and the nearest b2 that can follow them hold reservations."""
+    for distance in np.arange(30.0, 140.0, 1.0):
+        run, last = session(reach=150.0), car(9, 1, 2, float(distance))
+        decide(run, 0.0, *cars)
+        if decide(run, 0.0, *cars, last) == [Go(9)]:
+            return run, last
+    raise AssertionError("b2 is never granted")
+
+
+def test_a_late_holder_that_no_longer_fits_is_held_when_it_can_stop() -> None:
+    run, other = just_behind(car(1, 0, 2, 40.0))
+    on_time = car(9, 1, 2, other.distance - 7.0)
+    assert decide(run, 0.5, car(1, 0, 2, 40.0), on_time) == [Hold(1)]  # predicted at 33 m
+    assert set(run.manager.slots) == {9}
+
+
+def test_who_can_not_stop_keeps_its_reservation_and_the_other_yields() -> None:
+    """21.8 m are needed to stop from 14 m/s; the other is as predicted, and still loses its own."""
+    run, other = just_behind(car(1, 0, 2, 28.0))
+    late = car(1, 0, 2, 21.5)  # predicted at 14 m
+    on_time = car(9, 1, 2, other.distance - 14.0)
+    assert decide(run, 1.0, late, on_time) == [Hold(9)]
+    assert set(run.manager.slots) == {1}
+
+
+def test_with_its_leader_a_follower_loses_its_reservation() -> None:
+    """a2 is late for b2; a1 behind it is in harmony with b2, and cannot pass a2."""
+    first, follower = car(1, 0, 2, 40.0), car(3, 0, 1, 65.0)
+    run, other = just_behind(first, follower)
+    on_time = car(9, 1, 2, other.distance - 7.0)
+    assert not SITE.conflicts[index(0, 1), index(1, 2)]
+    assert decide(run, 0.5, first, car(3, 0, 1, 58.0), on_time) == [Hold(1), Hold(3)]
+    assert set(run.manager.slots) == {9}
+
+
+def test_speeds_that_differ_from_driver_to_driver_do_no_harm() -> None:
+    vehicle = VehicleType(speed_deviation=0.1)
+    profile = Profile(name="drivers", vehicle=vehicle, speed_limit=14.0)
+    scenario = four_way(350, profile=profile, horizon=900.0)
+    run = minisim.simulate(scenario, Reservation(), seed=3, on_collision="record")
+    assert run.collisions == ()
+
+
+def test_at_low_demand_nobody_is_delayed_and_below_the_all_way_stop_at_350() -> None:
+    """SUMO's all-way stop with 1 s of hold loses 7.6 s at 350 veh/h/lane; a lone turn 1–2 s."""
+    run = minisim.simulate(four_way(10, profile="fair"), Reservation(), seed=1)
+    free = minisim.simulate(
+        four_way(10, profile="fair"), Unregulated(), seed=1, on_collision="record"
+    )
+    loss = [r.summary()["time_loss_s"] for r in (run, free)]
+    assert loss[0] - loss[1] < 0.3
+    assert run.summary()["waiting_time_s"] < 0.05
+    busy = minisim.simulate(four_way(350, profile="fair", horizon=1800.0), Reservation(), seed=1)
+    assert busy.summary()["time_loss_s"] < 5.9  # the all-way stop without any hold
+
+
+def test_bad_input() -> None:
+    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}, {"name": None}):
+        with pytest.raises(InputError):
+            Reservation(**options)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="EngineVehicle"):
+        Reservation().start(four_way(profile=AS_RUN).site(0))
+    with pytest.raises(InputError, match="site"):
+        Manager(None, 0.5)  # type: ignore[arg-type]
+    assert math.isclose(Reservation().start(SITE).plan.sight, 14.0**2 / 9.0 + 7.0)

@@ -1,0 +1,200 @@
+"""Who drives, what drivers signal, and what others can know of their ways."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dim import Humans
+from dim.humans.drivers import TRUSTS, Drivers, Readings, Turn, parting, turns
+from minisim.control import Observed, Site
+from minisim.errors import InputError
+from minisim.streams import stream
+from scenarios import four_way, three_way
+
+NEAR, THROUGH, FAR = Turn
+SITE = four_way(profile="fair").site()
+MANY = 20_000
+
+
+def test_turns_mirror_with_the_side_of_the_road() -> None:
+    """Clockwise: left, straight, right. In left-hand traffic left is near."""
+    assert turns(SITE.intersection) == (NEAR, THROUGH, FAR) * 4
+    assert turns(four_way(side="right").intersection) == (FAR, THROUGH, NEAR) * 4
+    assert turns(three_way().intersection) == (NEAR, FAR) * 3
+
+
+def test_the_defaults_are_the_manual_s() -> None:
+    """HCM exhibits 20-17 and 20-18: right, through and left of a two-lane road, right-hand."""
+    humans = Humans()
+    assert humans.critical_gaps == (6.2, 6.5, 7.1)
+    assert humans.follow_up == (3.3, 4.0, 3.5)
+    assert humans.unsignalled == (0.29, 0.25)  # Sullivan et al. 2015: right, left
+
+
+def human(share: float, seed: int = 3, count: int = MANY) -> np.ndarray:
+    return Drivers(Humans(), share, seed).human(count)
+
+
+def test_shares_are_nested() -> None:
+    shares = (0.0, 0.05, 0.2, 0.4, 0.8, 1.0)
+    masks = [human(share) for share in shares]
+    for less, more in itertools.pairwise(masks):
+        assert not np.any(less & ~more)
+    assert not masks[0].any()
+    assert masks[-1].all()
+    for share, mask in zip(shares, masks, strict=True):
+        # Five standard deviations of a binomial share.
+        assert abs(mask.mean() - share) <= 5.0 * math.sqrt(share * (1.0 - share) / MANY)
+
+
+def test_drivers_do_not_depend_on_who_is_asked_for_first() -> None:
+    forwards, backwards = (Drivers(Humans(deviation=0.3), 0.5, 7) for _ in range(2))
+    wanted = [forwards[i] for i in range(1000)]
+    assert [backwards[i] for i in reversed(range(1000))] == wanted[::-1]
+    assert wanted != [Drivers(Humans(deviation=0.3), 0.5, 8)[i] for i in range(1000)]
+
+
+def test_drawing_drivers_shifts_no_other_stream() -> None:
+    before = stream(7, "drivers").bytes(64)
+    human(0.5, seed=7)
+    assert stream(7, "drivers").bytes(64) == before
+
+
+def test_critical_gaps_are_log_normal_about_the_published_mean() -> None:
+    alike = Drivers(Humans(), 1.0, 1)
+    assert {alike[i].gap for i in range(100)} == {1.0}
+    differing = Drivers(Humans(deviation=0.25), 1.0, 1)
+    gaps = np.array([differing[i].gap for i in range(MANY)])
+    assert gaps.mean() == pytest.approx(1.0, abs=5 * 0.25 / math.sqrt(MANY))
+    assert gaps.std() == pytest.approx(0.25, rel=0.05)
+    logs = np.log(gaps)
+    skewness = float(((logs - logs.mean()) ** 3).mean() / logs.std() ** 3)
+    assert abs(skewness) < 5.0 * math.sqrt(6.0 / MANY)
+
+
+def readings(share: float = 1.0, site: Site = SITE) -> Readings:
+    return Readings(Humans(), site, Drivers(Humans(), share, 1))
+
+
+def seen(vehicle: int, manoeuvre: int, distance: float = 5.0, lane: int = 0) -> Observed:
+    return Observed(vehicle, lane, manoeuvre, distance, 1.0, 5.0)
+
+
+@pytest.mark.parametrize(("manoeuvre", "rate"), [(1, 0.29), (2, 0.0), (3, 0.25)])
+def test_turns_without_a_signal_have_the_published_rates(manoeuvre: int, rate: float) -> None:
+    read = readings()
+    straight = [read.possible(seen(i, manoeuvre), "silence") == [1] for i in range(MANY)]
+    wanted = 1.0 if manoeuvre == 2 else rate
+    assert np.mean(straight) == pytest.approx(wanted, abs=5 * math.sqrt(0.25 / MANY))
+
+
+def test_what_is_believed() -> None:
+    read = readings()
+    drivers = Drivers(Humans(), 1.0, 1)
+    silent = next(i for i in range(100) if drivers[i].careless < 0.25)
+    telling = next(i for i in range(100) if drivers[i].careless > 0.29)
+    everything = [3, 4, 5]  # of lane b
+    table = {
+        ("motion", telling, 1): everything,
+        ("motion", silent, 1): everything,
+        ("motion", telling, 2): everything,
+        ("signals", telling, 1): [3],
+        ("signals", silent, 1): everything,
+        ("signals", telling, 2): everything,
+        ("signals", telling, 3): [5],
+        ("silence", telling, 3): [5],
+        ("silence", silent, 3): [4],  # wrong, as others are
+        ("silence", telling, 2): [4],
+    }
+    for (trust, vehicle, manoeuvre), wanted in table.items():
+        assert read.possible(seen(vehicle, manoeuvre, lane=1), trust) == wanted
+
+
+@pytest.mark.parametrize("trust", TRUSTS)
+@pytest.mark.parametrize("manoeuvre", [1, 2, 3])
+def test_motion_shows_the_way_in_the_end_and_never_excludes_it_before(
+    trust: str, manoeuvre: int
+) -> None:
+    read = readings()
+    for vehicle, distance in itertools.product(range(40), np.arange(5.0, -20.0, -0.5)):
+        ways = read.possible(seen(vehicle, manoeuvre, float(distance)), trust)
+        if trust != "silence":
+            assert manoeuvre - 1 in ways
+        if distance < -8.0:
+            assert ways == [manoeuvre - 1]
+
+
+@pytest.mark.parametrize("apart", [0.3, 1.0, 2.0])
+def test_ways_part_where_the_arc_has_left_the_straight_line(apart: float) -> None:
+    """After s an arc of radius r is at r(1 − cos(s/r)), r·sin(s/r): to the tenth of a metre."""
+    parts = parting(SITE.intersection, apart)
+    for turn in (0, 2):
+        r = SITE.intersection.paths[turn].radius
+        s = np.arange(0.0, 10.0, 1e-4)
+        gaps = np.hypot(r * (1.0 - np.cos(s / r)), s - r * np.sin(s / r))
+        first = float(s[np.argmax(gaps > apart)])
+        for found in (parts[turn][1], parts[1][turn]):
+            assert first - 1e-3 <= found <= first + 0.1 + 1e-3
+    assert [parts[way][way] for way in range(12)] == [math.inf] * 12
+    assert parts[0][3:] == parts[4][:3] + parts[4][6:] == [-math.inf] * 9
+    assert parting(SITE.intersection, 1e3)[0][:3] == [math.inf] * 3  # never so far
+
+
+def test_vehicles_of_dim_always_tell() -> None:
+    read = readings(share=0.0)
+    for vehicle, manoeuvre, trust in itertools.product(range(20), (1, 2, 3), TRUSTS):
+        assert read.possible(seen(vehicle, manoeuvre), trust) == [manoeuvre - 1]
+
+
+def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
+    read = readings(site=three_way().site())
+    drivers = Drivers(Humans(), 1.0, 1)
+    silent = next(i for i in range(100) if drivers[i].careless < 0.25)
+    assert read.possible(seen(silent, 1), "silence") == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"critical_gaps": (6.2, 6.5)}, "critical_gaps must be 3 numbers"),
+        ({"critical_gaps": (6.2, 6.5, -1)}, r"critical gap \[s\] must be at least 0"),
+        ({"critical_gaps": 6.2}, "critical_gaps must be a sequence"),
+        ({"critical_gaps": (6.2, 6.5, "x")}, "must be a number, got 'x'"),
+        ({"follow_up": (3.3, 4.0, math.inf)}, "follow_up"),
+        ({"follow_up": (3.3, 4.0, 61.0)}, r"follow-up time \[s\] must be .* at most 60"),
+        ({"deviation": -0.1}, "deviation of critical gaps must be at least 0"),
+        ({"deviation": math.nan}, "deviation of critical gaps"),
+        ({"reaction": 0.1}, r"reaction \[s\] must be at least 0.5"),
+        ({"unsignalled": (0.2, 1.2)}, "share of unsignalled turns must be .* at most 1"),
+        ({"unsignalled": (0.2, 0.2, 0.2)}, "unsignalled must be 2 numbers"),
+        ({"trust": "signal"}, "did you mean 'signals'"),
+        ({"trust": True}, "unknown trust True"),
+    ],
+)
+def test_bad_parameters_are_named(parameters: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        replace(Humans(), **parameters)
+
+
+def test_bounds_are_allowed() -> None:
+    humans = Humans(
+        critical_gaps=(0, 60, 0),
+        follow_up=(0, 60, 0),
+        deviation=1,
+        reaction=0.5,
+        unsignalled=(0, 1),
+    )
+    assert humans.critical_gaps == humans.follow_up == (0.0, 60.0, 0.0)
+    assert Humans(deviation=0, reaction=60).reaction == 60
+
+
+def test_lists_become_tuples() -> None:
+    """As in an experiment file; a recipe must hash."""
+    gaps: Any = [5, 5, 5]
+    assert hash(Humans(critical_gaps=gaps)) == hash(Humans(critical_gaps=(5.0, 5.0, 5.0)))

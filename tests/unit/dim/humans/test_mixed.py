@@ -1,0 +1,348 @@
+"""Human drivers and vehicles of DIM on hand-made views, and in runs."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import minisim
+from baselines import AllWayStop
+from dim import Dim, Humans, Mixed, NoisyPerception
+from dim.agent import GATES
+from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
+from minisim.errors import InputError
+from minisim.junction.geometry import Movement
+from scenarios import four_way
+from scenarios.mixing import driver_means, with_humans
+from scenarios.sweep.experiment import Experiment, run_experiment
+from tests.builders import digest, replayed
+
+SITE = four_way(profile="fair").site()
+#: Drivers of this share and seed; ids by kind are looked up, so that scenes read well.
+MIXED = Mixed(share=0.5)
+HUMAN = MIXED.human(SITE.seed, 200)
+PEOPLE = np.flatnonzero(HUMAN).tolist()
+CARS = np.flatnonzero(~HUMAN).tolist()
+A, B, C, D = range(4)
+LEFT, STRAIGHT, RIGHT = 1, 2, 3
+EVERY_GATE = pytest.mark.parametrize("gate", GATES)
+
+
+def seen(vehicle: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0) -> Observed:
+    return Observed(vehicle, lane, manoeuvre, distance, speed, 5.0)
+
+
+class Scene:
+    """A session that is shown views; answers with ids that may go and that may not."""
+
+    def __init__(self, mixed: Mixed = MIXED) -> None:
+        self.session = mixed.start(SITE)
+
+    def show(self, time: float, *vehicles: Observed) -> tuple[set[int], set[int]]:
+        view = View(time, tuple(sorted(vehicles, key=lambda v: (v.lane, v.distance))))
+        commands: list[Command] = list(self.session.decide(view))
+        assert sum(isinstance(c, Wake) for c in commands) <= 1
+        return self._of(commands, Go), self._of(commands, Hold)
+
+    def goes(self, time: float, *vehicles: Observed) -> set[int]:
+        """Who may go from now on."""
+        return self.show(time, *vehicles)[0]
+
+    @staticmethod
+    def _of(commands: Iterable[Command], kind: type) -> set[int]:
+        return {c.vehicle for c in commands if isinstance(c, kind)}  # type: ignore[union-attr]
+
+
+def test_a_driver_stops_looks_and_goes() -> None:
+    scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.1)
+    assert scene.goes(0.0, seen(PEOPLE[0], A, STRAIGHT, 7.0, 4.0)) == set()
+    assert scene.goes(2.0, driver) == set()
+    assert scene.goes(3.8, driver) == set()
+    assert scene.goes(3.9, driver) == {PEOPLE[0]}  # 1.9 s, HCM: 3.9 s less 2.0 s for moving up
+
+
+def test_a_driver_who_has_not_come_to_the_line_does_not_go() -> None:
+    scene = Scene()
+    for time in (0.0, 5.0, 10.0):
+        assert scene.goes(time, seen(PEOPLE[0], A, STRAIGHT, 4.0)) == set()
+
+
+def test_who_stopped_first_goes_first() -> None:
+    first, second = seen(PEOPLE[0], B, STRAIGHT, 2.0), seen(PEOPLE[1], A, STRAIGHT, 2.0)
+    scene = Scene()
+    scene.goes(0.0, first)
+    scene.goes(1.0, first, second)
+    assert scene.goes(1.9, first, second) == {PEOPLE[0]}
+    inside = first._replace(distance=-3.0, speed=4.0)
+    assert scene.goes(4.0, inside, second) == set()
+    assert scene.goes(6.0, second) == {PEOPLE[1]}
+
+
+def test_of_equals_the_lane_decides_and_only_one_of_two_in_conflict_goes() -> None:
+    both = [seen(PEOPLE[k], lane, STRAIGHT, 2.0) for k, lane in enumerate((B, A))]
+    scene = Scene()
+    scene.goes(0.0, *both)
+    assert scene.goes(1.9, *both) == {PEOPLE[1]}
+
+
+def test_followers_keep_the_follow_up_time() -> None:
+    """3.5 s for the far turn (HCM exhibit 20-18), although it stood long enough before."""
+    scene = Scene()
+    scene.goes(0.0, seen(PEOPLE[0], A, RIGHT, 2.0))
+    assert scene.goes(1.9, seen(PEOPLE[0], A, RIGHT, 2.0)) == {PEOPLE[0]}
+    follower = seen(PEOPLE[1], A, RIGHT, 2.0)
+    scene.goes(2.0, follower)
+    assert scene.goes(5.3, follower) == set()
+    assert scene.goes(5.4, follower) == {PEOPLE[1]}
+
+
+@pytest.mark.parametrize(("manoeuvre", "gap"), [(LEFT, 6.2), (STRAIGHT, 6.5), (RIGHT, 7.1)])
+def test_critical_gaps_by_manoeuvre(manoeuvre: int, gap: float) -> None:
+    """Left-hand traffic: left is near. A vehicle of DIM comes on lane d, which conflicts."""
+    lane, way = (C, RIGHT) if manoeuvre == LEFT else (D, STRAIGHT)
+    driver = seen(PEOPLE[0], A, manoeuvre, 2.0)
+    for later, accepted in ((-0.1, False), (0.1, True)):
+        scene = Scene()
+        scene.goes(0.0, driver)
+        coming = seen(CARS[0], lane, way, (gap + later) * 5.0, 5.0)
+        assert (PEOPLE[0] in scene.goes(1.9, driver, coming)) is accepted
+
+
+def test_a_driver_lets_pass_what_rolls_through_the_yellow_zone_but_not_what_stands() -> None:
+    driver = seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    scene = Scene()
+    scene.goes(0.0, driver)
+    assert scene.goes(2.0, driver, seen(CARS[0], B, STRAIGHT, 6.0, 0.2)) == set()
+    assert scene.goes(3.0, driver, seen(CARS[0], B, STRAIGHT, 2.0, 0.0)) == {PEOPLE[0]}
+
+
+def test_a_gap_in_a_stream_that_is_not_in_the_way_needs_no_waiting() -> None:
+    driver = seen(PEOPLE[0], A, LEFT, 2.0)
+    scene = Scene()
+    scene.goes(0.0, driver)
+    assert PEOPLE[0] in scene.goes(1.9, driver, seen(CARS[0], B, LEFT, 6.0, 3.0))
+
+
+def test_what_the_host_has_to_provide() -> None:
+    """DIM's plan, the entry as one more mark, and sight as far as the longest gap at the limit."""
+    alone, plan = MIXED.dim.start(SITE).plan, MIXED.start(SITE).plan
+    assert plan.marks == (*alone.marks, 0.0)
+    assert plan.sight == pytest.approx(7.1 * SITE.speed_limit)
+    assert replace(plan, marks=alone.marks, sight=alone.sight) == alone
+    harmonious = Dim(gate="harmonious")
+    assert Mixed(harmonious).start(SITE).plan.marks == harmonious.start(SITE).plan.marks
+    differing = Mixed(humans=Humans(deviation=0.25)).start(SITE).plan
+    assert differing.sight == pytest.approx(1.75 * 7.1 * SITE.speed_limit)  # 3 deviations
+    hasty = Mixed(humans=Humans(critical_gaps=(0.0, 0.0, 0.0))).start(SITE).plan
+    assert hasty.sight == alone.sight
+    noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
+    assert Mixed(noisy).start(SITE).plan.period == 0.2
+    assert Mixed(noisy).name == "dim-missed-0.15-humans-0.2"
+
+
+def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:
+    return [c.time for c in session.decide(View(time, vehicles)) if isinstance(c, Wake)]
+
+
+def test_drivers_at_the_junction_look_five_times_a_second() -> None:
+    driver = seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    assert wakes(MIXED.start(SITE), 3.0, driver) == [pytest.approx(3.2)]
+    assert wakes(MIXED.start(SITE), 3.0, driver._replace(distance=8.5)) == []
+    slow = replace(SITE, dt=0.5)
+    assert wakes(MIXED.start(slow), 3.0, driver) == [3.5]  # as often as there are steps
+    unseen = seen(CARS[0], B, STRAIGHT, 0.0, 5.0)  # has entered without a right of way
+    assert wakes(MIXED.start(SITE), 3.0, driver, unseen) == [pytest.approx(3.0 + SITE.dt)]
+
+
+def test_a_driver_stands_at_the_line() -> None:
+    """Up to 1 m before it, at no more than 0.1 m/s; what it sees, it sees half a step early."""
+    line = MIXED.dim.zones.hold_distance
+    for distance, speed, goes in (
+        (line + 0.99, 0.0, True), (line + 1.01, 0.0, False), (2.0, 0.09, True), (2.0, 0.11, False)
+    ):  # fmt: skip
+        scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, distance, speed)
+        scene.goes(0.0, driver)
+        assert (scene.goes(1.9, driver) == {PEOPLE[0]}) is goes
+    for early, goes in ((0.4, True), (0.6, False)):
+        scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+        scene.goes(0.0, driver)
+        assert (scene.goes(1.9 - early * SITE.dt, driver) == {PEOPLE[0]}) is goes
+
+
+def test_whoever_rolls_back_from_the_line_begins_anew() -> None:
+    scene, driver = Scene(), seen(PEOPLE[0], A, STRAIGHT, 2.0)
+    scene.goes(0.0, driver)
+    scene.goes(1.0, driver._replace(speed=0.5))
+    assert scene.goes(2.0, driver) == set()
+    assert scene.goes(3.8, driver) == set()
+    assert scene.goes(3.9, driver) == {PEOPLE[0]}
+
+
+@EVERY_GATE
+def test_dim_yields_to_a_human_in_the_yellow_zone_wherever_it_may_go(gate: str) -> None:
+    """Left turns from a and b are in harmony, but b's driver may mean another way."""
+    scene = Scene(replace(MIXED, dim=Dim(gate=gate)))
+    car, driver = seen(CARS[0], A, STRAIGHT, 6.0, 4.0), seen(PEOPLE[0], B, LEFT, 7.5, 4.0)
+    assert scene.goes(0.0, car, driver) == set()
+    assert scene.goes(0.5, car._replace(distance=2.0, speed=0.0)) == {CARS[0]}
+
+
+def test_the_harmonious_gate_lets_in_who_is_in_harmony_with_all_that_a_human_may_do() -> None:
+    """Whatever comes out of lane b keeps clear of a left turn from a."""
+    car, driver = seen(CARS[0], A, LEFT, 6.0, 4.0), seen(PEOPLE[0], B, STRAIGHT, 7.5, 4.0)
+    assert Scene(replace(MIXED, dim=Dim(gate="harmonious"))).goes(0.0, car, driver) == {CARS[0]}
+    assert Scene().goes(0.0, car, driver) == set()
+
+
+def test_a_human_beyond_the_yellow_zone_holds_up_nobody() -> None:
+    car, driver = seen(CARS[0], A, STRAIGHT, 6.0, 4.0), seen(PEOPLE[0], B, LEFT, 8.2, 4.0)
+    assert Scene().goes(0.0, car, driver) == {CARS[0]}
+
+
+def test_nobody_of_dim_goes_from_behind_a_human() -> None:
+    driver, car = seen(PEOPLE[0], A, STRAIGHT, 0.5), seen(CARS[0], A, STRAIGHT, 7.9)
+    assert Scene(replace(MIXED, dim=Dim(gate="harmonious"))).goes(0.0, driver, car) == set()
+
+
+@pytest.mark.parametrize(("trust", "goes"), [("motion", False), ("signals", True)])
+def test_dim_may_believe_an_indicator(trust: str, goes: bool) -> None:
+    """a's left turn and c's straight way, of a driver who has already entered; b waits for d."""
+    drivers = [i for i in PEOPLE if MIXED_CARELESS[i] > 0.29]
+    inside = seen(drivers[0], C, LEFT, -0.5, 3.0)
+    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
+    scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
+    assert (CARS[0] in scene.goes(0.0, car, inside)) is goes
+
+
+@pytest.mark.parametrize("lane", [B, C, D])
+@pytest.mark.parametrize("manoeuvre", [LEFT, RIGHT])
+@pytest.mark.parametrize("distance", [-0.5, 8.0])  # inside; where the yellow zone begins
+def test_an_indicator_that_is_believed_means_its_way(
+    lane: int, manoeuvre: int, distance: float
+) -> None:
+    driver = next(i for i in PEOPLE if MIXED_CARELESS[i] > 0.29)
+    other = seen(driver, lane, manoeuvre, distance, 4.0)
+    matrix = Dim().harmony(SITE)
+    for mine in (LEFT, STRAIGHT, RIGHT):
+        car = seen(CARS[0], A, mine, 6.0, 4.0)
+        harmony = matrix.harmony(Movement(A, mine), Movement(lane, manoeuvre))
+        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust="signals"))
+        assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
+
+
+def test_a_human_at_the_very_entry_may_enter() -> None:
+    car, driver = seen(CARS[0], A, STRAIGHT, 2.0), seen(PEOPLE[0], B, LEFT, 0.0)
+    assert Scene().goes(0.0, car, driver) == set()
+
+
+def test_the_yellow_zone_begins_where_it_is_marked() -> None:
+    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
+    start = MIXED.dim.zones.yellow_start
+    for distance, there in ((start, True), (start + 1e-3, False)):
+        driver = seen(PEOPLE[0], B, LEFT, distance, 4.0)
+        assert Scene().goes(0.0, car, driver) == (set() if there else {CARS[0]})
+        assert bool(wakes(MIXED.start(SITE), 0.0, driver)) is there
+
+
+def _careless() -> dict[int, float]:
+    from dim.humans.drivers import Drivers
+
+    drivers = Drivers(Humans(), 0.5, SITE.seed)
+    return {i: drivers[i].careless for i in range(200)}
+
+
+MIXED_CARELESS = _careless()
+
+
+@EVERY_GATE
+@pytest.mark.parametrize("profile", ["paper", "fair"])
+def test_without_humans_runs_are_those_of_dim_byte_for_byte(gate: str, profile: str) -> None:
+    scenario = four_way(300, profile=profile, horizon=300.0)
+    alone = minisim.simulate(scenario, Dim(gate=gate), 4, record="junction")
+    none = minisim.simulate(scenario, Mixed(Dim(gate=gate), 0.0), 4, record="junction")
+    assert digest(none) == digest(alone)
+
+
+def test_a_share_that_hits_nobody_changes_nothing_either() -> None:
+    """The cautious look at humans is no other look where there are none."""
+    scenario = four_way(300, profile="fair", horizon=120.0)
+    rare = Mixed(share=1e-9)
+    assert not rare.human(4, 200).any()
+    run, alone = (minisim.simulate(scenario, c, 4) for c in (rare, Dim()))
+    assert run.trips.equals(alone.trips)
+
+
+def test_one_driver_alone_loses_what_stopping_costs() -> None:
+    """Standing for the reaction time, ± the step of a glance; nobody else is there."""
+    scenario = replayed(four_way(profile="fair"), (0.0, A, STRAIGHT), horizon=120.0)
+    run = minisim.simulate(scenario, Mixed(share=1.0))
+    waited = float(run.columns.waiting_time[0])
+    assert waited == pytest.approx(1.9, abs=0.3)
+    stop = minisim.simulate(scenario, AllWayStop(reaction=1.9))
+    assert waited == pytest.approx(float(stop.columns.waiting_time[0]), abs=0.3)
+
+
+def test_who_believes_in_silence_collides() -> None:
+    """The check of safety can fail: 3 of 10 turns come unannounced."""
+    careless = Mixed(share=1.0, humans=Humans(trust="silence"))
+    scenario = four_way(250, profile="fair")
+    run = minisim.simulate(scenario, careless, 1, on_collision="record")
+    assert run.collisions
+
+
+def test_the_groups_of_a_run_make_up_the_whole() -> None:
+    run = minisim.simulate(four_way(150, profile="fair", horizon=600.0), Mixed(share=0.4), 2)
+    groups = driver_means(run)
+    human = run.controller.human(run.seed, len(run.columns.lane))  # type: ignore[attr-defined]
+    assert groups["human"]["trips"] == int(human.sum()) > 10
+    assert groups["human"]["trips"] + groups["automated"]["trips"] == len(human)
+    waits = run.columns.waiting_time[human & run.columns.departed]
+    assert groups["human"]["complete"]["waiting_time_s"] == pytest.approx(float(waits.mean()))
+    row = run_experiment(Experiment(run.scenario, run.controller, 2)).row  # type: ignore[arg-type]
+    assert row["human_trips"] == groups["human"]["trips"]
+    assert driver_means(minisim.simulate(four_way(50, horizon=60.0), Dim())) == {}
+
+
+def test_a_mixed_controller_is_a_value() -> None:
+    mixed = Mixed(Dim(gate="harmonious"), 0.25)
+    assert mixed.name == "dim-harmonious-humans-0.25"
+    assert pickle.loads(pickle.dumps(mixed)) == mixed
+    assert hash(mixed) == hash(Mixed(Dim(gate="harmonious"), 0.25))
+
+
+def test_with_humans() -> None:
+    dim = Dim(order="lanes")
+    assert with_humans(dim, 0.0) is dim
+    assert with_humans(dim, 1) == Mixed(dim, 1.0)
+    stop = AllWayStop()
+    assert with_humans(stop, 0.0) is stop
+    with pytest.raises(InputError, match=r"among vehicles of DIM .* not with 'all-way-stop'"):
+        with_humans(stop, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"share": 1.1}, "share of humans must be at least 0 and at most 1, got 1.1"),
+        ({"share": -0.1}, "share of humans"),
+        ({"share": float("nan")}, "share of humans"),
+        ({"share": "half"}, "share of humans must be a number"),
+        ({"dim": AllWayStop()}, "dim must be a Dim"),
+        ({"humans": 0.2}, "humans must be a Humans, got 0.2"),
+        ({"trust": "all"}, "unknown trust 'all'; allowed: motion, signals, silence"),
+    ],
+)
+def test_bad_parameters_are_named(parameters: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        replace(MIXED, **parameters)
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, "x"])
+def test_a_bad_number_of_vehicles_is_named(count: Any) -> None:
+    with pytest.raises(InputError, match="number of vehicles must be an integer of at least 0"):
+        MIXED.human(1, count)

@@ -1,0 +1,200 @@
+"""What wrong perception does is counted, and counting changes nothing."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dim import DecisionTable, Dim, HarmonyMatrix, Monitor, NoisyPerception, Perception
+from dim.perception import See
+from dim.senses.tally import Tallied, TallySession
+from minisim import simulate
+from minisim.control import Counting, Observed, Session, Site, View
+from minisim.errors import InputError
+from minisim.testing import check_controller, small_scenario
+from tests.builders import said, seen
+
+SITE = small_scenario(4).site(0)
+NONE = {"crossings": 0, "false_grants": 0, "disagreement_s": 0.0, "deadlock_s": 0.0}
+
+
+@dataclass(frozen=True)
+class Told:
+    """Everybody is told what to take another's manoeuvre for: (observer, vehicle) -> read."""
+
+    readings: tuple[tuple[tuple[int, int], int], ...] = ()
+    name: str = "told"
+    period: float | None = field(default=0.1)
+
+    def start(self, site: Site) -> See:
+        told = dict(self.readings)
+
+        def see(view: View, ego: Observed) -> View:
+            return View(
+                view.time,
+                tuple(
+                    v._replace(manoeuvre=told.get((ego.id, v.id), v.manoeuvre))
+                    for v in view.vehicles
+                ),
+            )
+
+        return see
+
+
+def session(perception: Perception, **rules: Any) -> TallySession:
+    return Tallied(Dim(perception=perception, **rules)).start(SITE)
+
+
+def show(session: Session, time: float, *vehicles: Observed) -> str:
+    return ", ".join(said(session.decide(View(time, vehicles))))
+
+
+def test_it_is_the_controller_that_it_counts_for() -> None:
+    dim = Dim(perception=NoisyPerception(0.15))
+    assert Tallied(dim).name == dim.name
+    assert pickle.loads(pickle.dumps(Tallied(dim))) == Tallied(dim)
+    assert isinstance(Tallied(dim).start(SITE), Counting)
+    assert not isinstance(dim.start(SITE), Counting)
+    with pytest.raises(InputError, match="dim must be a Dim"):
+        Tallied(NoisyPerception())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "perception", [NoisyPerception(), NoisyPerception(0.2, "symmetric", shared=False)]
+)
+def test_counting_changes_nothing(perception: NoisyPerception) -> None:
+    scenario, dim = small_scenario(4, demand_time=200.0), Dim(perception=perception)
+    plain, counted = (simulate(scenario, c, 1, on_collision="record") for c in (dim, Tallied(dim)))
+    assert plain.trips.equals(counted.trips)
+    assert plain.counts == {}
+    assert plain.summary() == {k: v for k, v in counted.summary().items() if k not in NONE}
+
+
+@pytest.mark.parametrize(
+    "dim", [Dim(), Dim(gate="harmonious"), Dim(order="lanes"), Dim(priorities="waiting"),
+            Dim(period=0.1), Dim(monitor=Monitor())]
+)  # fmt: skip
+def test_exact_perception_has_nothing_to_count(dim: Dim) -> None:
+    """But the crossings: whoever is not in the junction or on the approach at the end."""
+    run = simulate(small_scenario(4, drain=300.0), Tallied(dim), 1)
+    assert run.counts == {**NONE, "crossings": len(run.columns.lane)}
+    assert np.all(run.columns.arrived)
+
+
+def test_the_contract() -> None:
+    check_controller(Tallied(Dim()), arms=(4,), horizon=60.0)
+
+
+def test_a_right_of_way_that_the_truth_does_not_give_is_false() -> None:
+    """a2 and b2 conflict, a goes; b takes a for a left turn, which is in harmony with b2."""
+    tally = session(Told((((2, 1), 1),)))
+    waiting = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1)
+    assert show(tally, 0.0, *waiting) == "Go 1, Go 2"
+    assert tally.counts == {**NONE, "false_grants": 1}
+    show(tally, 0.1, *waiting)  # the same one
+    assert tally.counts["false_grants"] == 1
+    assert tally.counts["disagreement_s"] == 0.1
+
+
+def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
+    """b2 and d2 outvote a1, but for a b2 is b1, with which it goes."""
+    tally = session(Told((((1, 2), 1), ((1, 4), 1))))
+    assert show(tally, 0.0, seen(1, 0, 2, 2.1)) == "Go 1"
+    assert tally.counts["false_grants"] == 0
+    assert "Hold 1" not in show(
+        tally, 0.1, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 2, 2.1)
+    )
+    assert tally.counts["false_grants"] == 1
+
+
+def test_one_wrong_reading_can_stop_everybody() -> None:
+    """a2, b2 and d3 all conflict, so a goes; but for a d is d2, which goes with b2."""
+    trio = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1)
+    assert show(session(Told()), 0.0, *trio) == "Go 1"
+    tally = session(Told((((1, 4), 2),)))
+    assert show(tally, 0.0, *trio) == ""
+    assert show(tally, 2.5, *trio) == ""
+    assert tally.counts == {**NONE, "deadlock_s": 2.5, "disagreement_s": 2.5}
+
+
+def test_times_are_rounded_to_a_microsecond() -> None:
+    """0.1 + 0.2 is 0.3; in floating point, a bit more."""
+    tally = session(Told((((1, 4), 2),)))
+    for time in (0.0, 0.1, 0.1 + 0.2):
+        show(tally, time, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 0.3, "disagreement_s": 0.3}
+    show(tally, 1.3000001, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
+    assert tally.counts == {**NONE, "deadlock_s": 1.3, "disagreement_s": 1.3}
+
+
+def test_crossings_are_counted_however_rarely_one_looks() -> None:
+    tally = session(Told())
+    show(tally, 0.0, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1))
+    show(tally, 1.0, seen(1, 0, 2, -3.0), seen(2, 1, 2, 2.1))
+    assert tally.counts["crossings"] == 1
+    show(tally, 9.0)  # both have left
+    assert tally.counts["crossings"] == 2
+
+
+def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
+    tally = session(Told())
+    for time, distance, crossings in ((0.0, 2.1, 0), (1.0, 0.5, 0), (2.0, 0.0, 0), (3.0, -0.1, 1)):
+        show(tally, time, seen(1, 0, 2, distance))
+        assert tally.counts["crossings"] == crossings
+
+
+def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
+    for distance, crossings in ((8.0, 1), (8.001, 0)):  # who leaves between two looks
+        tally = session(Told())
+        show(tally, 5.0, seen(1, 0, 2, distance, 5.0))
+        show(tally, 9.0)
+        assert tally.counts == {**NONE, "crossings": crossings}
+
+
+@pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
+def test_who_must_wait_anyway_disagrees_with_nobody(gate: str, lasts: float) -> None:
+    """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
+    views = [
+        (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
+         seen(4, 3, 1, 2.1))
+        for time in (0.0, 2.5)
+    ]  # fmt: skip
+    tally = session(Told((((1, 4), 3),)), gate=gate)
+    for view in views:
+        show(tally, *view)
+    assert tally.counts["disagreement_s"] == lasts
+
+
+def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> None:
+    """The experiment can fail: with one reading in four wrong, bodies touch."""
+    scenario = small_scenario(4, density=300.0, demand_time=1200.0)
+    wrong = NoisyPerception(0.25, "symmetric")
+    run = simulate(scenario, Tallied(Dim(perception=wrong)), 1, on_collision="record")
+    assert run.collisions
+    assert run.counts["false_grants"] >= len(run.collisions)
+    assert run.counts["disagreement_s"] > 0.0
+
+
+def test_lanes_first_lets_the_first_lane_go_in_every_case() -> None:
+    """All 255 cases of four arms; the largest clique leaves it out in some."""
+    for order, always in (("lanes", True), ("size", False)):
+        table = DecisionTable(HarmonyMatrix.paper(4), order)
+        goes = [table.lanes(table.case(case)) >> case[0].origin & 1 for case in table]
+        assert all(goes) is always
+
+
+@pytest.mark.parametrize("confidence", [None, 0.9])
+def test_lanes_first_never_blocks_on_wrong_intents(confidence: float | None) -> None:
+    """The first lane that takes part belongs to the clique of every case: it goes, whoever errs."""
+    scenario = small_scenario(4, density=250.0, demand_time=600.0)
+    wrong = NoisyPerception(0.25, "symmetric", shared=False, confidence=confidence)
+    size, lanes = (
+        simulate(scenario, Tallied(Dim(order=order, perception=wrong)), 1, on_collision="record")
+        for order in ("size", "lanes")
+    )
+    assert size.counts["deadlock_s"] > 100.0
+    assert lanes.counts["deadlock_s"] == 0.0

@@ -1,0 +1,356 @@
+"""DIM as a controller: its plan, and its commands on hand-made views."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+
+import pytest
+
+from dim import Dim, HarmonyMatrix, Zones
+from dim.agent import GATES
+from dim.controller import DimSession
+from dim.perception import See
+from minisim.control import Controller, Go, Hold, Observed, Session, Site, View, Wake
+from minisim.errors import InputError
+from minisim.junction.geometry import Intersection
+from scenarios import five_way, four_way, three_way
+
+MATRIX = HarmonyMatrix.paper(4)
+
+
+def car(vehicle: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
+    lane, manoeuvre = MATRIX.movements[MATRIX.index(movement)]
+    return Observed(vehicle, lane, manoeuvre, distance, speed, 4.0)
+
+
+class Scene:
+    """A session on the paper's 4 arms that is shown one view after the other."""
+
+    def __init__(self, dim: Dim, site: Site | None = None) -> None:
+        self.session = dim.start(four_way().site() if site is None else site)
+        self.time = 0.0
+
+    def show(self, *cars: Observed) -> str:
+        """The commands as text, such as `go 1, hold 2`."""
+        self.time += 1.0
+        vehicles = sorted(cars, key=lambda c: (c.lane, c.distance))
+        commands = self.session.decide(View(self.time, tuple(vehicles)))
+        return ", ".join(self._word(command) for command in commands)
+
+    def _word(self, command: object) -> str:
+        if isinstance(command, Wake):
+            return f"wake in {command.time - self.time:.1f}"
+        assert isinstance(command, Go | Hold)
+        return f"{type(command).__name__.lower()} {command.vehicle}"
+
+
+EVERY_GATE = pytest.mark.parametrize("gate", GATES)
+
+
+@EVERY_GATE
+def test_an_empty_junction_needs_no_command(gate: str) -> None:
+    assert Scene(Dim(gate=gate)).show() == ""
+
+
+@EVERY_GATE
+def test_alone_it_goes_at_the_yellow_zone_and_is_told_once(gate: str) -> None:
+    scene = Scene(Dim(gate=gate))
+    assert scene.show(car(1, "b3", 8.4, 5.0)) == ""
+    assert scene.show(car(1, "b3", 8.0, 4.8)) == "go 1"
+    assert scene.show(car(1, "b3", 6.0, 4.8)) == ""
+    assert scene.show(car(1, "b3", 2.0, 5.0)) == ""
+    assert scene.show(car(1, "b3", -8.0, 5.0)) == ""
+    assert scene.show() == ""
+
+
+@EVERY_GATE
+def test_the_papers_example(gate: str) -> None:
+    waiting = [car(i, m, 2.2) for i, m in enumerate(["a1", "b2", "c2", "d2"])]
+    assert Scene(Dim(gate=gate)).show(*waiting) == "go 0, go 1"
+
+
+@EVERY_GATE
+def test_the_order_decides(gate: str) -> None:
+    scene = [car(1, "a2", 2.2), car(2, "b1", 2.2), car(3, "d2", 2.2)]
+    assert Scene(Dim(gate=gate)).show(*scene) == "go 2, go 3"
+    assert Scene(Dim(gate=gate, order="lanes")).show(*scene) == "go 1"
+
+
+def test_a_late_arrival_waits_until_the_junction_is_clear() -> None:
+    """The paper's case 2: decisions stand while anyone crosses, even in harmony."""
+    scene = Scene(Dim())
+    assert scene.show(car(1, "c2", 7.9, 4.8)) == "go 1"
+    assert scene.show(car(1, "c2", -3.0, 5.0), car(2, "a1", 8.0, 4.8)) == ""
+    assert scene.show(car(1, "c2", -9.0, 5.0), car(2, "a1", 2.2)) == ""
+    assert scene.show(car(2, "a1", 2.2)) == "go 2"
+
+
+def test_who_holds_the_right_of_way_keeps_it_while_another_crosses() -> None:
+    scene = Scene(Dim())
+    both = [car(1, "a1", 2.2), car(2, "b2", 2.2)]
+    assert scene.show(*both) == "go 1, go 2"
+    # 1 is on its way, 2 has not moved; c and d would prefer another clique without 1.
+    assert (
+        scene.show(car(1, "a1", -1.0, 3.0), both[1], car(3, "d2", 8, 4), car(4, "c2", 8, 4)) == ""
+    )
+    # 1 is clear: now the three others decide, and 2 and 3 are in harmony.
+    assert scene.show(both[1], car(3, "d2", 2.2), car(4, "c2", 2.2)) == "go 3"
+
+
+@EVERY_GATE
+def test_a_new_decision_revokes_a_right_of_way_that_nobody_has_used(gate: str) -> None:
+    scene = Scene(Dim(gate=gate))
+    assert scene.show(car(3, "c2", 2.2)) == "go 3"
+    assert scene.show(car(3, "c2", 2.1, 0.6), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
+    # and back, when that one has gone
+    assert scene.show(car(3, "c2", 1.9), car(2, "b2", -4.0, 5.0)) == ""
+    assert scene.show(car(3, "c2", 1.9)) == "go 3"
+
+
+@EVERY_GATE
+def test_a_committed_vehicle_keeps_its_right_of_way(gate: str) -> None:
+    scene = Scene(Dim(gate=gate))
+    assert scene.show(car(3, "c2", 2.2)) == "go 3"
+    assert scene.show(car(3, "c2", 1.0, 2.5), car(2, "b2", 8.0, 4.8)) == ""
+
+
+@EVERY_GATE
+def test_revoked_and_standing_in_the_green_zone_it_takes_part(gate: str) -> None:
+    scene = Scene(Dim(gate=gate))
+    scene.show(car(3, "c2", 2.2))
+    assert scene.show(car(3, "c2", 1.2, 1.0), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
+    # It stands past half of the green zone: with commit="stoppable" not committed.
+    assert scene.show(car(3, "c2", 0.4), car(2, "b2", 3.0, 3.0), car(1, "a1", 8, 4)) == "go 1"
+    assert scene.show(car(3, "c2", 0.4)) == "go 3"
+
+
+@EVERY_GATE
+def test_a_vehicle_that_lost_its_right_of_way_and_looks_committed_is_waited_for(gate: str) -> None:
+    """No wake-up comes when it stands, so the session asks to look again every step."""
+    scene = Scene(Dim(gate=gate))
+    scene.show(car(3, "c2", 2.2))
+    scene.show(car(3, "c2", 1.3, 1.0), car(2, "b2", 8.0, 4.8))
+    assert scene.show(car(3, "c2", 0.2, 0.9)) == "wake in 0.1"
+    assert scene.show(car(3, "c2", 0.05)) == "go 3"
+
+
+def test_paper_commit_at_half_of_the_green_zone() -> None:
+    scene = Scene(Dim(commit="paper"))
+    assert scene.show(car(3, "c2", 2.2)) == "go 3"
+    # Before half of it a moving vehicle is revoked, even one that cannot stop any more...
+    assert scene.show(car(3, "c2", 1.1, 5.0), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
+    # ...and past it the others grant it the right of way: now two conflicting vehicles go.
+    assert scene.show(car(3, "c2", 0.9, 4.9), car(2, "b2", 7.5, 4.8)) == "go 3"
+
+
+def test_stoppable_commit_does_not_revoke_there() -> None:
+    scene = Scene(Dim())
+    assert scene.show(car(3, "c2", 2.2)) == "go 3"
+    assert scene.show(car(3, "c2", 1.1, 5.0), car(2, "b2", 8.0, 4.8)) == ""
+
+
+def test_paper_commit_counts_a_standing_vehicle_past_half_as_crossing() -> None:
+    scene = Scene(Dim(commit="paper"))
+    assert scene.show(car(3, "c2", 0.9), car(1, "a1", 2.2)) == "go 3"
+    assert scene.show(car(3, "c2", -9.0, 5.0), car(1, "a1", 2.2)) == ""
+    assert scene.show(car(1, "a1", 2.2)) == "go 1"
+
+
+def test_the_harmonious_gate_admits_beside_a_crossing_vehicle() -> None:
+    crossing = car(1, "c2", -3.0, 5.0)
+    arriving = [car(2, "a1", 8.0, 4.8), car(3, "d2", 2.2)]  # a1 and d2 are in conflict
+    for gate, commands in [("clear", ""), ("harmonious", "go 2")]:
+        scene = Scene(Dim(gate=gate))
+        scene.show(car(1, "c2", 5.0, 3.0))
+        assert scene.show(crossing, *arriving) == commands
+
+
+def test_beside_a_crossing_vehicle_a_right_of_way_may_be_revoked_too() -> None:
+    both = [car(1, "c2", 2.2), car(2, "a2", 2.2)]
+    later = [car(1, "c2", -1.0, 3.0), car(2, "a2", 2.2), car(3, "b1", 8.0, 4.8)]
+    for gate, commands in [("clear", ""), ("harmonious", "hold 2, go 3")]:
+        scene = Scene(Dim(gate=gate, priorities=(1, 0, 2, 3)))
+        assert scene.show(*both) == "go 2, go 1"
+        assert scene.show(*later) == commands  # a2 and b1 are in conflict, b comes first
+
+
+def test_a_vehicle_follows_those_of_its_lane_beside_harmonious_others() -> None:
+    follower = car(2, "a3", 7.0, 4.0)
+    for gate, commands in [("clear", ""), ("harmonious", "go 2")]:
+        scene = Scene(Dim(gate=gate))
+        assert scene.show(car(1, "a2", 5.0, 3.0), car(3, "c1", 5.0, 3.0)) == "go 1, go 3"
+        # a3 would follow a2, but is in conflict with c1...
+        assert scene.show(car(1, "a2", -3.0, 5.0), follower, car(3, "c1", -3.0, 5.0)) == ""
+        # ... until that is clear.
+        assert scene.show(car(1, "a2", -9.0, 5.0), follower) == commands
+
+
+@pytest.mark.parametrize(("gate", "commands"), [("clear", ""), ("harmonious", "go 2, hold 3")])
+def test_nobody_of_a_lane_takes_part_until_its_committed_front_vehicle_has_entered(
+    gate: str, commands: str
+) -> None:
+    """c2 may go beside a2; the follower a3 is in conflict with it, and of a higher lane."""
+    scene = Scene(Dim(gate=gate))
+    behind, beside = car(2, "a3", 6.9), car(3, "c2", 2.2)
+    assert scene.show(car(1, "a2", 2.2), beside) == "go 1, go 3"
+    assert scene.show(car(1, "a2", 2.0, 1.0), behind, beside) == ""  # not committed yet
+    assert scene.show(car(1, "a2", 1.0, 3.0), behind, beside) == ""  # 3²/(2·2) = 2.25 > 1
+    assert scene.show(car(1, "a2", -0.1, 4.0), behind, beside) == commands
+
+
+def test_vehicles_out_of_sight_are_forgotten() -> None:
+    scene = Scene(Dim())
+    for vehicle in range(50):
+        assert scene.show(car(vehicle, "a1", 3.0)) == f"go {vehicle}"
+        assert len(scene.session._agents) == 1
+    scene.show()
+    assert not scene.session._agents
+
+
+def test_sessions_share_nothing_but_the_table() -> None:
+    dim, site = Dim(), four_way().site()
+    one, other = Scene(dim, site), Scene(dim, site)
+    assert one.show(car(1, "a1", 3.0)) == "go 1"
+    assert other.show(car(1, "a1", 3.0)) == "go 1"
+    assert one.session.rules.table is other.session.rules.table
+
+
+@dataclass(frozen=True)
+class Blind:
+    """Everyone sees only itself."""
+
+    name = "blind"
+    period = None
+
+    def start(self, site: Site) -> See:
+        return lambda view, ego: View(view.time, (ego,))
+
+
+def test_each_vehicle_decides_from_what_it_perceives_itself() -> None:
+    waiting = [car(i, m, 2.2) for i, m in enumerate(["a2", "b2", "c2", "d2"])]
+    assert Scene(Dim(perception=Blind())).show(*waiting) == "go 0, go 1, go 2, go 3"
+
+
+def test_the_plan() -> None:
+    zones = Zones(red=20, yellow=5, green=3)
+    site = four_way().site()
+    plan = Dim(zones=zones).start(site).plan
+    assert plan.hold_distance == 3
+    assert plan.sight == 8.5
+    assert plan.wake_on_clear
+    assert not plan.lanes_open
+    assert plan.period is None
+    assert plan.markings == zones.markings(site)
+    assert Dim(period=0.1).start(site).plan.period == 0.1
+
+
+@pytest.mark.parametrize(
+    ("gate", "commit", "marks"),
+    [
+        ("clear", "stoppable", (9,)),
+        ("clear", "paper", (9, 2)),
+        ("harmonious", "stoppable", (9, 0)),
+        ("harmonious", "paper", (9, 2, 0)),
+    ],
+)
+def test_wake_up_marks(gate: str, commit: str, marks: tuple[float, ...]) -> None:
+    """Yellow zone; half of the green zone, where the paper commits; entry, for the followers."""
+    dim = Dim(zones=Zones(yellow=5, green=4), gate=gate, commit=commit)
+    assert dim.start(four_way().site()).plan.marks == marks
+
+
+@pytest.mark.parametrize(
+    ("dim", "name"),
+    [
+        (Dim(), "dim"),
+        (Dim(gate="harmonious"), "dim-harmonious"),
+        (Dim(order="lanes"), "dim-lanes"),
+        (Dim(commit="paper"), "dim-paper-commit"),
+        (Dim(priorities="inflow"), "dim-inflow"),
+        (Dim(priorities=(1, 0, 2)), "dim-priorities"),
+        (Dim("lanes", "paper", "harmonious", "inflow"), "dim-harmonious-lanes-paper-commit-inflow"),
+    ],
+)
+def test_name(dim: Dim, name: str) -> None:
+    assert dim.name == name
+
+
+def test_it_is_a_controller_hashable_and_picklable() -> None:
+    dim = Dim(matrix=HarmonyMatrix.paper(4), priorities=[3, 1, 0, 2])  # type: ignore[arg-type]
+    assert isinstance(dim, Controller)
+    assert isinstance(dim.start(four_way().site()), Session)
+    assert dim.priorities == (3, 1, 0, 2)
+    again = pickle.loads(pickle.dumps(dim))
+    assert again == dim
+    assert hash(again) == hash(dim)
+    assert repr(again) == repr(dim)
+    assert dim != Dim()
+
+
+def test_lanes_by_inflow() -> None:
+    dim = Dim(priorities="inflow")
+    for split, ranks in [
+        (None, (0, 1, 2, 3)),
+        ((4, 3, 2, 1), (0, 1, 2, 3)),
+        ((4, 1, 4, 1), (0, 2, 1, 3)),  # ties by lane
+        ((1, 2, 3, 4), (3, 2, 1, 0)),
+        ((3, 1, 4, 2), (1, 3, 0, 2)),
+    ]:
+        site = four_way(split=split).site()
+        assert dim.ranks(site) == ranks
+        assert dim.start(site).rules.table.priorities == ranks
+
+
+def test_priorities_decide_ties() -> None:
+    pair = [car(1, "a2", 2.2), car(2, "b2", 2.2)]
+    assert Scene(Dim()).show(*pair) == "go 1"
+    assert Scene(Dim(priorities=(1, 0, 2, 3))).show(*pair) == "go 2"
+
+
+def test_the_matrix_comes_from_the_site_unless_given() -> None:
+    for maker, n in [(three_way, 3), (four_way, 4), (five_way, 5)]:
+        assert Dim().harmony(maker().site()) == HarmonyMatrix.paper(n)
+    right = Intersection((0.0, 90.0, 180.0, 270.0), side="right")
+    site = Site(right, four_way().site().vehicle, 11.0, (1.0,) * 4)
+    assert Dim().harmony(site) != HarmonyMatrix.paper(4)
+    given = Dim(matrix=HarmonyMatrix.paper(4))
+    assert given.start(site).rules.table.matrix == HarmonyMatrix.paper(4)
+
+
+def test_sites_that_it_cannot_serve() -> None:
+    site = five_way().site()
+    with pytest.raises(InputError, match="matrix is for 4 arms, the intersection has 5"):
+        Dim(matrix=HarmonyMatrix.paper(4)).start(site)
+    with pytest.raises(InputError, match="priorities of 5 lanes"):
+        Dim(priorities=(0, 1, 2)).start(site)
+    with pytest.raises(InputError, match="make arm_length longer"):
+        Dim().start(four_way(arm_length=40.0).site())
+    with pytest.raises(InputError, match="site must be a Site"):
+        Dim().start("four-way")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="dim must be a Dim"):
+        DimSession("dim", site)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"order": "sizes"}, r"unknown order 'sizes'.*did you mean 'size'"),
+        ({"commit": "stopable"}, r"unknown commit rule 'stopable'.*did you mean 'stoppable'"),
+        ({"gate": "harmony"}, r"unknown gate 'harmony'.*did you mean 'harmonious'"),
+        ({"gate": None}, "unknown gate None"),
+        ({"priorities": "inflows"}, r"unknown priorities 'inflows'.*did you mean 'inflow'"),
+        ({"priorities": (0, 2)}, "priorities of 2 lanes are the ranks 0 … 1"),
+        ({"priorities": 3}, "priorities must be lane ranks or 'inflow', got 3"),
+        ({"priorities": ("a", "b")}, "lane rank"),
+        ({"priorities": (0, 10**5000)}, "priorities of 2 lanes"),
+        ({"zones": 30}, "zones must be a Zones"),
+        ({"matrix": "paper"}, "matrix must be a HarmonyMatrix"),
+        ({"perception": "exact"}, "perception must be a Perception"),
+        ({"period": 0}, "period"),
+        ({"period": "1"}, "period"),
+    ],
+)
+def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Dim(**arguments)  # type: ignore[arg-type]

@@ -1,0 +1,344 @@
+"""The decision: the paper's example, all cases against an oracle, and the offline table."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import combinations, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dim
+from dim import DecisionTable, HarmonyMatrix, decide, explain
+from dim.decision import ORDERS, decision_table, lane_ranks
+from minisim.errors import InputError
+from minisim.junction.geometry import Movement
+
+Clique = tuple[Movement, ...]
+
+#: Of every case of 3, 4, 5 arms: how many, and in how many the two orders differ (as_run.md).
+CASES = {3: (26, 1), 4: (255, 26), 5: (3124, 508)}
+
+
+def text(movements: Iterable[Movement]) -> str:
+    return " ".join(map(str, movements))
+
+
+def all_cases(n: int) -> Iterator[Clique]:
+    """Every non-empty choice of nobody or one manoeuvre for each lane."""
+    for digits in product(range(n), repeat=n):
+        if any(digits):
+            yield tuple(Movement(lane, j) for lane, j in enumerate(digits) if j)
+
+
+def oracle(participants: Clique, matrix: HarmonyMatrix, order: str, ranks: Sequence[int]) -> Clique:
+    """The definition, by trying every subset: no graph library, no shared code."""
+    together = [
+        subset
+        for size in range(1, len(participants) + 1)
+        for subset in combinations(participants, size)
+        if all(matrix.values[matrix.index(a), matrix.index(b)] for a, b in combinations(subset, 2))
+    ]
+    if order == "size":
+        largest = max(len(subset) for subset in together)
+        eligible = [subset for subset in together if len(subset) == largest]
+    else:
+        eligible = [s for s in together if not any(set(s) < set(other) for other in together)]
+    return min(eligible, key=lambda subset: sorted(ranks[m.origin] for m in subset))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_table_online_and_oracle_agree_on_every_case(n: int, order: str) -> None:
+    matrix = HarmonyMatrix.paper(n)
+    table = DecisionTable(matrix, order)
+    table.complete()
+    count = 0
+    for participants in all_cases(n):
+        count += 1
+        expected = oracle(participants, matrix, order, range(n))
+        assert decide(participants, matrix, order) == expected, text(participants)
+        assert table.decide(participants) == expected, text(participants)
+    assert count == len(table) == CASES[n][0]
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_given_priorities_agree_with_the_oracle_on_every_case(n: int) -> None:
+    matrix = HarmonyMatrix.paper(n)
+    rng = random.Random(n)
+    for order in ORDERS:
+        ranks = rng.sample(range(n), n)
+        table = DecisionTable(matrix, order, ranks)
+        for participants in all_cases(n):
+            expected = oracle(participants, matrix, order, ranks)
+            assert decide(participants, matrix, order, ranks) == expected
+            assert table.decide(participants) == expected
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_in_how_many_cases_the_orders_differ(n: int) -> None:
+    by_size, by_lanes = (DecisionTable(HarmonyMatrix.paper(n), order) for order in ORDERS)
+    differing = sum(by_size.lanes(case) != by_lanes.lanes(case) for case in range(1, n**n))
+    assert differing == CASES[n][1]
+
+
+def test_the_papers_example() -> None:
+    explanation = explain(["a1", "b2", "c2", "d2"], HarmonyMatrix.paper(4))
+    assert text(explanation.participants) == "a1 b2 c2 d2"
+    assert [text(edge) for edge in explanation.edges] == ["a1 b2", "a1 c2", "b2 d2"]
+    assert [text(clique) for clique in explanation.tied] == ["a1 b2", "a1 c2", "b2 d2"]
+    assert explanation.cliques == explanation.tied
+    assert text(explanation.right_of_way) == "a1 b2"
+    assert explanation.reason == (
+        "3 cliques tie at the largest size, 2; a1 b2 holds the highest-priority lanes of them "
+        "(priority a b c d)."
+    )
+
+
+def test_the_papers_worst_case_goes_by_the_table() -> None:
+    """A and C turn left, B and D go straight: the text expects four tied pairs (Fig. 4)."""
+    explanation = explain(["a1", "b2", "c1", "d2"], HarmonyMatrix.paper(4))
+    assert text(explanation.right_of_way) == "a1 b2"
+    assert [text(clique) for clique in explanation.tied] == ["a1 b2", "a1 c1", "b2 d2", "c1 d2"]
+
+
+@pytest.mark.parametrize(
+    ("movements", "order", "priorities", "chosen", "reason"),
+    [
+        ("c3", "size", None, "c3", "c3 is alone."),
+        ("a1 b1 c1 d1", "size", None, "a1 b1 c1 d1", "a1 b1 c1 d1 are all in harmony."),
+        ("a2 b2", "size", None, "a2", "2 cliques tie at the largest size, 1; a2 holds"),
+        ("a2 b2", "size", (3, 2, 1, 0), "b2", "b2 holds .* \\(priority d c b a\\)"),
+        ("a2 b1 d2", "size", None, "b1 d2", "b1 d2 is the only clique of 2, the largest size"),
+        ("a2 b1 d2", "lanes", None, "a2", "a2 holds the .* all 2 maximal cliques .*, whatever"),
+        ("a1 b2 c2 d2", "size", (3, 2, 1, 0), "b2 d2", "priority d c b a"),
+        ("a1 b2 c2 d2", "lanes", (2, 3, 1, 0), "b2 d2", "priority d c a b"),
+        ("a1 b2 c2 d2", "size", (1, 3, 0, 2), "a1 c2", "priority c a d b"),
+    ],
+)
+def test_choice_and_reason(
+    movements: str, order: str, priorities: tuple[int, ...] | None, chosen: str, reason: str
+) -> None:
+    matrix = HarmonyMatrix.paper(4)
+    explanation = explain(movements.split(), matrix, order, priorities)
+    assert text(explanation.right_of_way) == chosen
+    assert explanation.cliques[0] == explanation.right_of_way
+    assert decide(movements.split(), matrix, order, priorities) == explanation.right_of_way
+    assert re.search(reason, explanation.reason)
+
+
+def test_nobody() -> None:
+    matrix = HarmonyMatrix.paper(3)
+    assert decide([], matrix) == ()
+    assert DecisionTable(matrix).lanes(0) == 0
+    assert DecisionTable(matrix).decide([]) == ()
+    with pytest.raises(
+        InputError, match=r"^a decision needs at least one participant, such as a1$"
+    ):
+        explain([], matrix)
+
+
+def test_insertion_order_does_not_matter() -> None:
+    matrix = HarmonyMatrix.paper(5)
+    rng = random.Random(1)
+    for participants in rng.sample(list(all_cases(5)), 150):
+        expected = [decide(participants, matrix, order) for order in ORDERS]
+        for _ in range(4):
+            shuffled = rng.sample(participants, len(participants))
+            assert [decide(shuffled, matrix, order) for order in ORDERS] == expected
+            assert decide(map(str, shuffled), matrix) == expected[0]
+            assert explain(shuffled, matrix) == explain(participants, matrix)
+
+
+DIGEST = """
+import hashlib
+from itertools import product
+from dim import DecisionTable, HarmonyMatrix, decide
+from dim.decision import ORDERS
+digest = hashlib.sha256()
+for n in (3, 4, 5):
+    matrix = HarmonyMatrix.paper(n)
+    tables = [DecisionTable(matrix, order) for order in ORDERS]
+    for digits in product(range(n), repeat=n):
+        # A set of strings: its order depends on the hash seed, the answers must not.
+        participants = {f"{'abcde'[lane]}{j}" for lane, j in enumerate(digits) if j}
+        for order, table in zip(ORDERS, tables):
+            answer = table.decide(participants)
+            if n < 5:
+                assert answer == decide(participants, matrix, order)
+            digest.update(" ".join(map(str, answer)).encode() + b";")
+print(digest.hexdigest())
+"""
+
+
+def test_answers_do_not_depend_on_the_hash_seed() -> None:
+    root = str(Path(dim.__file__).parents[1])
+    digests = set()
+    for seed in ("0", "1", "20240229"):
+        result = subprocess.run(
+            [sys.executable, "-c", DIGEST],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": root},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        digests.add(result.stdout)
+    assert len(digests) == 1
+    assert len(digests.pop().strip()) == 64
+
+
+def test_cases_are_the_integers_from_one() -> None:
+    table = DecisionTable(HarmonyMatrix.paper(3))
+    cases = list(table)
+    assert len(cases) == len(set(cases)) == len(table) == 26
+    assert sorted(cases) == sorted(all_cases(3))
+    for number, participants in enumerate(cases, start=1):
+        assert table.case(participants) == number
+        assert table.participants(number) == participants
+    assert table.case(["b2", "a1"]) == 1 + 2 * 3
+    assert table.participants(0) == ()
+
+
+def test_an_entry_is_computed_once_and_kept() -> None:
+    table = DecisionTable(HarmonyMatrix.paper(4))
+    case = table.case(["a1", "b2", "c2", "d2"])
+    assert table.lanes(case) == 0b0011
+    table.lanes(case)
+    assert table.lanes.cache_info().misses == 1
+    table.complete()
+    assert table.lanes.cache_info().currsize == 255
+    table.complete()
+    assert table.lanes.cache_info().misses == 255
+
+
+def test_tables_are_shared() -> None:
+    matrix = HarmonyMatrix.paper(4)
+    same = HarmonyMatrix(4, np.array(matrix.values))
+    assert decision_table(matrix, "size", (0, 1, 2, 3)) is decision_table(
+        same, "size", (0, 1, 2, 3)
+    )
+    assert decision_table(matrix, "lanes") is not decision_table(matrix, "size")
+
+
+def test_a_table_of_many_arms_is_filled_on_demand_only() -> None:
+    free = np.ones((56, 56), dtype=int)
+    lane = np.arange(56) // 7
+    free[lane[:, None] == lane[None, :]] = 0
+    table = DecisionTable(HarmonyMatrix(8, free))
+    assert len(table) == 8**8 - 1
+    assert text(table.decide(["a1", "h7", "c2"])) == "a1 c2 h7"
+    with pytest.raises(InputError, match="8 arms have 16777215 cases"):
+        table.complete()
+
+
+@pytest.mark.parametrize(
+    ("participants", "crossing", "admitted"),
+    [
+        ("a1 b2 c2 d2", "", "a1 b2 c2 d2"),
+        ("a1 b2 c2 d2", "b1", "a1 b2 c2 d2"),  # b2 follows in the lane of b1
+        ("a1 b2 c2 d2", "a1", "a1 b2 c2"),
+        ("a1 b2 c2 d2", "a1 b2", "a1 b2"),
+        ("a2 c2", "b2", ""),
+        ("c1", "a1 b1", "c1"),
+        ("d3", "d1 d2", "d3"),  # all of one lane
+        ("a3 b2", "a1 c1", ""),  # a3 behind a1, but in conflict with c1
+    ],
+)
+def test_who_is_admitted_beside_crossing_vehicles(
+    participants: str, crossing: str, admitted: str
+) -> None:
+    matrix = HarmonyMatrix.paper(4)
+    table = DecisionTable(matrix)
+    occupied = sum(1 << matrix.index(m) for m in crossing.split())
+    case = table.admitted(table.case(participants.split()), occupied)
+    assert text(table.participants(case)) == admitted
+
+
+@pytest.mark.parametrize(
+    ("movements", "message"),
+    [
+        (["a1", "a2"], "one participant a lane: lane a has a1 and a2"),
+        (["b1", "b1"], "lane b has b1 and b1"),
+        (["e1"], "no movement 'e1'"),
+        (["a4"], "no movement 'a4'"),
+        ([5], "no movement 5"),
+        ([10**5000], "no movement a int too large"),
+        ("a1", "^participants must be a sequence of movements such as a1, b2"),
+        (7, "must be a sequence"),
+    ],
+)
+def test_participants_are_checked(movements: object, message: str) -> None:
+    matrix = HarmonyMatrix.paper(4)
+    for function in (decide, explain):
+        with pytest.raises(InputError, match=message):
+            function(movements, matrix)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=message):
+        DecisionTable(matrix).case(movements)  # type: ignore[arg-type]
+
+
+def test_other_arguments_are_checked() -> None:
+    matrix = HarmonyMatrix.paper(4)
+    with pytest.raises(InputError, match=r"unknown order 'sise'.*did you mean 'size'"):
+        decide(["a1"], matrix, "sise")
+    with pytest.raises(InputError, match="unknown order"):
+        DecisionTable(matrix, "first")
+    with pytest.raises(InputError, match="matrix must be a HarmonyMatrix"):
+        DecisionTable("paper")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="matrix must be a HarmonyMatrix"):
+        decide(["a1"], 4)  # type: ignore[arg-type]
+    for case in (-1, 256, 1.0, "1"):
+        with pytest.raises(InputError, match="case must be an integer 0 … 255"):
+            DecisionTable(matrix).participants(case)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "priorities",
+    [(0, 1, 2), (0, 1, 2, 2), (1, 2, 3, 4), (0, 1, 2, 3, 4), "abcd", 4, (0.0, 1, 2, 3)],
+)
+def test_priorities_are_a_permutation_of_the_lanes(priorities: object) -> None:
+    with pytest.raises(InputError, match=r"priorities|lane rank"):
+        lane_ranks(priorities, 4)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"priorities|lane rank"):
+        decide(["a1"], HarmonyMatrix.paper(4), "size", priorities)  # type: ignore[arg-type]
+
+
+def test_wrong_priorities_are_named() -> None:
+    message = r"^priorities of 4 lanes are the ranks 0 … 3, each once, got \(0, 1, 2, 2\)$"
+    with pytest.raises(InputError, match=message):
+        lane_ranks([0, 1, 2, 2], 4)
+    with pytest.raises(InputError, match=r"^priorities must be a sequence of lane ranks"):
+        lane_ranks(4, 4)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^lane rank must be an integer of at least 0, got -1"):
+        lane_ranks([-1, 0, 1], 3)
+
+
+def test_default_priorities_are_the_lanes_own_order() -> None:
+    assert lane_ranks(None, 4) == lane_ranks([0, 1, 2, 3], 4) == (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_who_surely_goes_does_whatever_the_unknown_want(order: str) -> None:
+    """All cases of three arms, each with any of its participants unknown, and somebody inside."""
+    matrix = HarmonyMatrix.paper(3)
+    table = DecisionTable(matrix, order)
+    for lanes, inside in product(product(range(4), repeat=3), (None, *matrix.movements)):
+        known = [Movement(lane, j) for lane, j in enumerate(lanes) if 0 < j < 3]
+        unknown = [lane for lane, j in enumerate(lanes) if j == 3]
+        goes = []
+        for meant in product((1, 2), repeat=len(unknown)):
+            participants = [*known, *map(Movement, unknown, meant)]
+            admitted = [
+                m
+                for m in participants
+                if inside is None or m.origin == inside.origin or matrix.harmony(m, inside)
+            ]
+            goes.append({m.origin for m in decide(admitted, matrix, order)})
+        crossing = 0 if inside is None else 1 << matrix.index(inside)
+        found = table.surely(table.case(known), sum(1 << lane for lane in unknown), crossing)
+        assert found == sum(1 << lane for lane in set.intersection(*goes))

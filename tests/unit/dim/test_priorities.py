@@ -1,0 +1,257 @@
+"""Lane priorities that change with time: by hand, and the same for all whenever they came."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import minisim
+from dim import Dim, Zones
+from dim.controller import DimSession
+from dim.priorities import (
+    SAME_TIME,
+    TURN_TIME,
+    Watch,
+    longest_waiting,
+    memory_of,
+    rotating,
+    turn_at,
+)
+from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
+from minisim.errors import InputError
+from scenarios import four_way
+from scenarios.strategies import scenarios
+from tests.builders import digest, drained
+
+
+def car(vehicle: int, lane: int, distance: float, manoeuvre: int = 2) -> Observed:
+    return Observed(vehicle, lane, manoeuvre, distance, 0.0, 4.0)
+
+
+# --- by hand ---------------------------------------------------------------------------------
+
+
+def test_turns_follow_the_clock() -> None:
+    assert turn_at(0.0, 4, 10.0) == (0, 10.0)
+    assert turn_at(9.9, 4, 10.0) == (0, 10.0)
+    assert turn_at(10.0, 4, 10.0) == (1, 20.0)
+    assert turn_at(40.0, 4, 10.0) == (0, 50.0)
+    assert turn_at(2.9999999, 3, 3.0) == (1, 6.0)  # a rounding error before the end of a turn
+
+
+def test_ranks_rotate() -> None:
+    assert [rotating(t, 4, 10.0).ranks for t in (0, 10, 20, 30, 40)] == [
+        (0, 1, 2, 3), (3, 0, 1, 2), (2, 3, 0, 1), (1, 2, 3, 0), (0, 1, 2, 3),
+    ]  # fmt: skip
+
+
+def test_a_turn_is_longer_than_a_crossing() -> None:
+    """22 m from a stand at 2.6 m/s²: t = √(2·22 / 2.6) = 4.1 s."""
+    assert TURN_TIME > 2 * (2 * 22 / 2.6) ** 0.5
+
+
+def test_the_longest_wait_comes_first() -> None:
+    ranking = longest_waiting(30.0, 4, {0: 29.0, 2: 25.0, 3: 27.0}, memory=8.0, turn_time=100.0)
+    assert ranking.ranks == (2, 3, 0, 1)  # c, d, a; nobody waits on b
+    assert ranking.until == 33.0  # then c's wait counts no more
+
+
+def test_no_wait_counts_more_than_the_memory() -> None:
+    since = {0: 29.0, 2: 1.0, 3: 15.0}
+    ranks = [longest_waiting(30.0 + t, 4, since, 8.0, 10.0).ranks for t in (0.0, 10.0)]
+    assert ranks == [(2, 3, 1, 0), (0, 3, 1, 2)]  # c, d alike, and d's turn; then all, and a's
+
+
+def test_waits_that_differ_by_rounding_tie_and_others_do_not() -> None:
+    """2e-7 s apart are one instant, and the turn decides; 0.4 s apart are not."""
+    one_turn = {"memory": 50.0, "turn_time": 100.0}
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-7}, **one_turn).ranks == (0, 1)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 0.4}, **one_turn).ranks == (1, 0)
+    assert longest_waiting(30.0, 2, {0: 20.0, 1: 20.0 - 2e-6}, **one_turn).ranks == (1, 0)
+
+
+def test_ranks_hold_until_a_wait_reaches_the_memory_or_the_turn_ends() -> None:
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 100.0).until == 32.0
+    assert longest_waiting(30.0, 3, {1: 25.0, 2: 24.0}, 8.0, 31.0).until == 31.0
+    assert longest_waiting(30.0, 3, {1: 22.0}, 8.0, 100.0).until == 100.0  # it has just done so
+    assert longest_waiting(0.0, 3, {1: 0.0}, SAME_TIME, 100.0).until == 100.0
+
+
+def test_who_has_just_come_is_before_nobody() -> None:
+    assert longest_waiting(0.0, 3, {2: 0.0}, 8.0, 100.0).ranks == (1, 2, 0)
+
+
+def test_memory_is_how_long_everybody_has_watched() -> None:
+    """100 m range, yellow zone from 8 m: 92 m at 40 km/h."""
+    site = four_way().site()
+    assert memory_of(site, Zones()) == pytest.approx(92.0 / (40.0 / 3.6))
+    with pytest.raises(InputError, match="sensors that reach 8 m"):
+        memory_of(site, Zones(), 8.0)
+    with pytest.raises(InputError, match="sensors that reach 8 m"):
+        Dim(priorities="waiting", sensor_range=8.0).start(site)
+    Dim(priorities="rotating", sensor_range=8.0).start(site)
+    assert memory_of(site, Zones(), 8.5) == pytest.approx(0.5 / (40.0 / 3.6))
+
+
+def test_a_watch_notes_who_passes_the_start() -> None:
+    watch = Watch(8.0)
+    assert watch.look(1.0, [car(1, 0, 8.1)]) == {}
+    assert watch.look(2.0, [car(1, 0, 7.9), car(5, 2, 3.0)]) == {0: 2.0, 2: 2.0}
+    assert Watch(8.0).look(2.0, [car(1, 0, 8.0), car(5, 2, 0.0)]) == {0: 2.0, 2: 2.0}
+    assert watch.look(3.0, [car(1, 0, -1.0), car(2, 0, 6.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 2.0}
+    assert watch.look(4.0, [car(2, 0, 2.0)]) == {0: 3.0}
+    assert watch.look(5.0, [car(2, 0, 2.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 5.0}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"turn_time": 0.9}, "turn_time"),
+        ({"turn_time": 3600.5}, "turn_time"),
+        ({"turn_time": "10"}, "turn_time"),
+        ({"sensor_range": 0.0}, "sensor_range"),
+        ({"priorities": "rotate"}, "unknown priorities 'rotate'.*did you mean 'rotating'"),
+    ],
+)
+def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Dim(**arguments)  # type: ignore[arg-type]
+
+
+# --- the session -----------------------------------------------------------------------------
+
+
+def words(commands: Iterable[Command]) -> list[str]:
+    names = {Go: "go", Hold: "hold"}
+    return [
+        f"wake {c.time:g}" if isinstance(c, Wake) else f"{names[type(c)]} {c.vehicle}"
+        for c in commands
+    ]
+
+
+def test_a_session_looks_again_when_the_turn_ends() -> None:
+    session = Dim(priorities="rotating").start(four_way().site())
+    both = (car(0, 0, 2.2), car(1, 1, 2.2))  # a2 and b2 are in conflict
+    assert words(session.decide(View(9.0, both))) == ["go 0", "wake 10"]
+    assert words(session.decide(View(10.0, both))) == ["hold 0", "go 1", "wake 20"]
+    alone = (both[0],)
+    assert words(session.decide(View(11.0, alone))) == ["go 0"]  # nobody waits: no wake-up
+
+
+def test_a_session_lets_go_who_waits_longest() -> None:
+    session = Dim(priorities="waiting").start(four_way().site())
+    first, second = car(1, 1, 2.2), car(0, 0, 2.2)
+    assert words(session.decide(View(1.0, (first,)))) == ["go 1"]
+    assert words(session.decide(View(3.0, (second, first)))) == ["wake 9.28"]
+    # Both have waited for 8.28 s, which is as much as counts; it is b's turn from 10 s on.
+    assert words(session.decide(View(12.0, (second, first)))) == ["wake 20"]
+
+
+def test_names() -> None:
+    assert Dim(priorities="rotating").name == "dim-rotating"
+    assert Dim(order="lanes", priorities="waiting").name == "dim-lanes-waiting"
+
+
+@given(
+    scenarios(horizon=60.0, max_density=500.0),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(["rotating", "waiting"]),
+    st.sampled_from(["clear", "harmonious"]),
+    st.sampled_from(["size", "lanes"]),
+)
+@settings(max_examples=20)
+def test_safe_and_wake_ups_lose_nothing(scenario, seed, priorities, gate, order) -> None:
+    scenario = drained(scenario, seed, 900.0)
+    dim = Dim(priorities=priorities, gate=gate, order=order)
+    woken = minisim.simulate(scenario, dim, seed=seed)
+    assert woken.columns.arrived.all()
+    always = minisim.simulate(scenario, replace(dim, period=scenario.profile.dt), seed=seed)
+    assert digest(woken) == digest(always)
+
+
+# --- unanimity -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Observers:
+    """DIM, and beside it a watch for every vehicle that starts when its sensors reach.
+
+    Each vehicle that takes part ranks the lanes from what it has seen itself, with sensors of
+    `reach` metres; `disagreements` counts the looks at which it ranks two participants otherwise
+    than the session.
+    """
+
+    dim: Dim
+    reach: float
+    tally: dict[str, int]
+    name: str = "observers"
+
+    def start(self, site: Site) -> ObserversSession:
+        return ObserversSession(self, site)
+
+
+class ObserversSession:
+    def __init__(self, recipe: Observers, site: Site) -> None:
+        self.session = DimSession(recipe.dim, site)
+        self.plan: Plan = replace(self.session.plan, sight=recipe.reach, period=site.dt)
+        self.recipe = recipe
+        self.start = recipe.dim.zones.yellow_start + 1e-6
+        self.memory = memory_of(site, recipe.dim.zones, recipe.dim.sensor_range)
+        self.n = site.intersection.n
+        self.ours = Watch(self.start)
+        self.watches: dict[int, Watch] = {}
+
+    def decide(self, view: View) -> Iterable[Command]:
+        ours = self.ours.look(view.time, view.vehicles)
+        common = longest_waiting(view.time, self.n, ours, self.memory).ranks
+        for ego in view.vehicles:
+            watch = self.watches.setdefault(ego.id, Watch(self.start))
+            own = longest_waiting(
+                view.time, self.n, watch.look(view.time, view.vehicles), self.memory
+            ).ranks
+            if 0.0 <= ego.distance <= self.start:
+                self.recipe.tally["looks"] += 1
+                self.recipe.tally["differ"] += own != common
+        return self.session.decide(view)
+
+
+def disagreements(reach: float, sensor_range: float, density: float) -> dict[str, int]:
+    tally = {"looks": 0, "differ": 0}
+    dim = Dim(priorities="waiting", sensor_range=sensor_range)
+    scenario = four_way(density=density, profile="fair", horizon=400.0)
+    minisim.simulate(scenario, Observers(dim, reach, tally), seed=2)
+    return tally
+
+
+def test_late_vehicles_rank_the_lanes_as_those_who_were_there() -> None:
+    """Whoever has watched from 100 m on knows as much as the others about every wait."""
+    tally = disagreements(reach=100.0, sensor_range=100.0, density=300.0)
+    assert tally["looks"] > 2000
+    assert tally["differ"] == 0
+
+
+def test_with_shorter_sensors_than_agreed_they_do_not() -> None:
+    """The assumption matters: who sees 12 m only, but counts as if it saw 100, differs."""
+    assert disagreements(reach=12.0, sensor_range=100.0, density=300.0)["differ"] > 0
+
+
+@given(
+    st.dictionaries(st.integers(0, 4), st.integers(0, 300), min_size=1, max_size=5),
+    st.integers(10, 100),
+    st.integers(0, 200),
+    st.integers(0, 200),
+)
+def test_whoever_has_watched_for_the_memory_agrees(
+    passed: dict[int, int], memory: int, early: int, later: int
+) -> None:
+    """In tenths of a second: passing times, and an observer that began `early` before it must."""
+    now = max(passed.values()) + later
+    began = now - memory - early
+    truth = {lane: when / 10 for lane, when in passed.items()}
+    seen = {lane: max(when, began) / 10 for lane, when in passed.items()}
+    rankings = [longest_waiting(now / 10, 5, since, memory / 10) for since in (truth, seen)]
+    assert rankings[0] == rankings[1]

@@ -1,0 +1,394 @@
+"""Figures and animations: what is drawn is where and what the model says."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+import minisim
+from dim import Dim, HarmonyMatrix, explain
+from figures import decision_figure, performance_figure, save, style, write_animation
+from figures.film.animate import Picture, frame_times
+from figures.film.encode import COLOURS, palette_of, write_gif, write_html
+from figures.film.frames import RELEASED, Film
+from figures.junction import drawing
+from minisim.control import Plan, Unregulated
+from minisim.errors import FileError, InputError
+from minisim.junction.geometry import Intersection
+from minisim.results.run import Run
+from minisim.vehicle import VehicleType
+from scenarios import four_way
+
+INTERSECTIONS = [
+    Intersection((0, 120, 240)),
+    Intersection((0, 90, 180, 270), side="right"),
+    Intersection((0, 72, 144, 216, 288), junction_radius=8.4),
+    Intersection((0, 35, 100, 200)),
+    Intersection((0, 60, 120)),
+    Intersection((10, 100, 190), side="right", lane_width=4.0),
+]
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return minisim.simulate(
+        four_way(400, horizon=130), Dim(), seed=1, record="all", record_window=(100, 130)
+    )
+
+
+@pytest.fixture(scope="module")
+def picture(run: Run) -> Picture:
+    return Picture(run, 100.0)
+
+
+# --- the junction ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
+def test_every_body_stays_on_the_asphalt(intersection: Intersection) -> None:
+    asphalt = shapely.Polygon(drawing.outline(intersection, 100.0))
+    assert asphalt.is_valid
+    vehicle = VehicleType()
+    for path in intersection.paths:
+        # A long body cuts the tightest corners by a few centimetres.
+        assert asphalt.buffer(0.2).covers(path.corridor(vehicle))
+
+
+@pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
+def test_lanes_lie_under_their_paths(intersection: Intersection) -> None:
+    for path in intersection.paths:
+        corners = drawing.lane_strip(intersection, path.movement.origin, 38.0, 8.0)
+        strip = shapely.Polygon(corners)
+        way = shapely.LineString(path.position([path.entry - 38.0, path.entry - 8.0]))
+        assert strip.area == pytest.approx(30.0 * intersection.lane_width)
+        assert way.hausdorff_distance(strip.centroid) == pytest.approx(15.0)
+        assert strip.buffer(1e-6).covers(
+            way.buffer(0.4 * intersection.lane_width, cap_style="flat")
+        )
+
+
+def test_hold_lines_cross_the_paths_at_the_hold_distance() -> None:
+    intersection = Intersection((0, 90, 180, 270))
+    lines = drawing.hold_lines(intersection, Plan(hold_distance=2.0))
+    for path in intersection.paths:
+        front = path.position(path.entry - 2.0)
+        np.testing.assert_allclose(lines[path.movement.origin].mean(axis=0), front, atol=1e-9)
+
+
+def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
+    vehicle = run.site.vehicle
+    path = run.site.intersection.paths[2]
+    for s in (path.entry - 3.0, path.entry + 4.0, path.exit + 9.0):
+        centre, heading = path.pose(s, vehicle.length)
+        front = centre + heading * vehicle.length / 2.0
+        angle = math.degrees(math.atan2(heading[0], heading[1]))
+        body, glass = drawing.body_shape(vehicle)
+        drawn = shapely.Polygon(drawing.place(body, *front, angle)[0])
+        true = shapely.Polygon(path.bodies(s, vehicle))
+        assert true.buffer(1e-6).covers(drawn), "a rounded body inside the model's rectangle"
+        assert drawn.area > 0.93 * true.area
+        assert drawn.covers(shapely.Polygon(drawing.place(glass, *front, angle)[0]))
+
+
+# --- film: the run by time -------------------------------------------------------------------
+
+
+def test_film_counts_what_the_trajectories_say(run: Run) -> None:
+    film, frame = Film(run, 100.0), run.trajectories
+    for time in (100.1, 112.0, 129.9):
+        now = frame[np.isclose(frame["time_s"], time)]
+        assert film.at(time).stop - film.at(time).start == len(now)
+        assert film.waiting(film.at(time)) == (now["speed_mps"] <= 0.1).sum()
+    assert film.served(100.0) == 0
+    paths = run.site.intersection.paths
+    cleared = 0
+    for _, trip in frame.groupby("vehicle"):
+        index = "abcd".index(trip["lane"].iloc[0]) * 3 + trip["manoeuvre"].iloc[0] - 1
+        clear = paths[index].exit + run.site.vehicle.length
+        cleared += (trip["s_m"].iloc[0] <= clear) and (trip["s_m"].iloc[-1] > clear)
+    assert film.served(130.0) == cleared > 0
+
+
+def test_lanes_open_with_their_first_vehicle(run: Run) -> None:
+    film = Film(run, 100.0)
+    opened = set()
+    for time in frame_times(100.1, 29.0, 10.0, 0.1).tolist():
+        rows = film.rows(film.at(time), 1e9)
+        for lane in film.open_lanes(rows):
+            ahead = rows[(film.lane[rows] == lane) & (film.s[rows] <= film.entry)]
+            assert film.state[ahead[np.argmax(film.s[ahead])]] == RELEASED
+            opened.add(lane)
+    assert opened
+
+
+def test_ways_end_at_the_exit(run: Run) -> None:
+    film, intersection = Film(run, 100.0), run.site.intersection
+    exits = np.array([path.position(path.exit) for path in intersection.paths])
+    ways = [way for t in range(101, 130) for way in film.ways(film.rows(film.at(t), 1e9))]
+    assert ways
+    for way in ways:
+        assert np.min(np.linalg.norm(exits - way[-1], axis=1)) < 1e-6
+
+
+def test_indicators_follow_the_turn() -> None:
+    """Manoeuvre 1 is left, 2 straight, 3 right with left-hand traffic on four arms (paper)."""
+    right_now = minisim.simulate(
+        four_way(400, horizon=60), Unregulated(), seed=1, record="all", on_collision="record"
+    )
+    film = Film(right_now, 0.0)
+    assert film.turn.tolist() == [-1, 0, 1] * 4
+
+
+def test_collisions_are_ringed() -> None:
+    crash = minisim.simulate(
+        four_way(350, horizon=150), Unregulated(), seed=1, record="all", on_collision="record"
+    )
+    film, first = Film(crash, 0.0), crash.collisions[0]
+    assert film.collided(first.time - 0.1) == 0
+    assert film.crashes(first.time - 0.1) == []
+    (ring,) = film.crashes(first.time)
+    assert film.collided(first.time) == 1
+    front = crash.site.intersection.path(
+        crash.site.intersection.parse(first.movements[0])
+    ).position(first.positions[0])
+    assert np.linalg.norm(ring.mean(axis=0) - front) < 6.0
+
+
+def test_nothing_recorded_is_an_error() -> None:
+    empty = minisim.simulate(four_way(0, horizon=5), Dim(), record="all")
+    with pytest.raises(InputError, match="no vehicle"):
+        Picture(empty)
+    with pytest.raises(InputError, match="record"):
+        Picture(minisim.simulate(four_way(300, horizon=5), Dim()))
+
+
+# --- the picture -----------------------------------------------------------------------------
+
+
+def pixels(image: Image.Image) -> npt.NDArray[np.int64]:
+    return np.asarray(image).astype(np.int64)
+
+
+def rgb(colour: str) -> list[int]:
+    return [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+
+
+def test_picture_is_the_same_whatever_was_drawn_before(run: Run, picture: Picture) -> None:
+    before = pixels(picture.draw(105.0))
+    picture.draw(128.3)
+    assert (pixels(picture.draw(105.0)) == before).all()
+    assert (pixels(Picture(run, 100.0).draw(105.0)) == before).all()
+
+
+def test_picture_shows_the_vehicles(run: Run, picture: Picture) -> None:
+    """Whoever waits or is about to cross has its colour at its place."""
+    frame, entry = run.trajectories, run.site.intersection.paths[0].entry
+    near = frame[(frame["s_m"] > entry - 25.0) & (frame["s_m"] < entry + 5.0)]
+    seen = set()
+    for time in (104.0, 108.0, 112.0, 116.0, 120.0, 124.0, 128.0):
+        image = pixels(picture.draw(time))
+        for row in near[(near["time_s"] - time).abs() < 0.01].itertuples():
+            if not row.right_of_way and row.speed_mps > 0.1:
+                continue
+            heading = np.radians(row.angle_deg)
+            rear = (row.x_m - 3.2 * np.sin(heading), row.y_m - 3.2 * np.cos(heading))
+            x, y = picture._axes.transData.transform(rear)
+            colour = image[image.shape[0] - 1 - round(y), round(x)]
+            wanted = style.RIGHT_OF_WAY if row.right_of_way else style.WAITING
+            assert np.abs(colour - rgb(wanted)).max() < 12
+            seen.add(wanted)
+    assert seen == {style.RIGHT_OF_WAY, style.WAITING}
+
+
+def test_every_zone_is_coloured(picture: Picture) -> None:
+    seen = {tuple(c) for c in pixels(picture.draw(129.0)).reshape(-1, 3).tolist()}
+    assert {tuple(rgb(colour)) for colour in style.ZONES.values()} <= seen
+
+
+def test_frame_times_are_steps() -> None:
+    times = frame_times(10.0, 2.0, 4.0, 0.1)
+    np.testing.assert_allclose(times, [10.0, 10.2, 10.5, 10.8, 11.0, 11.2, 11.5, 11.8])
+    for bad in ((-1.0, 2.0, 4.0), (0.0, 0.0, 4.0), (0.0, 2.0, 11.0), (0.0, math.inf, 4.0)):
+        with pytest.raises(InputError):
+            frame_times(*bad, 0.1)
+
+
+# --- files -----------------------------------------------------------------------------------
+
+images = st.lists(
+    st.binary(min_size=48, max_size=48).map(
+        lambda data: Image.frombytes("RGB", (4, 4), bytes(b & 0xC0 for b in data))
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+def palette_for(frames: list[Image.Image]) -> Image.Image:
+    """Few enough colours that none is changed: four levels a channel, all pictures at once."""
+    strip = Image.new("RGB", (4, 4 * len(frames)))
+    for k, frame in enumerate(frames):
+        strip.paste(frame, (0, 4 * k))
+    palette = palette_of(strip)
+    return palette.crop((0, 0, 4, 4))
+
+
+def indexed(frames: list[Image.Image], palette: Image.Image) -> list[Image.Image]:
+    return [f.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB") for f in frames]
+
+
+@given(images)
+def test_gif_plays_back_every_frame(tmp_path_factory: pytest.TempPathFactory, frames: list) -> None:
+    frames = [*frames, frames[-1]]  # one that repeats
+    palette = palette_for(frames)
+    file = tmp_path_factory.mktemp("gif") / "film.gif"
+    write_gif(iter(frames), palette, file, fps=10.0)
+    with Image.open(file) as film:
+        assert film.n_frames == len(frames)
+        assert film.info["loop"] == 0
+        for k, frame in enumerate(indexed(frames, palette)):
+            film.seek(k)
+            assert film.info["duration"] == 100
+            assert (pixels(film.convert("RGB")) == pixels(frame)).all()
+
+
+def test_html_holds_every_frame(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    frames = [
+        Image.fromarray((rng.integers(0, 4, (5, 6, 3)) * 85).astype(np.uint8)) for _ in range(4)
+    ]
+    palette = palette_of(Image.fromarray(np.concatenate([np.asarray(f) for f in frames])))
+    palette = palette.crop((0, 0, 6, 5))
+    file = tmp_path / "film.html"
+    write_html(iter(frames), palette, file, 5.0, 'four-way <b> "x"')
+    page = file.read_text()
+    assert "{{" not in page
+    assert "four-way &lt;b&gt;" in page
+    assert "<b>" not in page
+    found = re.search(r"const frames = (\[.*?\n  \]);", page, re.DOTALL)
+    assert found is not None
+    parts = json.loads(re.sub(r",\s*\]", "]", found[1]))
+    assert len(parts) == len(frames)
+    shown = Image.new("RGBA", (6, 5))
+    ground = None
+    for (x, y, data), frame in zip(parts, indexed(frames, palette), strict=True):
+        part = Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA")
+        shown = Image.new("RGBA", (6, 5)) if ground is None else ground.copy()
+        shown.alpha_composite(part, (x, y))
+        ground = shown if ground is None else ground
+        assert (pixels(shown.convert("RGB")) == pixels(frame)).all()
+
+
+def test_palette_leaves_an_index_free() -> None:
+    gradient = np.arange(256 * 256 * 3, dtype=np.uint32).astype(np.uint8).reshape(256, 256, 3)
+    assert np.asarray(palette_of(Image.fromarray(gradient))).max() < COLOURS
+
+
+def test_animation_is_written_whole_or_not(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "film.gif"
+    file.write_bytes(b"before")
+
+    def stop(done: int, total: int) -> None:
+        assert total == 20
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_animation(run, file, start=110, seconds=2, progress=stop)
+    assert list(tmp_path.iterdir()) == [file]
+    assert file.read_bytes() == b"before"
+    write_animation(run, file, start=110, seconds=2)
+    first = file.read_bytes()
+    write_animation(run, file, start=110, seconds=2)
+    assert file.read_bytes() == first
+
+
+def test_figures_are_the_same_bytes_every_time(tmp_path: Path) -> None:
+    scenario = four_way()
+    site = scenario.site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    explanation = explain(["a1", "b2", "c2", "d2"], matrix)
+    for suffix in style.FORMATS:
+        written = []
+        for name in ("one", "two"):
+            file = tmp_path / f"{name}.{suffix}"
+            save(decision_figure(explanation, site, Dim().start(site).plan), file)
+            written.append(file.read_bytes())
+        assert written[0] == written[1]
+
+
+def test_save_refuses(tmp_path: Path) -> None:
+    figure = style.new_figure(1, 1)
+    with pytest.raises(InputError, match=r"\.bmp"):
+        save(figure, tmp_path / "x.bmp")
+    with pytest.raises(FileError):
+        save(figure, tmp_path / "no" / "x.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- plots -----------------------------------------------------------------------------------
+
+
+def test_decision_figure_names_everyone() -> None:
+    site = four_way().site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    explanation = explain(["a1", "b2", "c2", "d2"], matrix)
+    figure = decision_figure(explanation, site, Dim().start(site).plan)
+    scene, graph = figure.axes
+    assert {t.get_text() for t in scene.texts} >= {"a1", "b2", "c2", "d2", "a", "b", "c", "d"}
+    assert {t.get_text() for t in graph.texts} >= {"$V^{a}_{1}$", "$V^{d}_{2}$"}
+    strong = [line for line in graph.lines if line.get_color() == style.RIGHT_OF_WAY]
+    assert (len(graph.lines), len(strong)) == (len(explanation.edges), 1)
+    assert any(t.get_text() == "Right of way: a1, b2" for t in figure.texts)
+    (zones,) = figure.legends
+    assert [t.get_text() for t in zones.get_texts()] == ["red zone", "yellow zone", "green zone"]
+
+
+def test_decision_figure_texts_do_not_overlap() -> None:
+    site = four_way().site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    figure = decision_figure(
+        explain(["a1", "b2", "c2", "d2"], matrix), site, Dim().start(site).plan
+    )
+    figure.draw_without_rendering()
+    texts = [t for axes in figure.axes for t in axes.texts] + list(figure.texts)
+    boxes = [t.get_window_extent() for t in texts]
+    for i, one in enumerate(boxes):
+        assert one.x0 >= 0
+        assert one.x1 <= figure.bbox.x1
+        for other in boxes[i + 1 :]:
+            assert not one.overlaps(other)
+
+
+def test_performance_figure_draws_means_and_intervals() -> None:
+    points = pd.DataFrame({
+        "controller": ["dim", "fixed-time"] * 2, "density": [150.0, 150.0, 350.0, 350.0],
+        "waiting_time_s": [1.0, 9.0, 20.0, 90.0], "waiting_time_s_ci95": [0.1, 1.0, 5.0, 9.0],
+        "travel_time_s": [80.0, 90.0, 100.0, 180.0], "travel_time_s_ci95": [1.0, 2.0, 3.0, 4.0],
+    })  # fmt: skip
+    waiting, travel = performance_figure(points, "title").axes
+    assert [waiting.get_title(loc="left"), travel.get_title(loc="left")] == [
+        "Waiting time", "Travel time",
+    ]  # fmt: skip
+    for axes, column in ((waiting, "waiting_time_s"), (travel, "travel_time_s")):
+        handles, labels = axes.get_legend_handles_labels()
+        assert labels == ["DIM, paper's gate", "fixed-time signal"]
+        for handle, controller in zip(handles, ("dim", "fixed-time"), strict=True):
+            line, caps, _ = handle.lines
+            chosen = points[points["controller"] == controller]
+            upper = chosen[column] + chosen[f"{column}_ci95"]
+            np.testing.assert_allclose(np.array(line.get_ydata(), float), chosen[column])
+            np.testing.assert_allclose(np.array(caps[1].get_ydata(), float), upper)

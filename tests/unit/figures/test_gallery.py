@@ -1,0 +1,366 @@
+"""Figures and tables of results: each is made from a store of formulas, and says what it shows."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from baselines import webster
+from dim import HarmonyMatrix
+from figures import lines, report, style
+from figures.gallery import GALLERY, item_named, write
+from figures.paper_tables import harmony_table, webster_table
+from figures.tables import WRITERS, Table, save_table
+from minisim.errors import FileError, InputError
+from scenarios.paper import SERIES, Cell, reference_value
+from scenarios.studies.archive import Archive, MissingRunsError, missing_note
+from scenarios.studies.capacity import Search
+from scenarios.studies.cells import saturated
+from scenarios.studies.reproduction import CAPACITY, PARTS, Made
+from scenarios.studies.results import Effort
+from scenarios.studies.study import RIVALS, STUDIES
+from scenarios.sweep.experiment import Experiment
+from tests.builders import capacity_of, synthetic_find, synthetic_row
+
+EFFORT, SEARCH = Effort(seeds=2), Search(step=20.0, steps=64, seeds=2)
+
+
+@pytest.fixture(scope="module")
+def archive() -> Archive:
+    return Archive(synthetic_find, EFFORT, SEARCH)
+
+
+def partial_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    """A store without adaptive signals."""
+    return [None if e.label == "adaptive" else synthetic_row(e) for e in experiments]
+
+
+# --- the gallery -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archive) -> None:
+    drawing = GALLERY[name].build(archive)
+    if isinstance(drawing, Table):
+        assert drawing.rows
+        return
+    drawing.draw_without_rendering()
+    texts = [t for t in drawing.findobj(match=lambda a: hasattr(a, "get_text")) if t.get_text()]
+    boxes = [(t.get_text(), t.get_window_extent()) for t in texts if t.get_visible()]
+    for text, box in boxes:
+        inside = box.x0 >= -1 and box.x1 <= drawing.bbox.x1 + 1 and box.y1 <= drawing.bbox.y1 + 1
+        assert inside or not box.width, text
+    legends = [legend.get_window_extent() for legend in drawing.legends]
+    for i, one in enumerate(legends):
+        for other in legends[i + 1 :]:
+            assert not one.overlaps(other)
+
+
+def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
+    needed = {need for item in GALLERY.values() for need in item.needs}
+    assert needed == set(PARTS) == {*STUDIES, CAPACITY}
+
+
+def test_unknown_figure_names_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean 'worst-case'"):
+        item_named("worst-cases")
+
+
+@pytest.mark.parametrize("name", ["worst-case", "losses-table", "gate"])
+def test_same_results_same_bytes(name: str, archive: Archive, tmp_path: Path) -> None:
+    folders = [tmp_path / "one", tmp_path / "two"]
+    for folder in folders:
+        folder.mkdir()
+        write(GALLERY[name].build(archive), folder, name)
+    suffixes = style.FORMATS if isinstance(GALLERY[name].build(archive), Figure) else WRITERS
+    for suffix in suffixes:
+        one, two = ((folder / f"{name}.{suffix}").read_bytes() for folder in folders)
+        assert one == two
+
+
+def test_nothing_to_draw_says_how_to_make_it() -> None:
+    empty = Archive(lambda asked: [None] * len(asked), EFFORT, SEARCH)
+    for name, item in GALLERY.items():
+        if item.needs:
+            with pytest.raises(MissingRunsError, match=r"minisim reproduce --only .* --seeds 2"):
+                item.build(empty)
+        else:
+            assert item.build(empty), name
+
+
+@pytest.mark.parametrize("study", ["text", "as-run"])
+@pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
+def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
+    runs = {experiment.key for _, experiment in EFFORT.runs(STUDIES[study])}
+
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if e.key in runs else None for e in asked]
+
+    drawing = GALLERY[name].build(Archive(find, EFFORT, SEARCH))
+    if isinstance(drawing, Table):
+        columns = {"as-run": 3, "text": 5}
+        for other, column in columns.items():
+            assert {row[column] == "–" for row in drawing.rows} == {other != study}
+        return
+    assert [len(axes.get_legend_handles_labels()[0]) > 0 for axes in drawing.axes] == [
+        study == "as-run", study == "text",
+    ]  # fmt: skip
+    assert any("no run" in text.get_text() for text in drawing.texts)
+
+
+def test_what_is_missing_is_said_in_the_picture() -> None:
+    figure = GALLERY["fair"].build(Archive(partial_find, EFFORT, SEARCH))
+    assert isinstance(figure, Figure)
+    notes = [" ".join(t.get_text().split()) for t in figure.texts if "no run" in t.get_text()]
+    assert len(notes) == 1
+    assert "adaptive (fair, 4 arms, balanced, 50)" in notes[0]
+    assert "9 more" in notes[0]
+
+
+def test_small_print_counts_the_runs_that_there_are() -> None:
+    """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
+
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        lost = ("all-way-stop", 2)
+        return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
+
+    figure = GALLERY["fair"].build(Archive(find, EFFORT, SEARCH))
+    assert isinstance(figure, Figure)
+    (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
+    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
+    assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
+    assert "no run" not in note
+    archive = Archive(synthetic_find, Effort(seeds=5), SEARCH)
+    assert missing_note([archive.study("as-run")], lambda _: True).startswith("3 to 5 seeds, 3600")
+
+
+def test_losses_end_where_the_runs_do() -> None:
+    archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)), SEARCH)
+    table = GALLERY["losses-table"].build(archive)
+    assert isinstance(table, Table)
+    assert "demands tried, 150 to 350." in table.notes[0]
+    figure = GALLERY["losses"].build(archive)
+    assert isinstance(figure, Figure)
+    for axes in figure.axes:
+        assert axes.get_xticks().tolist() == [150.0, 350.0]
+        bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
+        assert bars
+        assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
+
+    def alone(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if e.label == "dim" else None for e in asked]
+
+    with pytest.raises(MissingRunsError, match="DIM and another controller"):
+        GALLERY["losses"].build(Archive(alone, EFFORT, SEARCH))
+
+
+# --- what the pictures say -------------------------------------------------------------------
+
+
+def hollow(figure: Figure, panel: int) -> list[Line2D]:
+    return [line for line in figure.axes[panel].lines if line.get_markerfacecolor() == "none"]
+
+
+def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
+    figure = GALLERY["waiting-4321"].build(archive)
+    assert isinstance(figure, Figure)
+    for panel in (0, 1):
+        found = hollow(figure, panel)
+        assert len(found) == len(SERIES)
+        for line, (published, series) in zip(found, SERIES.items(), strict=True):
+            assert line.get_marker() == style.look(series).marker
+            wanted = {
+                reference_value(Cell("4:3:2:1", d, 4), "waiting_time_s", published)
+                for d in (150, 200, 250, 300, 350)
+            }
+            assert set(np.asarray(line.get_ydata(), float).tolist()) == wanted
+        crossed = [line for line in figure.axes[panel].lines if line.get_marker() == "x"]
+        assert [len(np.asarray(line.get_xdata())) for line in crossed] == [0, 5, 5, 5]
+
+
+def test_our_means_are_drawn_where_they_are(archive: Archive) -> None:
+    figure = GALLERY["fair"].build(archive)
+    assert isinstance(figure, Figure)
+    (results,) = archive.need("fair")
+    handles = figure.axes[0].get_legend_handles_labels()[0]
+    assert len(handles) == len(RIVALS)
+    for handle, series in zip(handles, RIVALS, strict=True):
+        rows = results.good[results.good["series"] == series]
+        means = rows.groupby("density")["complete_waiting_time_s"].mean()
+        np.testing.assert_allclose(np.asarray(handle.lines[0].get_ydata(), float), means)
+
+
+def test_growing_queues_get_an_arrow(archive: Archive) -> None:
+    figure = GALLERY["fair"].build(archive)
+    assert isinstance(figure, Figure)
+    (results,) = archive.need("fair")
+    cells = results.good.groupby(["series", "density"])
+    grown = sum(saturated(cell) for _, cell in cells)
+    arrows = [t for t in figure.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
+    assert len(arrows) == grown > 0
+
+
+def test_series_are_told_apart_without_colour() -> None:
+    together = [RIVALS, ("dim", "dim-rotating", "dim-waiting"), ("dim-3", "dim-4", "dim-5")]
+    for group in together:
+        looks = [style.look(name) for name in group]
+        assert len({look.marker for look in looks}) == len(looks)
+        assert len({look.colour for look in looks}) == len(looks)
+
+
+def test_log_axis_shows_plain_numbers() -> None:
+    figure = style.new_figure(4, 3)
+    axes = figure.add_subplot()
+    lines.log_time(axes, 0.0, 500.0, linear=0.1)
+    figure.draw_without_rendering()
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["0", "0.1", "1", "10", "100"]
+
+
+# --- tables ----------------------------------------------------------------------------------
+
+
+def test_webster_table_by_hand() -> None:
+    """C0 = (1.5·8 + 5)/(1 − 4q/1500), g = (C0 − 8)/4; at 150: 28.33 and 5.08 s."""
+    table = webster_table()
+    assert [row[0] for row in table.rows] == ["150", "200", "250", "300", "350"]
+    assert [row[2] for row in table.rows] == ["5.08", "7.11", "10.75", "19.25", "61.75"]
+    assert [row[1] for row in table.rows] == ["5", "7", "10.75", "19.75", "61.75"]
+    assert table.rows[0][4] == "28.33"
+    assert table.rows[4][6] == f"{350 * 255 / (1500 * 61.75):.3f}"
+    assert webster((150,) * 4).greens[0] == pytest.approx(5.0833, abs=1e-4)
+
+
+@pytest.mark.parametrize("arms", [3, 4, 5])
+def test_harmony_table_is_the_published_matrix(arms: int) -> None:
+    table = harmony_table(arms)
+    paper = HarmonyMatrix.paper(arms)
+    entries = [[cell.rstrip("≠") == "1" for cell in row[1:]] for row in table.rows]
+    np.testing.assert_array_equal(entries, paper.values)
+    assert "same matrix" in table.notes[0]
+
+
+def test_lane_table_has_the_paper_s_numbers(archive: Archive) -> None:
+    table = GALLERY["lanes"].build(archive)
+    assert isinstance(table, Table)
+    found = {(row[0], row[1]): row[2] for row in table.rows}
+    assert found["4-way", "d"] == "10.21"
+    assert found["5-way", "e"] == "146.11"
+    assert found["3-way", "a"] == "0.46 †", "its run stopped early"
+
+
+def test_capacity_table_has_what_the_rows_hold(archive: Archive) -> None:
+    table = GALLERY["capacity-table"].build(archive)
+    assert isinstance(table, Table)
+    first = dict(zip(table.headings, table.rows[0], strict=True))
+    assert first["controller"] == "DIM"
+    for arms in (3, 4, 5, 6):
+        value = float(first[f"{arms} arms"].split(" ± ")[0])
+        assert value == pytest.approx(capacity_of("dim", arms) / 0.98, abs=20.0)
+
+
+def test_table_formats(tmp_path: Path) -> None:
+    table = Table("50 % & more", ("a_b", "c"), (("x", "1 ± 2"),), notes=("≥ 3",))
+    assert (
+        table.markdown() == "**50 % & more**\n\n| a_b | c |\n| --- | ---: |\n| x | 1 ± 2 |\n\n≥ 3\n"
+    )
+    assert list(csv.reader(io.StringIO(table.csv()))) == [["a_b", "c"], ["x", "1 ± 2"]]
+    latex = table.latex()
+    assert r"\caption{50 \% \& more}" in latex
+    assert r"a\_b & c \\" in latex
+    assert r"x & 1 $\pm$ 2 \\" in latex
+    for suffix in WRITERS:
+        save_table(table, tmp_path / f"t.{suffix}")
+    with pytest.raises(InputError, match=r"\.xlsx"):
+        save_table(table, tmp_path / "t.xlsx")
+    with pytest.raises(InputError, match="2 cells"):
+        Table("t", ("a", "b"), (("1",),))
+
+
+# --- the report ------------------------------------------------------------------------------
+
+
+FEW = ("webster", "gate", "losses-table", "comparison-text")
+
+
+def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a few figures: all of them are made above."""
+    monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
+    monkeypatch.setattr(report, "SECTIONS", {"Results": FEW[:3]})
+    pictures = tmp_path / "figures"
+    pictures.mkdir()
+    failed = {"controller": "x", "scenario": "four-way", "density": 1.0, "seed": 3, "error": "no"}
+    made = [Made("text", 700, 700.0, 699, 12.3, 45.6, (failed,))]
+    drawn: list[int] = []
+    count = report.write_report(
+        Archive(partial_find, EFFORT, SEARCH), made, 2, tmp_path, pictures,
+        lambda done, total: drawn.append(done),
+    )  # fmt: skip
+    assert count == len(FEW) == len(drawn)
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "![clear against harmonious gate](figures/gate.png)" in text
+    assert (pictures / "gate.png").is_file()
+    assert (pictures / "webster.tex").is_file()
+    assert "| text |" in text
+    assert "four-way, 1 veh/h/lane, seed 3: no" in text
+    assert "CPU seconds for one simulated hour" in text
+    assert "fixed-time signal, 4 arms, balanced: 500, 600, 700, 800 veh/h/lane" in text
+    assert "**13** " in text
+    assert "**9a** " in text
+    assert "None in any run." in text, "no collision"
+    empty = Archive(lambda asked: [None] * len(asked), EFFORT, SEARCH)
+    assert report.write_report(empty, made, 1, tmp_path, pictures, lambda done, total: None) == 1
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "the store has no run of gate" in text
+    with pytest.raises(FileError, match="not inside"):
+        report.write_report(empty, made, 1, pictures, tmp_path, lambda done, total: None)
+
+
+def test_a_report_on_one_study_has_nothing_of_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
+    pictures = tmp_path / "figures"
+    pictures.mkdir()
+    made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
+    count = report.write_report(
+        Archive(synthetic_find, EFFORT, SEARCH), made, 2, tmp_path, pictures,
+        lambda done, total: None, parts=("gate",),
+    )  # fmt: skip
+    assert count == 1
+    assert {file.stem for file in pictures.iterdir()} == {"gate"}
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
+    assert headings == [
+        "What was run", "When does DIM lose, and how far does the harmonious gate move it?",
+        "Collisions", "Over-saturated cells", "Failed runs",
+    ]  # fmt: skip
+    assert "| controller | gate |" in text
+    assert "- fair: " not in text
+
+
+def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
+    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+        return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
+
+    report.write_report(
+        Archive(find, Effort.quick(), SEARCH), [], 1, tmp_path, tmp_path, lambda done, total: None,
+        parts=("as-run",),
+    )  # fmt: skip
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "- as-run: DIM, 5 arms, balanced, 350 veh/h/lane: 4 in 0.1 h" in text
+    assert "Why DIM collides as it was run: the published five-arm table" in text
+    assert "- `as-run`: Smoke test, which means nothing: " in text
+
+
+def test_every_section_names_figures() -> None:
+    shown = [name for names in report.SECTIONS.values() for name in names]
+    assert len(shown) == len(set(shown))
+    assert set(shown) <= set(GALLERY)

@@ -1,0 +1,358 @@
+"""Geometry against closed forms: lengths, arcs, mirror images, bodies and corridors."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from minisim.errors import InputError
+from minisim.junction.geometry import ARM_NAMES, Intersection, Movement, Path
+from minisim.vehicle import VehicleType
+
+CAR = VehicleType()
+SQUARE = (0.0, 90.0, 180.0, 270.0)
+STAR = (0.0, 72.0, 144.0, 216.0, 288.0)
+ODD = (10.0, 80.0, 190.5, 260.0, 300.0)
+
+
+@pytest.fixture(scope="module", params=["left", "right"])
+def square(request: pytest.FixtureRequest) -> Intersection:
+    return Intersection(SQUARE, side=request.param)
+
+
+# --- lengths and radii -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("bearings", "approach"),
+    [((0.0, 120.0, 240.0), 495.84), (SQUARE, 492.80)],
+)
+def test_approach_lanes_are_as_long_as_in_the_authors_sumo_networks(
+    bearings: tuple[float, ...], approach: float
+) -> None:
+    assert Intersection(bearings).approach_length == pytest.approx(approach, abs=0.005)
+
+
+def test_four_way_lengths_are_quarter_circles_and_a_straight_line() -> None:
+    """Left-hand traffic, lanes of 3.2 m, entries 7.2 m out: radii 7.2 ∓ 1.6 m."""
+    four = Intersection(SQUARE)
+    paths = [four.path(Movement(0, j)) for j in (1, 2, 3)]
+    assert [p.exit - p.entry for p in paths] == pytest.approx(
+        [5.6 * math.pi / 2, 14.4, 8.8 * math.pi / 2], abs=1e-12
+    )
+    assert [p.radius for p in paths] == pytest.approx([5.6, math.inf, 8.8])
+    assert [p.length for p in paths] == pytest.approx([2 * 492.8 + p.exit - p.entry for p in paths])
+
+
+def test_default_radius_leaves_the_kerb_of_netconvert() -> None:
+    """Kerb lines of neighbouring arms at 90° then meet in a circle of 4 m."""
+    assert Intersection(SQUARE).junction_radius == pytest.approx(3.2 + 4.0)
+    assert Intersection(SQUARE, lane_width=3.0).junction_radius == pytest.approx(7.0)
+    smallest = Intersection((0.0, 30.0, 180.0)).junction_radius
+    assert smallest == pytest.approx(7.2 / math.tan(math.radians(15.0)))
+
+
+def test_lanes_keep_to_their_side(square: Intersection) -> None:
+    """From the north one drives south: keeping left is keeping east."""
+    x, y = square.path(Movement(0, 2)).position(0.0)
+    assert (x, y) == pytest.approx((1.6 if square.side == "left" else -1.6, 500.0))
+
+
+@pytest.mark.parametrize("bearings", [SQUARE, STAR, ODD])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_paths_are_circular_arcs_tangent_to_both_lanes(
+    bearings: tuple[float, ...], side: str
+) -> None:
+    """The circle is found here from the entry alone, and must meet the exit lane."""
+    intersection = Intersection(bearings, side=side)  # type: ignore[arg-type]
+    keep = 1.6 if side == "left" else -1.6
+    for path in intersection.paths:
+        arm = intersection.arms[path.exit_arm]
+        out = np.array(arm.outward)
+        exit_point = out * intersection.junction_radius + keep * np.array([-out[1], out[0]])
+        np.testing.assert_allclose(path.points[-1], exit_point, atol=1e-12)
+        np.testing.assert_allclose(path.heading_out, out)
+        if math.isinf(path.radius):
+            assert abs(np.linalg.det([path.heading_in, path.points[-1] - path.points[0]])) < 1e-12
+            continue
+        turn = np.linalg.det([path.heading_in, path.heading_out])  # positive to the left
+        normal = np.array([-path.heading_in[1], path.heading_in[0]]) * np.sign(turn)
+        centre = path.points[0] + path.radius * normal
+        distance = np.linalg.norm(path.points - centre, axis=1)
+        np.testing.assert_allclose(distance, path.radius, rtol=1e-9)
+        assert abs((path.points[-1] - centre) @ path.heading_out) < 1e-9
+        angle = math.acos(np.clip(path.heading_in @ path.heading_out, -1.0, 1.0))
+        assert path.exit - path.entry == pytest.approx(path.radius * angle)
+
+
+def test_an_almost_straight_path_joins_the_straight_one_smoothly() -> None:
+    """Where arcs become lines (turns under 1e-4 rad), the path must not jump."""
+    base = Intersection((0.0, 90.0, 180.0)).path(Movement(0, 2))
+    for degrees in (0.004, 0.006, 0.02):
+        bent = Intersection((0.0, 90.0, 180.0 + degrees)).path(Movement(0, 2))
+        assert np.abs(bent.points - base.points).max() < 0.01
+        assert bent.exit == pytest.approx(base.exit, abs=0.01)
+
+
+# --- positions and bodies ----------------------------------------------------------------------
+
+
+def test_position_moves_one_metre_a_metre(square: Intersection) -> None:
+    """A step that turns by θ is at least cos(θ/2) as far as the way; here within 0.1 %."""
+    theta = 0.5 / 5.6
+    for path in square.paths:
+        s = np.arange(path.entry - 30.0, path.exit + 30.0, 0.5)
+        steps = np.linalg.norm(np.diff(path.position(s), axis=0), axis=1)
+        assert steps.max() <= 0.5 + 1e-9
+        assert steps.min() >= 0.5 * math.cos(theta / 2.0)
+
+
+def test_position_has_the_shape_of_s(square: Intersection) -> None:
+    path = square.path(Movement(0, 1))
+    assert path.position(3.0).shape == (2,)
+    assert path.position(np.zeros((4, 5))).shape == (4, 5, 2)
+    assert path.bodies(np.zeros(4), CAR).shape == (4, 4, 2)
+
+
+def test_paths_start_and_end_at_the_far_ends_of_their_arms(square: Intersection) -> None:
+    half_lane = 1.6
+    for path in square.paths:
+        start, end = path.position([0.0, path.length])
+        for point in (start, end):
+            assert np.linalg.norm(point) == pytest.approx(math.hypot(500.0, half_lane))
+        assert end @ path.heading_out == pytest.approx(500.0)
+
+
+def test_bodies_are_rectangles_with_both_bumpers_on_the_path(square: Intersection) -> None:
+    for path in square.paths:
+        s = np.linspace(path.entry, path.exit + CAR.length, 40)
+        corners = path.bodies(s, CAR)
+        rectangles = shapely.polygons(corners)
+        np.testing.assert_allclose(shapely.area(rectangles), CAR.length * CAR.width, rtol=1e-12)
+        front, rear = corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
+        heading = (front - rear) / CAR.length
+        np.testing.assert_allclose(np.linalg.norm(heading, axis=1), 1.0)
+        np.testing.assert_allclose(front, path.position(s), atol=1e-9)
+        # The rear lies on the chord, which is shorter than the arc by L³/24R² at most.
+        off = np.linalg.norm(rear - path.position(s - CAR.length), axis=1)
+        assert off.max() <= CAR.length**3 / (24.0 * path.radius**2) + 0.005
+
+
+def test_pose_heads_along_the_lane_before_the_junction(square: Intersection) -> None:
+    for path in square.paths:
+        centre, heading = path.pose(100.0, CAR.length)
+        np.testing.assert_allclose(heading, path.heading_in, atol=1e-12)
+        np.testing.assert_allclose(centre, path.position(100.0 - CAR.length / 2.0))
+
+
+def test_mirrored_bearings_and_the_other_side_give_the_mirror_image() -> None:
+    """x → −x turns left-hand traffic on ODD into right-hand traffic on the mirrored arms."""
+    left = Intersection(ODD, side="left")
+    right = Intersection(tuple(sorted(360.0 - b for b in ODD)), side="right")
+    n = left.n
+    for path in left.paths:
+        i, j = path.movement
+        twin = right.path(Movement(n - 1 - i, n - j))
+        assert twin.exit == pytest.approx(path.exit)
+        np.testing.assert_allclose(twin.points * [-1.0, 1.0], path.points, atol=1e-9)
+
+
+def test_turning_the_whole_junction_changes_nothing_but_the_view() -> None:
+    turned = Intersection(tuple(b + 20.0 for b in ODD))
+    np.testing.assert_allclose(turned.separation(CAR), Intersection(ODD).separation(CAR), atol=1e-9)
+
+
+# --- corridors ---------------------------------------------------------------------------------
+
+
+def test_corridor_of_a_straight_movement_is_a_rectangle() -> None:
+    path = Intersection(SQUARE).path(Movement(0, 2))
+    corridor = path.corridor(CAR)
+    # From the rear at the entry's front to the front when the rear leaves: 14.4 + 2 · 5 m.
+    assert shapely.area(corridor) == pytest.approx((14.4 + 2 * 5.0) * 1.8)
+    assert shapely.bounds(corridor) == pytest.approx((1.6 - 0.9, -12.2, 1.6 + 0.9, 12.2))
+
+
+def test_opposite_straight_corridors_are_a_lane_minus_a_body_apart() -> None:
+    four = Intersection(SQUARE)
+    separation = four.separation(CAR)
+    a2, c2 = four.index(Movement(0, 2)), four.index(Movement(2, 2))
+    assert separation[a2, c2] == pytest.approx(3.2 - 1.8)
+    assert four.conflicts(CAR, 1.39)[a2, c2] == np.False_
+    assert four.conflicts(CAR, 1.41)[a2, c2] == np.True_
+
+
+def test_separation_is_symmetric_and_zero_within_an_arm(square: Intersection) -> None:
+    separation = square.separation(CAR)
+    np.testing.assert_array_equal(separation, separation.T)
+    for p, q in itertools.product(range(12), repeat=2):
+        if p // 3 == q // 3:
+            assert separation[p, q] == 0.0
+
+
+def test_crossing_movements_conflict(square: Intersection) -> None:
+    conflict = square.conflicts(CAR, 0.5)
+
+    def meet(p: str, q: str) -> bool:
+        return bool(conflict[square.index(square.parse(p)), square.index(square.parse(q))])
+
+    assert meet("a2", "b2")
+    assert meet("a2", "d2")
+    assert not meet("a2", "c2")
+    near, far = ("1", "3") if square.side == "left" else ("3", "1")
+    assert not meet(f"a{near}", f"c{near}")  # opposite turns to the near side
+    assert meet(f"a{far}", "c2")  # across the opposite traffic
+
+
+@pytest.mark.parametrize(("origin", "exit_arm"), list(itertools.permutations(range(4), 2)))
+def test_movements_that_share_an_exit_conflict(
+    square: Intersection, origin: int, exit_arm: int
+) -> None:
+    conflict = square.conflicts(CAR, 0.0)
+    bound_there = [m for m in square.movements if square.exit_arm(m) == exit_arm]
+    mine = Movement(origin, (exit_arm - origin) % 4)
+    assert mine in bound_there
+    assert all(conflict[square.index(mine), square.index(m)] for m in bound_there)
+
+
+def test_room_beside_a_held_vehicle(square: Intersection) -> None:
+    """Straight traffic passes at a lane minus a body; who turns in cuts the corner a little."""
+    assert 1.0 < square.room(CAR) < 3.2 - 1.8
+    bus = VehicleType(length=12.0, width=2.5)
+    assert square.room(bus) == 0.0
+
+
+# --- branches ----------------------------------------------------------------------------------
+
+
+def test_branch_lies_in_the_junction_and_only_between_movements_of_one_arm(
+    square: Intersection,
+) -> None:
+    branch = square.branch(CAR)
+    for p, q in itertools.product(range(12), repeat=2):
+        if p == q:
+            assert branch[p, q] == math.inf
+        elif p // 3 != q // 3:
+            assert branch[p, q] == 0.0
+        else:
+            assert square.paths[p].entry < branch[p, q] < square.paths[p].exit + 1.0
+
+
+def test_branch_from_a_straight_path_is_where_the_arc_is_left_behind() -> None:
+    """The rear bumper must be 1.8 + 0.5 m from the arc of radius 5.6 m: 1 − cos, in closed form.
+
+    Seen from the arc's path q the straight path p leaves the circle: at x past the entry it is
+    √(R² + x²) − R away.
+    """
+    four = Intersection(SQUARE)
+    left, straight = four.index(Movement(0, 1)), four.index(Movement(0, 2))
+    x = math.sqrt((5.6 + 2.3) ** 2 - 5.6**2)
+    assert four.branch(CAR)[straight, left] == pytest.approx(four.approach_length + x, abs=0.3)
+    angle = math.acos(1.0 - 2.3 / 5.6)
+    along_arc = 5.6 * angle
+    assert four.branch(CAR)[left, straight] == pytest.approx(
+        four.approach_length + along_arc, abs=0.3
+    )
+
+
+# --- speeds, names, errors ---------------------------------------------------------------------
+
+
+def test_turn_speed_needs_exactly_the_lateral_acceleration() -> None:
+    four = Intersection(SQUARE)
+    v = four.turn_speed(Movement(0, 1), lateral=2.0)
+    assert v * v / 5.6 == pytest.approx(2.0)
+    assert four.turn_speed(Movement(0, 2), lateral=2.0) == math.inf
+
+
+def test_movements_are_numbered_like_the_harmony_matrix(square: Intersection) -> None:
+    assert " ".join(map(str, square.movements)) == "a1 a2 a3 b1 b2 b3 c1 c2 c3 d1 d2 d3"
+    for k, movement in enumerate(square.movements):
+        assert square.index(movement) == k
+        assert square.parse(str(movement)) == movement
+        assert square.paths[k].movement == movement
+
+
+def test_manoeuvres_count_arms_clockwise() -> None:
+    """With left-hand traffic on four arms 1 turns left, 2 goes straight on, 3 turns right."""
+    four = Intersection(SQUARE)
+
+    def turn(path: Path) -> float:
+        return float(np.linalg.det([path.heading_in, path.heading_out]))
+
+    assert [round(turn(four.path(Movement(2, j)))) for j in (1, 2, 3)] == [1, 0, -1]
+    assert four.exit_arm(Movement(3, 2)) == 1
+
+
+def test_names_reach_to_twelve_arms() -> None:
+    twelve = Intersection(tuple(30.0 * i for i in range(12)))
+    assert [arm.name for arm in twelve.arms] == list(ARM_NAMES)
+    assert twelve.parse("l11") == Movement(11, 11)
+    assert str(Movement(11, 11)) == "l11"
+
+
+@pytest.mark.parametrize("text", ["", "a", "a0", "a4", "e1", "A1", "1a", "a1 ", "a12", "a-1", "a²"])
+def test_parse_refuses_what_does_not_exist_and_says_what_does(
+    square: Intersection, text: str
+) -> None:
+    with pytest.raises(InputError, match=r"lane a … d and a manoeuvre 1 … 3, such as a1"):
+        square.parse(text)
+
+
+@pytest.mark.parametrize("movement", [(0, 0), (0, 4), (4, 1), (-1, 1)])
+def test_index_refuses_movements_that_do_not_exist(
+    square: Intersection, movement: tuple[int, int]
+) -> None:
+    with pytest.raises(InputError, match="no movement"):
+        square.index(Movement(*movement))
+
+
+@pytest.mark.parametrize(
+    ("bearings", "message"),
+    [
+        ((0, 90), "3 … 12 arms, got 2"),
+        (tuple(range(0, 390, 30)), "3 … 12 arms, got 13"),
+        ((0, 29, 180), "arms a and b are 29° apart; at least 30° are needed"),
+        ((10, 180, 345), "arms c and a are 25° apart"),
+        ((90, 0, 180), "did you mean 0, 90, 180"),
+        ((0, 90, 360), "bearing 3 .* below 360, got 360"),
+        ((-10, 90, 180), "bearing 1 .* at least 0"),
+        ((0, 90, math.nan), r"bearings\[2\]"),
+        ("abc", "bearings must be a sequence of numbers"),
+        ((0, 0, 180), "arms a and b are 0° apart"),
+    ],
+)
+def test_bearings_that_cannot_be_are_refused(bearings: tuple[float, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Intersection(bearings)
+
+
+def test_arms_exactly_at_the_least_angle_are_accepted() -> None:
+    assert Intersection((0.0, 30.0, 60.0)).n == 3
+    assert Intersection((0.1, 30.1, 180.0)).n == 3  # 30.1 − 0.1 is a rounding error below 30
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"side": "Left"}, "did you mean 'left'"),
+        ({"lane_width": 1.9}, "lane_width"),
+        ({"arm_length": 10}, "arm_length"),
+        ({"junction_radius": 0}, "junction_radius"),
+        ({"junction_radius": 491}, "junction_radius .* below 490"),
+        ({"junction_radius": "7"}, "junction_radius .* must be a number"),
+        ({"junction_radius": 5.5}, r"radius 3\.9 m; a car needs 4 m \(the default here is 7\.2 m"),
+    ],
+)
+def test_other_options_are_checked(options: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Intersection(SQUARE, **options)  # type: ignore[arg-type]
+
+
+def test_intersections_are_values() -> None:
+    assert Intersection(SQUARE) == Intersection([0, 90, 180, 270])  # type: ignore[arg-type]
+    assert len({Intersection(SQUARE), Intersection(SQUARE), Intersection(STAR)}) == 2

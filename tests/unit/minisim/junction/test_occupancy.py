@@ -1,0 +1,176 @@
+"""Conflict areas against the bodies themselves, and when a turn shows against the arc's formula."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from dim import HarmonyMatrix
+from minisim.control import CLEARANCE, Site
+from minisim.junction.occupancy import CLOSE, STEP, Area, area, passes, showing
+from scenarios import four_way, three_way
+
+SITES = [three_way().site(0), four_way(profile="fair").site(0)]
+SITE = SITES[1]
+
+
+def pairs(site: Site) -> list[tuple[int, int]]:
+    movements = site.intersection.movements
+    return [
+        (p, q)
+        for p, one in enumerate(movements)
+        for q, other in enumerate(movements)
+        if one.origin != other.origin
+    ]
+
+
+@pytest.mark.parametrize("site", SITES, ids=["3", "4"])
+def test_movements_in_harmony_have_no_conflict_area_and_all_others_have(site: Site) -> None:
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    for p, q in pairs(site):
+        assert (area(site, p, q) is None) == matrix.values[p, q], (p, q)
+
+
+def test_outside_its_area_bodies_keep_their_distance() -> None:
+    """The grid promises it for every position, not only for its points."""
+    random = np.random.default_rng(1)
+    paths, vehicle = SITE.intersection.paths, SITE.vehicle
+    tested = 0
+    for p, q in pairs(SITE)[::5]:
+        shared = area(SITE, p, q)
+        if shared is None:
+            continue
+        x = random.uniform(0.0, (shared.close.shape[0] - 1) * STEP, 300)
+        y = random.uniform(0.0, (shared.close.shape[1] - 1) * STEP, 300)
+        one = shapely.polygons(paths[p].bodies(paths[p].entry + x, vehicle))
+        other = shapely.polygons(paths[q].bodies(paths[q].entry + y, vehicle))
+        distance = shapely.distance(one, other)
+        for k in range(len(x)):
+            if shared.way(x[k], y[k]) > 0.0:
+                assert distance[k] > CLOSE
+            if shared.room(x[k], y[k]) > 0.0:
+                assert distance[k] > CLEARANCE
+                tested += 1
+    assert tested > 500
+
+
+def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
+    """And `ever` what is so at this or a later position of the second."""
+    p, q = 1, 4  # a2, b2
+    shared = area(SITE, p, q)
+    assert shared is not None
+    bodies = []
+    for way, count in zip((p, q), shared.close.shape, strict=True):
+        path = SITE.intersection.paths[way]
+        s = path.entry + STEP * np.arange(count)
+        assert s[-2] < path.exit + SITE.vehicle.length <= s[-1]
+        bodies.append(shapely.polygons(path.bodies(s, SITE.vehicle)))
+    distance = shapely.distance(bodies[0][:, None], bodies[1][None, :])
+    for x, y in itertools.product(*map(range, distance.shape)):
+        rows = slice(max(x - 1, 0), x + 2)
+        assert shared.close[x, y] == (distance[rows, max(y - 1, 0) : y + 2] <= CLOSE).any()
+        assert shared.ever[x, y] == (distance[rows, max(y - 1, 0) :] <= CLEARANCE).any()
+
+
+def test_an_area_is_the_others_mirrored() -> None:
+    for p, q in pairs(SITE):
+        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        if shared is not None:
+            assert mirrored is not None
+            assert (shared.close == mirrored.close.T).all()
+
+
+def test_whoever_has_stopped_in_time_is_in_nobodys_way() -> None:
+    """However far the other goes: that is what `room` is."""
+    for p, q in pairs(SITE):
+        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        if shared is None or mirrored is None:
+            continue
+        for x in np.arange(0.0, shared.close.shape[0] * STEP, STEP):
+            for y in np.arange(0.0, shared.close.shape[1] * STEP, 4 * STEP):
+                if shared.room(x, y) > 0.0:
+                    assert mirrored.way(y, x) == math.inf
+
+
+def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
+    a2, b2 = 1, 4
+    shared = area(SITE, a2, b2)
+    assert shared is not None
+    assert shared.room(-3.0, -50.0) == pytest.approx(shared.room(0.0, 0.0) + 3.0)
+    assert shared.room(100.0, 0.0) == math.inf
+    assert shared.room(0.0, 100.0) == math.inf
+    assert shared.room(shared.ends(0.0) + STEP, 0.0) == math.inf
+
+
+#: Five positions of the first vehicle, three of the second.
+BY_HAND = Area(
+    close=np.array([[0, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+    ever=np.array([[0, 0, 0], [1, 1, 0], [1, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "room", "way"),
+    [
+        (-3.0, -9.0, 3.0 + STEP, 3.0 + 4 * STEP),
+        (0.0, 0.0, STEP, 4 * STEP),
+        (0.1, 1.5 * STEP, STEP - 0.1, STEP - 0.1),
+        (1.5 * STEP, STEP, 0.0, 0.0),  # in it
+        (2.0 * STEP, 1.9 * STEP, 0.0, 0.0),
+        (3.0 * STEP, STEP, math.inf, math.inf),  # past it
+        (3.0 * STEP, 0.0, STEP, STEP),
+        (0.0, 2.0 * STEP, math.inf, math.inf),  # the other is past it
+        (5.0 * STEP, 0.0, math.inf, math.inf),  # off the grid
+        (0.0, 3.0 * STEP, math.inf, math.inf),
+    ],
+)
+def test_how_far_it_is_to_an_area_by_hand(
+    first: float, second: float, room: float, way: float
+) -> None:
+    assert BY_HAND.room(first, second) == pytest.approx(room)
+    assert BY_HAND.way(first, second) == pytest.approx(way)
+
+
+def test_where_an_area_ends_by_hand() -> None:
+    ends = [BY_HAND.ends(second * STEP) for second in (-9.0, 0.0, 0.9, 1.0, 2.0, 3.0)]
+    assert ends == [5 * STEP, 5 * STEP, 5 * STEP, 3 * STEP, 0.0, 0.0]
+
+
+def test_when_bodies_touch_by_hand() -> None:
+    """Before the entry is the entry; beyond the grid there is nothing to touch."""
+    for first, second, touching in (
+        (4.5, -2.0, True), (4.0, 0.9, True), (4.0, 1.0, False), (1.0, 1.0, True), (0.9, 1.0, False),
+        (2.9, 1.9, True), (-1.0, 1.0, False), (5.0, 0.0, False), (1.0, 3.0, False),
+    ):  # fmt: skip
+        at = np.array([first]) * STEP, np.array([second]) * STEP
+        assert BY_HAND.touches(*at) is touching, (first, second)
+    there, then = np.array([0.0, 1.0, 2.0]) * STEP, np.array([1.0, 2.0, 1.0]) * STEP
+    assert BY_HAND.touches(there, then)
+    assert not BY_HAND.touches(there[:2], then[:2])
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 0.3, 0.6])
+def test_a_turn_shows_where_the_arc_has_left_the_straight_lane(tolerance: float) -> None:
+    """Beside a straight line an arc of radius r is r(1 − cos(s/r)) after s."""
+    shows = showing(SITE, tolerance)
+    for turn in (0, 2):
+        radius = SITE.intersection.paths[turn].radius
+        expected = radius * math.acos(1.0 - tolerance / radius)
+        assert shows[turn, 1] == pytest.approx(expected, abs=0.06)
+    assert shows[0, 0] == math.inf
+    assert (shows[:3, 3:] == 0.0).all()
+
+
+def test_who_has_a_decimetre_gets_past_who_has_none_does_not() -> None:
+    """Where two once stood in each other's way for ever: 13 cm for one, a touch for the other."""
+    names = [str(movement) for movement in SITE.intersection.movements]
+    a2, b3 = names.index("a2"), names.index("b3")
+    assert passes(SITE, b3, 4.94, a2, 3.56)
+    assert not passes(SITE, a2, 3.56, b3, 4.94)
+    shared = area(SITE, b3, a2)
+    assert shared is not None
+    assert shared.way(4.94, 3.56) < math.inf, "the grid alone does not show it"

@@ -1,0 +1,351 @@
+"""TTC, DRAC and PET against situations worked out by hand.
+
+The hand calculations use the 4-arm junction of `small_scenario`: left-hand traffic, lanes of
+3.2 m, entries 7.2 m from the centre, cars of 5 × 1.8 m. Lanes from the north lie at x = 1.6, those
+from the east at y = −1.6.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import minisim
+from baselines import FixedTime
+from minisim.control import Unregulated
+from minisim.errors import InputError
+from minisim.results.safety import (
+    AREA_STEP,
+    conflict_areas,
+    crossings,
+    encroachments,
+    following,
+    safety_summary,
+)
+from minisim.results.trajectories import TRAJECTORY_COLUMNS
+from minisim.testing import small_scenario
+
+SITE = small_scenario(4).site(0)
+ENTRY = SITE.intersection.approach_length
+NOTHING = {
+    "min_ttc_s": None,
+    "min_pet_s": None,
+    "max_drac_mps2": None,
+    "max_braking_mps2": None,
+    "pets": 0,
+    "pets_below_1_s": 0,
+    "pets_below_1_5_s": 0,
+    "pets_below_2_s": 0,
+}
+
+
+def at(
+    vehicle: int,
+    movement: str,
+    s: float,
+    v: float,
+    *,
+    time: float = 0.0,
+    row: bool = True,
+    a: float = 0.0,
+) -> dict[str, Any]:
+    """One row of a frame; `s` from the junction entry."""
+    zero = dict.fromkeys(TRAJECTORY_COLUMNS, 0.0)
+    return zero | {
+        "time_s": time,
+        "vehicle": vehicle,
+        "lane": movement[0],
+        "manoeuvre": int(movement[1]),
+        "s_m": ENTRY + s,
+        "speed_mps": v,
+        "acceleration_mps2": a,
+        "right_of_way": row,
+    }
+
+
+def frame_of(*rows: dict[str, Any]) -> pd.DataFrame:
+    return pd.DataFrame(list(rows), columns=list(TRAJECTORY_COLUMNS))
+
+
+def drive(vehicle: int, movement: str, start: float, v: float) -> list[dict[str, Any]]:
+    """A vehicle at constant speed whose front passes the entry at `start`; 0.1 s a row."""
+    times = np.arange(round(start * 10) - 60, round(start * 10) + 60) / 10.0
+    return [at(vehicle, movement, v * (t - start), v, time=t) for t in times.tolist()]
+
+
+# Following.
+
+
+def test_ttc_and_drac_behind_a_slower_leader() -> None:
+    frame = frame_of(at(1, "a2", -80.0, 10.0), at(2, "a1", -100.0, 15.0))
+    (row,) = following(frame, SITE).to_dict("records")
+
+    # Gap 20 − 5 m, closing at 5 m/s.
+    assert (row["follower"], row["leader"]) == (2, 1)
+    assert row["gap_m"] == pytest.approx(15.0)
+    assert row["ttc_s"] == pytest.approx(3.0)
+    assert row["drac_mps2"] == pytest.approx(5.0**2 / 30.0)
+
+
+def test_ttc_is_undefined_behind_a_faster_leader() -> None:
+    frame = frame_of(at(1, "a2", -80.0, 15.0), at(2, "a2", -100.0, 10.0))
+    (row,) = following(frame, SITE).to_dict("records")
+    assert np.isnan(row["ttc_s"])
+    assert np.isnan(row["drac_mps2"])
+    assert safety_summary(frame, SITE)["min_ttc_s"] is None
+
+
+def test_bodies_that_overlap_have_no_time_left_and_no_drac() -> None:
+    frame = frame_of(at(1, "a2", -80.0, 5.0), at(2, "a2", -84.0, 10.0))
+    (row,) = following(frame, SITE).to_dict("records")
+    assert row["ttc_s"] == 0.0
+    assert np.isnan(row["drac_mps2"])
+
+
+def test_each_follows_the_one_ahead_at_the_same_time_and_lane() -> None:
+    frame = frame_of(
+        at(3, "a2", -30.0, 5.0), at(1, "a1", -10.0, 5.0), at(2, "a3", -20.0, 5.0),
+        at(4, "b2", -25.0, 5.0), at(1, "a1", -9.5, 5.0, time=0.1), at(4, "b2", -24.5, 5, time=0.1),
+    )  # fmt: skip
+    pairs = following(frame, SITE)[["time_s", "follower", "leader"]].to_numpy().tolist()
+    assert sorted(pairs) == [[0.0, 2, 1], [0.0, 3, 2]]
+
+
+def test_a_leader_that_has_turned_off_is_none() -> None:
+    # a1 turns left; a2 goes straight on. Once the rear of a1 is past their branch, a2 is free.
+    a1, a2 = SITE.intersection.parse("a1"), SITE.intersection.parse("a2")
+    index = SITE.intersection.index
+    branch = SITE.intersection.branch(SITE.vehicle)[index(a1), index(a2)] - ENTRY
+    follower = at(2, "a2", -3.0, 8.0)
+
+    still = frame_of(at(1, "a1", branch + 5.0 - 0.1, 4.0), follower)
+    gone = frame_of(at(1, "a1", branch + 5.0 + 0.1, 4.0), follower)
+    assert len(following(still, SITE)) == 1
+    assert len(following(gone, SITE)) == 0
+
+
+def test_behind_one_that_has_turned_off_the_next_one_ahead_counts() -> None:
+    # The first of a2 drives on slowly, a1 has turned off in between, the second of a2 follows.
+    path = SITE.intersection.path(SITE.intersection.parse("a1"))
+    beyond = path.exit - ENTRY + 20.0
+    frame = frame_of(
+        at(1, "a2", beyond + 30.0, 5.0), at(2, "a1", beyond, 5.0), at(3, "a2", -1.0, 10.0)
+    )
+    (row,) = following(frame, SITE).to_dict("records")
+    assert (row["follower"], row["leader"]) == (3, 1)
+    assert row["gap_m"] == pytest.approx(beyond + 30.0 - 5.0 + 1.0)
+
+
+def test_the_leader_may_come_from_another_arm_into_the_same_exit() -> None:
+    # d2 (straight on) and a1 (left) both leave by b.
+    d2, a1 = (SITE.intersection.path(SITE.intersection.parse(m)) for m in ("d2", "a1"))
+    assert d2.exit_arm == a1.exit_arm == 1
+    frame = frame_of(
+        at(1, "d2", d2.exit - ENTRY + 12.0, 6.0),
+        at(2, "a1", a1.exit - ENTRY - 2.0, 8.0),
+        at(3, "a1", -30.0, 8.0),
+        at(4, "c2", 5.0, 8.0),
+    )
+    rows = following(frame, SITE).set_index("follower")
+    assert rows.loc[2, "leader"] == 1
+    assert rows.loc[2, "gap_m"] == pytest.approx(12.0 - 5.0 + 2.0)
+    assert rows.loc[2, "ttc_s"] == pytest.approx(9.0 / 2.0)
+    assert rows.loc[3, "leader"] == 2
+    assert 4 not in rows.index
+
+
+def test_past_the_junction_each_still_follows_only_once() -> None:
+    frame = frame_of(at(1, "a2", 30.0, 5.0), at(2, "a2", 20.0, 10.0))
+    (row,) = following(frame, SITE).to_dict("records")
+    assert (row["follower"], row["leader"], row["gap_m"]) == (2, 1, pytest.approx(5.0))
+
+
+# Conflict areas and PET.
+
+
+def test_the_conflict_area_of_two_straight_movements() -> None:
+    """a2 drives south at x = 1.6 ± 0.9; b2 drives west at y = −1.6 ± 0.9."""
+    areas = conflict_areas(SITE.intersection, SITE.vehicle)
+    index = SITE.intersection.index
+    a2, b2 = (index(SITE.intersection.parse(m)) for m in ("a2", "b2"))
+
+    # a2's front reaches y = −0.7 after 7.2 + 0.7 m; its rear leaves y = −2.5 after 7.2 + 2.5 + 5.
+    assert areas.enter[a2, b2] - ENTRY == pytest.approx(7.9, abs=AREA_STEP)
+    assert areas.leave[a2, b2] - ENTRY == pytest.approx(14.7, abs=AREA_STEP)
+    # b2's front reaches x = 2.5 after 7.2 − 2.5 m; its rear leaves x = 0.7 after 7.2 − 0.7 + 5.
+    assert areas.enter[b2, a2] - ENTRY == pytest.approx(4.7, abs=AREA_STEP)
+    assert areas.leave[b2, a2] - ENTRY == pytest.approx(11.5, abs=AREA_STEP)
+
+
+def test_conflict_areas_of_merging_movements_end_at_the_exit_line() -> None:
+    areas = conflict_areas(SITE.intersection, SITE.vehicle)
+    index = SITE.intersection.index
+    a1, d2 = (index(SITE.intersection.parse(m)) for m in ("a1", "d2"))
+    for p, q in ((a1, d2), (d2, a1)):
+        clear = SITE.intersection.paths[p].exit + SITE.vehicle.length
+        assert areas.leave[p, q] == pytest.approx(clear, abs=2 * AREA_STEP)
+
+
+def test_movements_that_never_meet_have_no_conflict_area() -> None:
+    areas = conflict_areas(SITE.intersection, SITE.vehicle)
+    conflicts = SITE.conflicts
+    assert np.isnan(areas.enter[~conflicts]).all()
+    assert (np.isnan(areas.enter) == np.isnan(areas.enter.T)).all()
+    assert (np.isnan(areas.enter) == np.isnan(areas.leave)).all()
+    inside = np.isfinite(areas.enter)
+    assert inside.sum() > 20
+    assert (areas.leave[inside] > areas.enter[inside]).all()
+
+
+@pytest.mark.parametrize(("headway", "pet"), [(3.0, 2.0), (1.5, 0.5), (0.8, -0.2)])
+def test_pet_of_two_crossing_vehicles(headway: float, pet: float) -> None:
+    # At 10 m/s a2 leaves the area 1.47 s after its entry, b2 enters it 0.47 s after its own.
+    frame = frame_of(*drive(1, "a2", 10.0, 10.0), *drive(2, "b2", 10.0 + headway, 10.0))
+    (row,) = encroachments(frame, SITE).to_dict("records")
+
+    assert (row["first"], row["second"]) == (1, 2)
+    assert row["pet_s"] == pytest.approx(pet, abs=0.02)
+    assert row["time_s"] == pytest.approx(10.0 + headway + 0.47, abs=0.01)
+    summary = safety_summary(frame, SITE)
+    assert summary["min_pet_s"] == pytest.approx(pet, abs=0.02)
+    assert summary["pets_below_1_s"] == (pet < 1.0)
+    assert summary["pets_below_1_5_s"] == (pet < 1.5)
+
+
+def test_pet_of_merging_vehicles_ends_when_the_first_is_clear() -> None:
+    # d2 is clear (rear past the exit) after 14.4 + 5 m; then a1 begins.
+    frame = frame_of(*drive(1, "d2", 10.0, 10.0), *drive(2, "a1", 13.0, 5.0))
+    (row,) = encroachments(frame, SITE).to_dict("records")
+
+    areas = conflict_areas(SITE.intersection, SITE.vehicle)
+    enter = areas.enter[0, SITE.intersection.index(SITE.intersection.parse("d2"))] - ENTRY
+    assert row["pet_s"] == pytest.approx(13.0 + enter / 5.0 - (10.0 + 1.94), abs=0.02)
+
+
+def test_only_the_next_vehicle_through_the_area_encroaches() -> None:
+    frame = frame_of(
+        *drive(1, "a2", 10.0, 10.0), *drive(2, "a2", 12.0, 10.0), *drive(3, "b2", 15.0, 10.0),
+        *drive(4, "b2", 17.0, 10.0), *drive(5, "a2", 20.0, 10.0),
+    )  # fmt: skip
+    pairs = encroachments(frame, SITE)[["first", "second"]].to_numpy().tolist()
+    assert pairs == [[2, 3], [4, 5]]
+
+
+def test_harmonious_vehicles_do_not_encroach() -> None:
+    # a1 and c1 turn left, each into its own exit.
+    frame = frame_of(*drive(1, "a1", 10.0, 5.0), *drive(2, "c1", 10.5, 5.0))
+    assert len(encroachments(frame, SITE)) == 0
+    assert safety_summary(frame, SITE)["min_pet_s"] is None
+
+
+def test_a_vehicle_that_stays_in_the_area_leaves_it_at_the_end_of_its_recording() -> None:
+    stuck = [at(1, "a2", 9.0, 0.0, time=t / 10.0) for t in range(100, 200)]
+    arriving = [at(1, "a2", t - 101.0, 10.0, time=(t - 11) / 10.0) for t in range(90, 111)]
+    frame = frame_of(*arriving, *stuck, *drive(2, "b2", 15.0, 10.0))
+    (row,) = encroachments(frame, SITE).to_dict("records")
+    # b2 enters at 15.47 s; a2 is last seen, inside, at 19.9 s.
+    assert row["pet_s"] == pytest.approx(15.47 - 19.9, abs=0.02)
+
+
+def test_a_vehicle_whose_entry_is_not_recorded_does_not_count() -> None:
+    late = [row for row in drive(1, "a2", 10.0, 10.0) if row["time_s"] > 11.0]
+    frame = frame_of(*late, *drive(2, "b2", 13.0, 10.0))
+    assert len(encroachments(frame, SITE)) == 0
+
+
+# Crossing TTC.
+
+
+def test_crossing_ttc_is_the_time_of_the_second_to_the_area() -> None:
+    # a2: 2.9 m and 9.7 m to enter and leave at 10 m/s, so inside from 0.29 to 0.97 s.
+    # b2: 4.7 m to enter at 8 m/s, 0.5875 s.
+    frame = frame_of(at(1, "a2", 5.0, 10.0), at(2, "b2", 0.0, 8.0))
+    (row,) = crossings(frame, SITE).to_dict("records")
+
+    assert (row["first"], row["second"]) == (1, 2)
+    assert row["ttc_s"] == pytest.approx(0.5875, abs=0.02)
+    assert safety_summary(frame, SITE)["min_ttc_s"] == row["ttc_s"]
+
+
+def test_no_crossing_course_when_the_first_has_left_in_time() -> None:
+    # b2 at 4 m/s needs 1.175 s, a2 has left after 0.97 s.
+    assert len(crossings(frame_of(at(1, "a2", 5.0, 10.0), at(2, "b2", 0.0, 4.0)), SITE)) == 0
+
+
+def test_a_standing_vehicle_in_the_area_is_met_for_sure() -> None:
+    (row,) = crossings(frame_of(at(1, "a2", 9.0, 0.0), at(2, "b2", -5.0, 10.0)), SITE).to_dict(
+        "records"
+    )
+    assert row["ttc_s"] == pytest.approx(0.97, abs=0.02)
+
+
+def test_a_vehicle_without_right_of_way_is_on_nobodys_course() -> None:
+    first = at(1, "a2", 5.0, 10.0)
+    assert len(crossings(frame_of(first, at(2, "b2", -1.0, 8.0, row=False)), SITE)) == 0
+    assert len(crossings(frame_of(first, at(2, "b2", -1.0, 8.0)), SITE)) == 1
+    # Once inside, it crosses whether it may or not.
+    assert len(crossings(frame_of(first, at(2, "b2", 0.1, 8.0, row=False)), SITE)) == 1
+
+
+# Whole recordings.
+
+
+def test_braking_is_the_strongest_of_all() -> None:
+    frame = frame_of(
+        at(1, "a2", -80.0, 5.0, a=-3.5, row=False), at(2, "b2", -80.0, 5.0, a=1.0, row=False)
+    )
+    assert safety_summary(frame, SITE) == NOTHING | {"max_braking_mps2": 3.5}
+    assert safety_summary(frame.iloc[1:], SITE)["max_braking_mps2"] == 0.0
+
+
+def test_nothing_happens_on_an_empty_recording() -> None:
+    assert safety_summary(frame_of(), SITE) == NOTHING
+    for monitor in (following, encroachments, crossings):
+        assert len(monitor(frame_of(), SITE)) == 0
+
+
+def test_the_order_of_the_rows_does_not_matter() -> None:
+    run = minisim.simulate(
+        small_scenario(4, demand_time=120.0), FixedTime(), seed=1, record="junction"
+    )
+    shuffled = run.trajectories.sample(frac=1.0, random_state=0)
+    assert safety_summary(shuffled, run.site) == safety_summary(run.trajectories, run.site)
+
+
+def test_a_signal_is_safe_and_anarchy_is_not() -> None:
+    scenario = small_scenario(4, density=300, demand_time=240.0)
+    safe = minisim.simulate(scenario, FixedTime(), seed=1, record="junction")
+    wild = minisim.simulate(
+        scenario, Unregulated(), seed=1, record="junction", on_collision="record"
+    )
+
+    calm = safety_summary(safe.trajectories, safe.site)
+    assert calm["pets"] is not None
+    assert calm["pets"] > 50
+    assert calm["min_pet_s"] is not None
+    assert calm["min_pet_s"] > 1.0
+    assert len(crossings(safe.trajectories, safe.site)) == 0
+    assert calm["max_braking_mps2"] is not None
+    assert 1.0 < calm["max_braking_mps2"] < 6.0
+
+    # Whoever collides with another arm was in the conflict area together with it.
+    touched = {c.vehicles for c in wild.collisions if c.movements[0][0] != c.movements[1][0]}
+    assert touched
+    pets = encroachments(wild.trajectories, wild.site)
+    overlapping = pets[pets["pet_s"] <= 0.0][["first", "second"]].to_numpy().tolist()
+    assert touched & {(min(pair), max(pair)) for pair in overlapping}
+    assert len(crossings(wild.trajectories, wild.site)) > 0
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [(pd.DataFrame({"time_s": [0.0]}), "no column vehicle"), ("trips", "DataFrame")],
+)
+def test_another_frame_is_a_clear_error(frame: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        safety_summary(frame, SITE)
+    with pytest.raises(InputError, match="site must be a Site"):
+        safety_summary(frame_of(), "four-way")  # type: ignore[arg-type]

@@ -1,0 +1,274 @@
+"""Writers: what is written reads back, SUMO's reader reads it, and a failure leaves no trace."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import minisim
+from baselines import FixedTime
+from minisim.errors import FileError, InputError, MissingExtraError
+from minisim.results import trajectories as recording
+from minisim.results.run import Run
+from minisim.results.trajectories import (
+    TRAJECTORY_COLUMNS,
+    movement_index,
+    replacing,
+    write_fcd,
+    write_trajectories,
+    write_trips,
+)
+from minisim.results.trips import TRIP_COLUMNS
+from minisim.testing import small_scenario
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    scenario = small_scenario(4, density=300, demand_time=90.0)
+    return minisim.simulate(scenario, FixedTime(), seed=1, record="all")
+
+
+def write_fcd_of(run: Run) -> Callable[[pd.DataFrame, Path], None]:
+    return lambda frame, path: write_fcd(frame, path, run.site)
+
+
+def frame_of(*rows: tuple[float, int, str, int, float]) -> pd.DataFrame:
+    """A trajectory frame from (time, vehicle, lane, manoeuvre, s)."""
+    frame = pd.DataFrame(rows, columns=["time_s", "vehicle", "lane", "manoeuvre", "s_m"])
+    for column in TRAJECTORY_COLUMNS[5:10]:
+        frame[column] = 0.0
+    return frame.assign(right_of_way=True)
+
+
+# Tables.
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".CSV"])
+def test_trajectories_read_back(run: Run, tmp_path: Path, suffix: str) -> None:
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"trajectories{suffix}"
+    write_trajectories(run.trajectories, path)
+
+    read = pd.read_parquet(path) if suffix == ".parquet" else pd.read_csv(path)
+    assert tuple(read.columns) == TRAJECTORY_COLUMNS
+    read, written = (frame.astype({"lane": object}) for frame in (read, run.trajectories))
+    pd.testing.assert_frame_equal(read, written, check_dtype=False, rtol=0, atol=1e-6)
+    assert os.listdir(tmp_path) == [path.name]
+
+
+def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "trips.csv"
+    write_trips(run.trips, path)
+
+    read = pd.read_csv(path)
+    assert tuple(read.columns) == TRIP_COLUMNS
+    pd.testing.assert_frame_equal(read, run.trips, check_dtype=False, rtol=0, atol=1e-6)
+    unfinished = run.trips["arrival_s"].isna()
+    assert unfinished.any()
+    assert "nan" not in path.read_text(encoding="utf-8").lower()
+
+
+def test_times_are_written_as_people_write_them(tmp_path: Path) -> None:
+    frame = frame_of((3 * 0.1, 0, "a", 1, 0.1 + 0.2))
+    write_trajectories(frame, tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()[1] == (
+        "0.3,0,a,1,0.3,0.0,0.0,0.0,0.0,0.0,True"
+    )
+
+
+def test_parquet_without_pyarrow_says_what_to_install(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'minisim\[parquet\]'"):
+        write_trips(run.trips, tmp_path / "trips.parquet")
+    assert os.listdir(tmp_path) == []
+
+
+def test_another_suffix_is_an_error(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"allowed: \.csv, \.parquet"):
+        write_trips(run.trips, tmp_path / "trips.xlsx")
+
+
+@pytest.mark.parametrize(
+    ("write", "frame"),
+    [(write_trips, 5), (write_trips, pd.DataFrame()), (write_trajectories, pd.DataFrame())],
+)
+def test_a_frame_without_the_columns_is_an_error(
+    tmp_path: Path, write: Callable[[Any, Path], None], frame: object
+) -> None:
+    with pytest.raises(InputError, match=r"DataFrame|no column (time_s|demand_time_s)"):
+        write(frame, tmp_path / "out.csv")
+
+
+# FCD.
+
+
+def test_fcd_follows_the_schema_of_sumo(run: Run, tmp_path: Path) -> None:
+    """Element and attribute names and kinds of SUMO's fcd_file.xsd."""
+    path = tmp_path / "fcd.xml"
+    write_fcd(run.trajectories, path, run.site)
+
+    root = ET.parse(path).getroot()
+    assert root.tag == "fcd-export"
+    times = [float(step.attrib["time"]) for step in root]
+    assert {step.tag for step in root} == {"timestep"}
+    assert {tuple(step.attrib) for step in root} == {("time",)}
+    assert times == sorted(set(times))
+    vehicles = [vehicle for step in root for vehicle in step]
+    assert {vehicle.tag for vehicle in vehicles} == {"vehicle"}
+    assert {tuple(vehicle.attrib) for vehicle in vehicles} == {
+        ("id", "x", "y", "angle", "type", "speed", "pos", "lane", "slope")
+    }
+    for vehicle in vehicles:
+        values = {k: float(v) for k, v in vehicle.attrib.items() if k not in ("lane", "type")}
+        assert all(math.isfinite(value) for value in values.values())
+        assert values["speed"] >= 0.0
+        assert values["pos"] >= 0.0
+        assert 0.0 <= values["angle"] < 360.0
+
+
+def test_fcd_says_what_the_frame_says(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "fcd.xml"
+    write_fcd(run.trajectories, path, run.site)
+
+    rows = [
+        (float(step.attrib["time"]), int(v.attrib["id"]), *(float(v.attrib[k]) for k in "xy"))
+        for step in ET.parse(path).getroot()
+        for v in step
+    ]
+    frame = run.trajectories[["time_s", "vehicle", "x_m", "y_m"]]
+    np.testing.assert_allclose(rows, frame.to_numpy(), rtol=0, atol=0.005 + 1e-9)
+
+
+def test_sumos_own_reader_reads_fcd(run: Run, tmp_path: Path) -> None:
+    sumolib = pytest.importorskip("sumolib")
+    path = tmp_path / "fcd.xml"
+    write_fcd(run.trajectories, path, run.site)
+
+    steps = list(sumolib.xml.parse(str(path), "timestep"))
+    assert len(steps) == run.trajectories["time_s"].nunique()
+    assert sum(len(step.vehicle or ()) for step in steps) == len(run.trajectories)
+    first = steps[0].vehicle[0]
+    assert first.lane.endswith("_in_0")
+    assert float(first.speed) == pytest.approx(run.trajectories["speed_mps"][0], abs=0.005)
+
+
+def test_fcd_positions_are_measured_from_the_start_of_the_lane(run: Run, tmp_path: Path) -> None:
+    path = run.site.intersection.paths[0]  # a1: from a to b
+    places = (5.0, path.entry - 0.01, path.entry + 0.01, path.exit - 0.01, path.exit + 3.0)
+    frame = frame_of(*((float(i), 7, "a", 1, s) for i, s in enumerate(places)))
+    write_fcd(frame, tmp_path / "fcd.xml", run.site)
+
+    read = [v.attrib for step in ET.parse(tmp_path / "fcd.xml").getroot() for v in step]
+    assert [v["lane"] for v in read] == ["a_in_0", "a_in_0", ":C_a1_0", ":C_a1_0", "b_out_0"]
+    arc = path.exit - path.entry
+    expected = [5.0, path.entry - 0.01, 0.01, arc - 0.01, 3.0]
+    assert [float(v["pos"]) for v in read] == pytest.approx(expected, abs=0.006)
+
+
+def test_fcd_rounds_angles_and_positions_as_sumo_does(run: Run, tmp_path: Path) -> None:
+    frame = frame_of((0.0, 1, "a", 1, 5.0)).assign(angle_deg=359.999, x_m=-0.001)
+    write_fcd(frame, tmp_path / "fcd.xml", run.site)
+    text = (tmp_path / "fcd.xml").read_text(encoding="utf-8")
+    assert 'x="0.00"' in text
+    assert 'angle="0.00"' in text
+
+
+def test_fcd_of_nothing_is_an_empty_export(run: Run, tmp_path: Path) -> None:
+    write_fcd(run.trajectories.iloc[:0], tmp_path / "fcd.xml", run.site)
+    assert len(ET.parse(tmp_path / "fcd.xml").getroot()) == 0
+
+
+@pytest.mark.parametrize(
+    ("lane", "manoeuvre", "message"),
+    [("e", 1, "lane e"), (None, 1, "lane"), ("a", 4, "manoeuvre 4"), ("a", 0, "manoeuvre 0")],
+)
+def test_a_movement_that_the_site_does_not_have_is_an_error(
+    run: Run, tmp_path: Path, lane: str, manoeuvre: int, message: str
+) -> None:
+    frame = frame_of((0.0, 1, "a", 1, 5.0), (0.0, 2, lane, manoeuvre, 5.0))
+    with pytest.raises(InputError, match=message):
+        write_fcd(frame, tmp_path / "fcd.xml", run.site)
+    assert os.listdir(tmp_path) == []
+
+
+def test_movements_are_numbered_as_in_the_intersection(run: Run) -> None:
+    movements = run.site.intersection.movements
+    rows = [(0.0, i, "abcd"[m.origin], m.manoeuvre, 5.0) for i, m in enumerate(movements)]
+    frame = frame_of(*rows)
+    assert movement_index(frame, run.site).tolist() == list(range(12))
+
+
+# All or nothing.
+
+
+@pytest.mark.parametrize("target", ["missing/t.csv", "file/t.csv", "folder.csv", "a\0b.csv"])
+def test_a_place_that_cannot_be_written_is_one_clear_error(
+    run: Run, tmp_path: Path, target: str
+) -> None:
+    (tmp_path / "file").write_text("not a folder", encoding="utf-8")
+    (tmp_path / "folder.csv").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(FileError, match="cannot write"):
+        write_trips(run.trips, tmp_path / target)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_device_is_not_replaced_by_a_file(run: Run) -> None:
+    with pytest.raises(FileError, match="not an ordinary file"):
+        write_fcd(run.trajectories, os.devnull, run.site)
+    assert not Path(os.devnull).is_file()
+
+
+def test_a_failure_halfway_leaves_the_old_file(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "fcd.xml"
+    path.write_text("old", encoding="utf-8")
+
+    def fail(*_: object) -> Any:
+        yield "    <timestep"
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(recording, "_fcd_lines", fail)
+    with pytest.raises(FileError, match="No space left"):
+        write_fcd(run.trajectories, path, run.site)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert os.listdir(tmp_path) == ["fcd.xml"]
+
+
+def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "out.txt"
+    with replacing(path) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+        assert not path.exists()
+        assert temporary.parent == path.parent
+    assert path.read_text(encoding="utf-8") == "new"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_a_symbolic_link_keeps_pointing_to_the_file(tmp_path: Path) -> None:
+    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
+    real.write_text("old", encoding="utf-8")
+    link.symlink_to(real)
+    with replacing(link) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert link.is_symlink()
+    assert real.read_text(encoding="utf-8") == "new"
+
+
+@pytest.mark.parametrize("path", [5, None, b"x.csv"])
+def test_a_path_must_be_a_path(run: Run, path: Any) -> None:
+    with pytest.raises(InputError, match="output file"):
+        write_trips(run.trips, path)

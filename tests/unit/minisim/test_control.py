@@ -1,0 +1,126 @@
+"""The control room: sites, plans, and what an observer can tell about a vehicle."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from minisim.control import (
+    COMMIT_MARGIN,
+    Controller,
+    Marking,
+    Observed,
+    Plan,
+    Session,
+    Site,
+    Unregulated,
+    View,
+    can_stop,
+    stopping_distance,
+)
+from minisim.errors import InputError
+from minisim.junction.geometry import Intersection, Movement
+from minisim.vehicle import VehicleType
+
+FOUR = Intersection((0.0, 90.0, 180.0, 270.0))
+SITE = Site(FOUR, VehicleType(), speed_limit=14.0, demand=(350.0,) * 4)
+
+
+def observed(distance: float, speed: float) -> Observed:
+    return Observed(id=1, lane=2, manoeuvre=3, distance=distance, speed=speed, length=5.0)
+
+
+def test_stopping_distance_is_v_squared_over_2b() -> None:
+    """The paper's 23.14 m for 40 to 20 km/h at 2 m/s² are the difference of two of these."""
+    v, w = 40 / 3.6, 20 / 3.6
+    assert stopping_distance(v, 2.0) == pytest.approx(30.86, abs=0.005)
+    assert stopping_distance(v, 2.0) - stopping_distance(w, 2.0) == pytest.approx(23.15, abs=0.01)
+
+
+def test_a_vehicle_can_stop_while_the_stopping_distance_fits_before_the_junction() -> None:
+    needed = stopping_distance(10.0, 2.0) + COMMIT_MARGIN
+    assert can_stop(observed(needed + 1e-9, 10.0), 2.0)
+    assert not can_stop(observed(needed - 1e-6, 10.0), 2.0)
+
+
+def test_a_standing_vehicle_can_stop_unless_it_stands_inside() -> None:
+    assert can_stop(observed(0.0, 0.0), 2.0)
+    assert not can_stop(observed(-0.01, 0.0), 2.0)
+
+
+def test_an_observed_vehicle_has_its_movement() -> None:
+    assert observed(5.0, 1.0).movement == Movement(2, 3)
+
+
+def test_conflicts_leave_out_movements_of_one_arm() -> None:
+    conflicts = SITE.conflicts
+    np.testing.assert_array_equal(conflicts, conflicts.T)
+    for arm in range(4):
+        assert not conflicts[3 * arm : 3 * arm + 3, 3 * arm : 3 * arm + 3].any()
+    assert conflicts[FOUR.index(Movement(0, 2)), FOUR.index(Movement(1, 2))]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"intersection": "four-way"}, "intersection must be an Intersection"),
+        ({"vehicle": None}, "vehicle must be a VehicleType"),
+        ({"speed_limit": 0}, "speed_limit"),
+        ({"demand": (1.0, 2.0)}, "demand must be 4 numbers"),
+        ({"demand": (1.0, 2.0, 3.0, -1.0)}, "demand must be 4 numbers"),
+        ({"demand": 350.0}, "demand .* must be a sequence"),
+        ({"dt": 0.6}, "dt"),
+        ({"seed": -1}, "seed"),
+        ({"vehicle": VehicleType(length=12.0, width=2.5)}, r"12 × 2\.5 m do not fit lanes of 3\.2"),
+        ({"vehicle": VehicleType(width=3.3)}, "do not fit lanes"),
+    ],
+)
+def test_sites_are_checked(change: dict[str, object], message: str) -> None:
+    options = {"intersection": FOUR, "vehicle": VehicleType(), "speed_limit": 14.0}
+    with pytest.raises(InputError, match=message):
+        Site(**{**options, "demand": (350.0,) * 4, **change})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"hold_distance": -1}, "hold_distance"),
+        ({"sight": -1}, "sight"),
+        ({"marks": (1.0, -1001.0)}, "mark"),
+        ({"reach": -1}, "reach"),
+        ({"marks": 3.0}, "marks .* must be a sequence"),
+        ({"period": 0}, "period"),
+        ({"markings": ("red",)}, "marking must be a Marking"),
+        ({"markings": Marking("red", 30, 8)}, "markings must be a tuple"),
+        ({"lanes_open": 1}, "lanes_open must be a bool"),
+    ],
+)
+def test_plans_are_checked(change: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Plan(**change)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("red", 8.0, 30.0), r"start of marking red .* above 30"),
+        (("red", 8.0, -1.0), "end of marking red"),
+        (("red", 30.0, 8.0, 0.0), "speed of marking red"),
+        ((5, 30.0, 8.0), "name of a marking must be a str"),
+    ],
+)
+def test_markings_are_checked(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Marking(*arguments)  # type: ignore[arg-type]
+
+
+def test_unregulated_opens_every_lane_and_says_nothing() -> None:
+    controller = Unregulated()
+    session = controller.start(SITE)
+    assert isinstance(controller, Controller)
+    assert isinstance(session, Session)
+    assert session.plan.lanes_open
+    assert list(session.decide(View(0.0, (observed(5.0, 10.0),)))) == []
+    assert pickle.loads(pickle.dumps(controller)) == controller

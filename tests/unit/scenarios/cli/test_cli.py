@@ -1,0 +1,601 @@
+"""The command line: every command, and every error as one line and exit code 2."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+import minisim.simulation
+from dim import HarmonyMatrix
+from minisim.errors import InputError
+from minisim.results.trips import TRIP_COLUMNS
+from scenarios import four_way
+from scenarios.cli import COMMANDS, app, main
+from scenarios.cli.shared.report import harmony_table
+from scenarios.cli.shared.terminal import show
+from scenarios.controllers import CONTROLLERS, controller_named
+from scenarios.demo import Tour
+from tests import ROOT
+
+SHORT = ("--horizon", "240", "--density", "300")
+
+#: The issue's keys of `minisim run --json`.
+RUN_KEYS = {
+    "controller", "scenario", "profile", "density", "seed", "horizon_s", "trips", "unfinished",
+    "waiting_time_s", "travel_time_s", "depart_delay_s", "lanes", "collisions", "complete",
+}  # fmt: skip
+
+
+def ok(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    code = main(arguments)
+    captured = capsys.readouterr()
+    assert (code, captured.err) == (0, "")
+    return captured.out
+
+
+def fails(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
+    returned = main(arguments)
+    captured = capsys.readouterr()
+    assert (returned, captured.out) == (code, "")
+    assert captured.err.startswith("minisim: ")
+    assert captured.err.count("\n") == 1, "one line"
+    return captured.err
+
+
+# --- help ------------------------------------------------------------------------------------
+
+
+def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    text = ok(capsys, "--help")
+    assert all(f" {name} " in text for name in COMMANDS)
+    assert {c.name or c.callback.__name__ for c in app.registered_commands} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    assert f"minisim {command}" in ok(capsys, command, "--help")
+
+
+def test_nothing_typed_is_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert ok(capsys) == ok(capsys, "--help")
+
+
+def test_run_help_has_examples_that_work(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [" ".join(line.split()) for line in ok(capsys, "run", "--help").splitlines()]
+    examples = [line for line in lines if line.startswith("minisim run ")]
+    assert len(examples) >= 3
+    for example in examples:
+        short = [*example.split()[1:], "--horizon", "60"]
+        written = [k for k, word in enumerate(short) if word in ("--trips", "--fcd")]
+        for k in reversed(written):
+            del short[k : k + 2]
+        ok(capsys, *short)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = (
+        "import sys; from scenarios.cli import main; main(['run', '--help']); "
+        "print(sorted({'pandas', 'matplotlib', 'numba', 'networkx', 'pymunk'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+# --- run -------------------------------------------------------------------------------------
+
+
+def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, "--seed", "3", "--json"))
+    run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
+    assert set(printed) >= RUN_KEYS | {"safety"}
+    safety = printed.pop("safety")
+    assert printed == run.summary()
+    assert set(printed["lanes"]) == set("abcd")
+    assert set(printed["lanes"]["a"]) >= {"trips", "waiting_time_s", "travel_time_s"}
+    assert safety["min_ttc_s"] > 0
+    assert safety["min_pet_s"] > 0
+
+
+def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str]) -> None:
+    out = ok(capsys, "run", "five-way", *SHORT, "-c", "fixed-time", "-p", "fair")
+    rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
+    served = [int(rows[lane][0]) for lane in "abcde"]
+    assert int(rows["all"][0]) == sum(served)
+    assert rows["collisions"][0] == "0"
+    for word in ("waiting [s]", "travel [s]", "departure delay [s]", "minimum TTC", "minimum PET"):
+        assert word in out
+
+
+def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
+    printed = json.loads(ok(capsys, *arguments, "--json"))
+    assert printed["controller"] == "dim-humans-0.4"
+    groups = printed["drivers"]
+    assert groups["human"]["trips"] + groups["automated"]["trips"] == printed["trips"]
+    rows = {words[0]: words[1:] for line in ok(capsys, *arguments).splitlines()
+            if (words := line.split())}  # fmt: skip
+    for name in ("human", "automated"):
+        assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
+
+
+def test_run_without_vehicles(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
+    assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None
+    assert "–" in ok(capsys, *arguments)
+
+
+def test_run_writes_trips_trajectories_and_fcd(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    trips, table, fcd = (tmp_path / name for name in ("trips.csv", "t.parquet", "fcd.xml"))
+    plain = ok(capsys, "run", "four-way", *SHORT, "--json")
+    full = ok(
+        capsys, "run", "four-way", *SHORT, "--json", "--trips", str(trips),
+        "--trajectories", str(table), "--fcd", str(fcd),
+    )  # fmt: skip
+    assert plain == full, "what is written changes no result"
+    with trips.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == TRIP_COLUMNS
+    assert len(rows) == json.loads(full)["trips"]
+    assert pd.read_parquet(table)["time_s"].max() == pytest.approx(240.0)
+    assert ET.parse(fcd).getroot().tag == "fcd-export"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fcd.xml", "t.parquet", "trips.csv"]
+
+
+def test_run_replays_recorded_arrivals(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arrivals = tmp_path / "arrivals.csv"
+    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,c,1\n")
+    printed = json.loads(
+        ok(capsys, "run", "four-way", "--horizon", "120", "--arrivals", str(arrivals), "--json")
+    )
+    assert (printed["trips"], printed["unfinished"]) == (2, 0)
+    assert printed["lanes"]["c"]["trips"] == 1
+
+
+def test_split_turns_and_side_reach_the_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+    lanes = json.loads(
+        ok(capsys, "run", "four-way", *SHORT, "--split", "1:0:0:0", "--turns", "0:1:0",
+           "--side", "right", "--json")
+    )["lanes"]  # fmt: skip
+    assert [lanes[lane]["trips"] == 0 for lane in "abcd"] == [False, True, True, True]
+
+
+def test_collision_stops_the_run_and_writes_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    trips = tmp_path / "trips.csv"
+    arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
+    said = fails(capsys, *arguments, code=1)
+    assert "touched" in said
+    assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
+    assert list(tmp_path.iterdir()) == []
+    out = ok(capsys, *arguments, "--on-collision", "record")
+    assert " touched" in out
+    assert trips.exists()
+
+
+def test_without_safety_nothing_is_recorded(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    records, real = [], minisim.simulation.Simulation
+
+    def spy(*arguments: Any, **options: Any) -> Any:
+        records.append(options["record"])
+        return real(*arguments, **options)
+
+    monkeypatch.setattr("minisim.simulation.Simulation", spy)
+    with_safety = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json"))
+    without = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json", "--no-safety"))
+    assert records == ["junction", None]
+    assert without == {**with_safety, "safety": None}
+    assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
+
+
+# --- harmony and decide ----------------------------------------------------------------------
+
+
+def test_harmony_csv_is_the_papers_file(capsys: pytest.CaptureFixture[str]) -> None:
+    published = (ROOT / "dim" / "data" / "harmony_4way.csv").read_text()
+    assert ok(capsys, "harmony", "four-way", "--csv").split() == published.split()
+
+
+def test_harmony_table_json_and_csv_agree(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("harmony", "custom", "--bearings", "0,80,190,260", "--side", "right")
+    printed = json.loads(ok(capsys, *arguments, "--json"))
+    text = ok(capsys, *arguments, "--csv")
+    header, *rows = (line.split(",") for line in text.split())
+    assert printed["movements"] == header[1:]
+    assert [[str(v) for v in row] for row in printed["harmony"]] == [row[1:] for row in rows]
+    table = ok(capsys, *arguments)
+    assert table.count("●") - 1 == sum(map(sum, printed["harmony"])), "and one in the title"
+
+
+def test_harmony_of_twelve_arms_is_not_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    show(harmony_table(HarmonyMatrix(12, np.zeros((132, 132), dtype=bool))))
+    lines = capsys.readouterr().out.splitlines()
+    assert "…" not in "".join(lines)
+    assert "l10 l11" in lines[1]
+    assert [line.count("·") for line in lines if line.startswith((" a", " l"))] == [132] * 22
+
+
+def test_clearance_only_removes_harmony(capsys: pytest.CaptureFixture[str]) -> None:
+    def pairs(clearance: str) -> int:
+        text = ok(capsys, "harmony", "five-way", "--clearance", clearance, "--json")
+        return sum(map(sum, json.loads(text)["harmony"]))
+
+    assert pairs("0") >= pairs("0.5") > pairs("3")
+
+
+def test_decide_answers_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = json.loads(ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2", "--json"))
+    assert printed["right_of_way"] == ["a1", "b2"]
+    # Paper, section "Deadlock Analysis": (c2, a1), (a1, b2), (b2, d2).
+    assert sorted(map(sorted, printed["tied"])) == [["a1", "b2"], ["a1", "c2"], ["b2", "d2"]]
+    assert sorted(map(sorted, printed["edges"])) == [["a1", "b2"], ["a1", "c2"], ["b2", "d2"]]
+    text = ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2")
+    assert text.count("tied") == 3
+    assert "{a1 b2}  tied  ← right of way" in text
+    assert printed["reason"] in text
+
+
+def test_decide_plots(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for suffix, magic in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
+        file = tmp_path / f"decision.{suffix}"
+        ok(capsys, "decide", "three-way", "a1", "c2", "--plot", str(file))
+        assert file.read_bytes().startswith(magic)
+
+
+# --- animate and demo ------------------------------------------------------------------------
+
+
+def test_animate_writes_a_gif(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "film.gif"
+    ok(capsys, "animate", "four-way", "-o", str(file), "--start", "60", "--seconds", "2",
+       "--fps", "5", "--density", "400")  # fmt: skip
+    with Image.open(file) as film:
+        assert film.n_frames == 10
+        assert film.info["duration"] == 200
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_animate_checks_before_it_simulates(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
+    monkeypatch.setenv("PATH", str(tmp_path))
+    here = str(tmp_path)
+    assert ".gif, .mp4, .html" in fails(capsys, "animate", "four-way", "-o", f"{here}/film.avi")
+    assert "ffmpeg" in fails(capsys, "animate", "four-way", "-o", f"{here}/film.mp4")
+    missing = fails(capsys, "animate", "four-way", "-o", f"{here}/no/film.gif")
+    assert f"no folder {here}/no" in missing
+    for option, value in (("--fps", "11"), ("--start", "1e300"), ("--seconds", "1e300")):
+        message = fails(capsys, "animate", "four-way", "-o", f"{here}/f.gif", option, value)
+        assert option.lstrip("-") in message
+    recorded = tmp_path / "f.gif"
+    recorded.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
+    again = f"{here}/../{tmp_path.name}/f.gif"
+    same = fails(capsys, "animate", "four-way", "--arrivals", str(recorded), "-o", again)
+    assert "--arrivals and --out name the same file" in same
+    assert recorded.read_text().startswith("demand_time_s")
+
+
+def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "out"
+    out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
+    names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
+    assert sorted(p.name for p in folder.iterdir()) == names
+    points = pd.read_csv(folder / "demo.csv")
+    assert sorted(points["controller"].unique()) == ["dim", "dim-harmonious", "fixed-time"]
+    assert set(points["density"]) == {150.0, 350.0}
+    assert (points["waiting_time_s_ci95"] > 0).all()
+    assert (points["collisions"] == 0).all()
+    assert "DIM, paper's gate" in out
+    assert (folder / "demo.md").read_text().count("\n|") == 2 + len(points)
+    with Image.open(folder / "demo.gif") as film:
+        assert film.n_frames == 100
+
+
+def test_demo_takes_the_seeds_it_is_given(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(tour: Tour) -> None:
+        raise InputError(f"{tour.seeds} seeds")
+
+    monkeypatch.setattr(Tour, "film", stop)
+    here = str(tmp_path)
+    assert "7 seeds" in fails(capsys, "demo", "--quick", "--seeds", "7", "--out", here)
+    assert "2 seeds" in fails(capsys, "demo", "--quick", "--out", here)
+    assert "5 seeds" in fails(capsys, "demo", "--out", here)
+
+
+@pytest.mark.parametrize(("option", "value"), [("--jobs", "100000"), ("--seeds", "1001")])
+def test_a_demo_that_cannot_start_makes_no_folder(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, option: str, value: str
+) -> None:
+    assert option in fails(capsys, "demo", option, value, "--out", str(tmp_path / "new"))
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- errors ----------------------------------------------------------------------------------
+
+BAD = [
+    (("rum",), "rum"),
+    (("run",), "SCENARIO"),
+    (("run", "four-way", "--fo"), "--fo"),
+    (("run", "for-way"), "did you mean 'four-way'"),
+    (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
+    (("run", "2-way"), "3 … 12"),
+    (("run", "custom"), "needs bearings"),
+    (("run", "custom", "--bearings", "0,10,90"), "at least 30°"),
+    (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
+    (("run", "custom", "--bearings", "0,nan,90"), "0,nan,90"),
+    (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
+    (("run", "four-way", "--split", "1:1:inf:1"), "'inf' is no finite number"),
+    (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
+    (("run", "four-way", "--bearings", "0,90,180"), "custom"),
+    (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
+    (("run", "four-way", "-p", "pape"), "did you mean 'paper'"),
+    (("run", "four-way", "-d", "-1"), "-1"),
+    (("run", "four-way", "-d", "99999"), "99999"),
+    (("run", "four-way", "-d", "many"), "many"),
+    (("run", "four-way", "-d", "nan"), "nan"),
+    (("run", "four-way", "--humans", "1.5"), "at least 0 and at most 1, got 1.5"),
+    (("run", "four-way", "--humans", "-0.1"), "share of humans"),
+    (("run", "four-way", "--humans", "nan"), "got nan"),
+    (("run", "four-way", "--humans", "some"), "some"),
+    (("run", "four-way", "-c", "adaptive", "--humans", "0.1"), "not with 'adaptive'"),
+    (("run", "four-way", "-p", "as_run", "--humans", "0.1"), "among vehicles of DIM"),
+    (("animate", "four-way", "-o", "no.gif", "--humans", "2"), "at most 1, got 2"),
+    (("run", "four-way", "--split", "4:3"), "2 shares for 4 lanes"),
+    (("run", "four-way", "--split", "4;3"), "4;3"),
+    (("run", "four-way", "--turns", "1:1"), "2 shares for 3 manoeuvres"),
+    (("run", "four-way", "--side", "up"), "left, right"),
+    (("run", "four-way", "--seed", "-1"), "-1"),
+    (("run", "four-way", "--horizon", "0"), "horizon"),
+    (("run", "four-way", "--on-collision", "ignore"), "stop, record"),
+    (("run", "four-way", "--arrivals", "missing.csv"), "missing.csv"),
+    (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
+    (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
+    (("run", "four-way", "--trips", "t.xlsx"), ".csv, .parquet"),
+    (("run", "four-way", "--trips", str(ROOT)), "allowed"),
+    (("run", "four-way", "--fcd", str(ROOT)), "allowed"),
+    (("run", "four-way", "--fcd", "fcd.csv"), "allowed: .xml"),
+    (("harmony", "four-way", "--clearance", "-1"), "-1"),
+    (("harmony", "four-way", "--csv", "--json"), "--json"),
+    (("decide", "four-way"), "MOVEMENTS"),
+    (("decide", "four-way", "a1", "a2"), "a1 and a2"),
+    (("decide", "four-way", "a1", "a1"), "lane a"),
+    (("decide", "four-way", "a4"), "1 … 3"),
+    (("decide", "four-way", "e1"), "a … d"),
+    (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
+    (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
+    (("animate", "four-way"), "--out"),
+    (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
+    (("demo", "--jobs", "0"), "--jobs"),
+    (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a)[:40] for a, _ in BAD])
+def test_bad_input_is_one_line_and_exit_2(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], named: str
+) -> None:
+    assert named in fails(capsys, *arguments)
+
+
+def test_broken_arrivals_name_the_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arrivals = tmp_path / "arrivals.csv"
+    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
+    assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
+
+
+def test_one_bad_output_writes_none(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    good, bad = tmp_path / "trips.csv", tmp_path / "none" / "fcd.xml"
+    fails(capsys, "run", "four-way", *SHORT, "--trips", str(good), "--fcd", str(bad))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("--trips", "--trajectories"), ("--trips", "--fcd"), ("--arrivals", "--trips")],
+)
+def test_no_file_is_written_twice_or_over_an_input(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    first: str, second: str,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
+    monkeypatch.chdir(tmp_path)
+    file, link = tmp_path / "a.csv", tmp_path / "link.csv"
+    file.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
+    link.symlink_to(file)
+    before = file.read_text()
+    for other in ("a.csv", "./a.csv", str(link)):
+        message = fails(capsys, "run", "four-way", first, str(file), second, other)
+        assert f"{first} and {second} name the same file" in message
+    assert file.read_text() == before
+
+
+def test_ctrl_c_is_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scenarios.cli.run.build_scenario", interrupted)
+    assert main(["run", "four-way"]) == 130
+    assert capsys.readouterr().err == "minisim: interrupted\n"
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    command = "from scenarios.cli import main; raise SystemExit(main(['harmony', 'four-way']))"
+    with subprocess.Popen(
+        [sys.executable, "-c", command], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+
+
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run `minisim …` as a shell does, with its redirections."""
+    script = "from scenarios.cli import main; raise SystemExit(main())"
+    return subprocess.run(
+        ["sh", "-c", command.replace("minisim", '"$0" -c "$1"', 1), sys.executable, script],
+        cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    "command",
+    ["run three-way --horizon 20", "run three-way --horizon 20 --json", "--help", "--version",
+     "harmony five-way --csv"],
+)  # fmt: skip
+def test_a_full_disk_is_one_line(command: str) -> None:
+    done = shell(f"minisim {command} > /dev/full")
+    assert done.stderr == "minisim: cannot write to stdout: No space left on device\n"
+    assert done.returncode == 1
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_closed_streams_are_no_error(closed: str) -> None:
+    for command in ("harmony three-way --csv", "--help"):
+        done = shell(f"minisim {command} {closed}")
+        assert (done.returncode, done.stderr) == (0, "")
+    assert shell(f"minisim harmony 2-way {closed}").returncode == 2
+
+
+def test_a_terminal_without_unicode_gets_plain_characters() -> None:
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+    table = shell("minisim harmony three-way", **plain)
+    assert (table.returncode, table.stderr) == (0, "")
+    assert "x harmony, . conflict" in table.stdout
+    decision = shell("minisim decide four-way a1 b2", PYTHONIOENCODING="ascii")
+    assert (decision.returncode, decision.stderr) == (0, "")
+    assert "a1-b2" in decision.stdout
+
+
+# --- controllers -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_controllers_are_called_what_they_say(name: str) -> None:
+    assert controller_named(name, "fair").name == name
+
+
+# --- verify and protocol ---------------------------------------------------------------------
+
+
+def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) -> None:
+    text = ok(capsys, "verify", "four-way")
+    assert "four-way, 4 arms: all 255 cases, order size" in text
+    assert "130 (51%)" in text
+    assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
+
+
+def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(ok(capsys, "verify", "three-way", "--json"))
+    assert (found["arms"], found["cases"], found["most_cliques_tied"]) == (3, 26, 3)
+    assert all(claim["holds"] for claim in found["claims"])
+    assert found["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
+    assert found["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
+
+
+def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    (false,) = [claim for claim in found["claims"] if not claim["holds"]]
+    assert (false["name"], false["failures"]) == ("largest", 1)
+    assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
+
+
+def test_verify_draws(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    picture = tmp_path / "cases.png"
+    assert f"wrote {picture}" in ok(capsys, "verify", "four-way", "--plot", str(picture))
+    with Image.open(picture) as image:
+        assert image.width > 2 * image.height
+
+
+def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> None:
+    text = ok(capsys, "protocol", "three-way", "--order", "lanes")
+    assert "872, with 3259 transitions\n" in text
+    assert "safe         yes" in text
+    assert "live         yes" in text
+    assert "lane a       never starves" in text
+    assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
+
+
+def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    rules = ("--order", "lanes", "--priorities", "waiting")
+    found = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
+    assert found["all_states"] is True
+    assert (found["unsafe"], found["stuck"]) == ([], None)
+    assert found["starving"] == {"a": None, "b": None, "c": None}
+
+
+def test_protocol_writes_a_counterexample_that_collides(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "two.csv"
+    assert main(["protocol", "three-way", "--commit", "paper", "--counterexample", str(file)]) == 1
+    text = capsys.readouterr().out
+    assert "safe         no: arrive b1, look, roll b1, arrive a2, look," in text
+    assert f"wrote {file}" in text
+    run = ("run", "three-way", "--arrivals", str(file), "-c")
+    assert "touched" in fails(capsys, *run, "dim-paper-commit", "--horizon", "120", code=1)
+    assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
+        (("verify", "four-way", "--order", "sise"), "unknown order 'sise'"),
+        (("verify", "four-way", "--plot", "x.txt"), "a figure file ends in .png, .pdf, .svg"),
+        (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
+        (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
+        (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
+        (("protocol", "three-way", "--commit", "shut"), "unknown commit rule 'shut'"),
+        (("protocol", "three-way", "--priorities", "inflow"), "unknown priorities 'inflow'"),
+        (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
+        (("protocol", "three-way", "--counterexample", "/nowhere/x.csv"), "there is no folder"),
+        (("protocol", "three-way", "--counterexample", "x.csv"), "there is no counterexample"),
+    ],
+)
+def test_bad_input_to_the_proofs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert message in fails(capsys, *arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def test_arrivals_of_a_smaller_junction_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """They fit, but a 3-arm manoeuvre 2 would be read as straight on."""
+    table = tmp_path / "three.csv"
+    rows = [f"{k},{'abc'[k % 3]},{k % 2 + 1}" for k in range(40)]
+    table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows, ""]))
+    message = fails(capsys, "run", "four-way", "--arrivals", str(table))
+    assert "junction with 3 arms" in message
+    table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows[:3], ""]))
+    assert main(["run", "four-way", "--arrivals", str(table), "--horizon", "60"]) == 0

@@ -1,0 +1,172 @@
+"""`minisim figures` and `minisim reproduce`: what they write, and what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from figures import gallery, report
+from figures.gallery import GALLERY
+from figures.tables import WRITERS
+from minisim.errors import InputError
+from scenarios.cli import main
+from scenarios.cli.shared import terminal
+from scenarios.studies import reproduction
+from scenarios.studies.archive import MissingRunsError
+from scenarios.studies.capacity import CASES, Search
+from scenarios.studies.reproduction import PARTS, Plan, find_in, reproduce
+from scenarios.studies.results import Effort
+from scenarios.sweep.store import Store
+
+
+def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", "--list"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in GALLERY)
+
+
+def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
+    assert main(["figures", "webster", "harmony-3way", "--out", str(tmp_path / "new")]) == 0
+    names = {f"{name}.{suffix}" for name in ("webster", "harmony-3way") for suffix in WRITERS}
+    assert {file.name for file in (tmp_path / "new").iterdir()} == names
+
+
+def test_without_a_store_what_needs_runs_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = {name: GALLERY[name] for name in ("webster", "gate", "fair")}
+    monkeypatch.setattr(gallery, "GALLERY", few)
+    assert main(["figures", "--out", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("wrote 1 figures")
+    assert captured.err == "  not 2 others, which need runs: name a store with --store\n"
+
+
+def test_a_wrong_store_is_refused_before_a_folder_is_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notes, folder = tmp_path / "notes.txt", tmp_path / "out"
+    notes.write_text("mine")
+    assert main(["reproduce", "--store", str(notes), "--out", str(folder)]) == 2
+    assert "is not a store of minisim" in capsys.readouterr().err
+    assert not folder.exists()
+    assert main(["figures", "webster", "--out", str(notes)]) == 2
+    assert "it is a file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["figures", "maps", "fairnes"], "did you mean 'fairness'"),
+        (["figures", "webster", "gate"], "gate: drawn from results; give them with --store"),
+        (["figures", "webster", "--store", "STORE"], "there is no store"),
+        (["figures", "--seeds", "1"], "seeds must be an integer 2 … 10000, got 1"),
+        (["reproduce", "--seeds", "1"], "seeds must be an integer"),
+        (["reproduce", "--jobs", "0"], "--jobs must be an integer 1 … 1024, got 0"),
+        (["reproduce", "--only", "fare"], "did you mean 'fair'"),
+    ],
+)
+def test_refused_before_anything_is_written(
+    arguments: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [a.replace("STORE", str(tmp_path / "runs.sqlite")) for a in arguments]
+    folder = tmp_path / "out"
+    assert main([*arguments, "--out", str(folder)]) == 2
+    error = capsys.readouterr().err
+    assert why in error
+    assert error.count("\n") == 1
+    assert not folder.exists()
+    assert not (tmp_path / "runs.sqlite").exists()
+
+
+def test_an_empty_store_says_what_makes_its_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = tmp_path / "runs.sqlite"
+    Store(store).close()
+    assert main(["figures", "gate", "--store", str(store), "--out", str(tmp_path)]) == 2
+    assert "minisim reproduce --only gate --seeds 10" in capsys.readouterr().err
+
+
+TINY = Plan(
+    effort=Effort(seeds=2, horizon=100.0, densities=(350.0,)),
+    search=Search(step=400.0, steps=2, seeds=1, horizon=100.0),
+    parts=("fairness", "capacity"),
+)
+
+
+def test_reproduce_computes_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduction, "CASES", CASES[:2])
+    seen: list[tuple[int, int]] = []
+    with Store(tmp_path / "runs.sqlite") as store:
+        first = reproduce(TINY, store, 1, lambda done, total: seen.append((done, total)))
+        again = reproduce(TINY, store, 1, lambda done, total: None)
+        archive = TINY.archive(find_in(store))
+        assert archive.study("fairness").missing == ()
+        with pytest.raises(MissingRunsError):
+            archive.need("text")
+    assert [(part.name, part.runs, part.computed) for part in first] == [
+        ("fairness", 6, 6), ("capacity", 2, 2),
+    ]  # fmt: skip
+    assert [part.computed for part in again] == [0, 0]
+    assert seen[5] == (6, 6)
+    assert seen[-1] == (2, 2)
+    assert first[0].hours == pytest.approx(6 * 100 / 3600)
+    assert not any(part.failed for part in first)
+
+
+def test_progress_is_told_without_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 5.0, 25.0, 30.0, 50.0])
+    monkeypatch.setattr(terminal, "SILENCE", 20.0)
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock))
+    with terminal.bar("simulating text") as progress:
+        for done in (1, 2, 3):
+            progress(done, 9)
+        progress.label("still")
+        progress(4, 9)
+    assert capsys.readouterr().err == "simulating text: 2 of 9\nstill: 4 of 9\n"
+
+
+def test_reproduce_says_what_each_study_took(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduction.Plan, "of", lambda **_: TINY)
+    monkeypatch.setattr(reproduction, "CASES", CASES[:1])
+    monkeypatch.setattr(report, "write_report", lambda *_, parts: len(parts))
+    assert main(["reproduce", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    captured = capsys.readouterr()
+    took = captured.err.splitlines()
+    assert [line.rpartition(" in ")[0] for line in took] == [
+        "fairness: 6 of 6 runs computed", "capacity: 1 of 1 runs computed",
+    ]  # fmt: skip
+    assert "wrote 2 figures and tables" in captured.out
+
+
+def test_plans() -> None:
+    assert Plan.of().effort == Effort()
+    assert Plan.of().parts == PARTS
+    assert Plan.of(quick=True, seeds=3).effort.seeds == 3
+    assert Plan.of(parts=["text"]).parts == ("text",)
+    with pytest.raises(InputError, match="did you mean 'text'"):
+        Plan.of(parts=["texts"])
+
+
+@pytest.mark.slow
+def test_reproduce_quick_from_nothing(tmp_path: Path) -> None:
+    """The same code path as the full run; every figure, and a report that links them."""
+    assert main(["reproduce", "--quick", "--jobs", "2", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "A smoke test" in text
+    assert "## Failed runs\n\nNone." in text
+    for name in GALLERY:
+        assert list((tmp_path / "figures").glob(f"{name}.*"))
+    files = [str(tmp_path / "runs.sqlite"), str(tmp_path / "again")]
+    assert main(["figures", "gate", "--quick", "--store", files[0], "--out", files[1]]) == 0
+    for suffix in ("png", "pdf", "svg"):
+        one, two = (tmp_path / folder / f"gate.{suffix}" for folder in ("figures", "again"))
+        assert one.read_bytes() == two.read_bytes()

@@ -1,0 +1,192 @@
+"""`minisim sweep`: results, resuming, interruptions, and what it refuses."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from scenarios.cli import main
+from scenarios.studies import study as studies
+from scenarios.studies.reproduction import find_in
+from scenarios.studies.results import Effort, collect
+from scenarios.studies.study import STUDIES
+from scenarios.sweep.store import Store
+from tests import ROOT
+
+SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "e.toml"
+    path.write_text(SMALL)
+    return path
+
+
+def test_a_sweep_and_the_same_again(
+    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store, table = tmp_path / "s.db", tmp_path / "rows.csv"
+    arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
+    assert main(arguments) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    lines = captured.out.splitlines()
+    for name in ("dim", "fixed-time"):
+        assert any(f" {name} " in line and "too short" in line for line in lines)
+    assert any("4 runs in" in line for line in lines)
+    first = pd.read_csv(table)
+    assert first["controller"].tolist() == ["dim", "dim", "fixed-time", "fixed-time"]
+    assert first["seed"].tolist() == [1, 2, 1, 2]
+    table.unlink()
+    assert main(arguments) == 0
+    again = pd.read_csv(table)
+    pd.testing.assert_frame_equal(first, again)  # processor times too: nothing was run
+
+
+def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
+    table = tmp_path / "rows.parquet"
+    more = ["--seeds", "1", "--horizon", "30", "--jobs", "1", "--export", str(table)]
+    assert main(["sweep", str(file), "--out", str(tmp_path / "s.db"), *more]) == 0
+    rows = pd.read_parquet(table)
+    assert rows["horizon_s"].tolist() == [30.0, 30.0]
+    assert rows["error"].isna().all()
+
+
+def test_failures_are_rows_and_exit_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, store = tmp_path / "e.toml", tmp_path / "s.db"
+    file.write_text('horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n')
+    assert main(["sweep", str(file), "--jobs", "1", "--out", str(store)]) == 1
+    out = capsys.readouterr().out
+    assert "2 of 4 runs failed; the first (unregulated, four-way, 350 veh/h/lane, seed 1)" in out
+    assert "(+2 failed)" in out
+    with Store(store) as kept:
+        assert len(kept) == 4
+
+
+def test_a_capped_signal_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "e.toml"
+    file.write_text('horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n')
+    assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db")]) == 0
+    assert "over Webster's capacity; the cycle is capped at 180 s" in capsys.readouterr().out
+
+
+def test_the_papers_grid(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The study `text`: what `minisim reproduce` needs of it is then in the store."""
+    text = STUDIES["text"]
+    some = replace(text, cases=tuple(case for case in text.cases if case.density == 300))
+    monkeypatch.setattr(studies, "STUDIES", {"text": some})
+    store = tmp_path / "s.db"
+    few = ["--seeds", "2", "--horizon", "5", "--jobs", "1", "--out", str(store)]
+    assert main(["sweep", "paper", *few]) == 0
+    assert "28 runs in" in capsys.readouterr().out
+    with Store(store) as kept:
+        assert len(kept) == 28
+        assert set(kept.frame()["profile"]) == {"paper"}
+        effort = Effort(seeds=2, horizon=5.0, densities=(300.0,))
+        assert collect(text, effort, find_in(kept)).missing == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["FILE", "--jobs", "0"], "--jobs must be an integer 1"),
+        (["FILE", "--seeds", "0"], "--seeds must be an integer 1"),
+        (["FILE", "--seeds", "many"], "many"),
+        (["FILE", "--horizon", "-5"], "--horizon [s] must be above 0"),
+        (["FILE", "--horizon", "nan"], "--horizon [s] must be above 0"),
+        (["FILE", "--horizon", "inf"], "--horizon [s] must be above 0 and at most 1e+07, got inf"),
+        (["FILE", "--jobs", "2", "--scheduler", "tcp://x:1"], "give one"),
+        (["FILE", "--export", "rows.txt"], "suffix of rows.txt"),
+        (["FILE", "--export", "missing/rows.csv"], "there is no folder"),
+        (["fare"], "unknown study 'fare'; allowed: paper, text, as-run"),
+        (["papers"], "did you mean 'paper'"),
+        (["missing.toml"], "cannot read experiments from missing.toml"),
+        ([], "Missing argument"),
+    ],
+)
+def test_bad_input(
+    arguments: list[str],
+    message: str,
+    file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    store = tmp_path / "s.db"
+    given = [str(file) if a == "FILE" else a for a in arguments]
+    assert main(["sweep", *given, "--out", str(store)]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert not store.exists()
+
+
+def test_results_do_not_go_over_the_experiments(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sweep", str(file), "--out", str(file)]) == 2
+    assert "FILE.toml and --out name the same file" in capsys.readouterr().err
+    assert file.read_text() == SMALL
+
+
+def test_the_extra_is_named_where_it_is_missing(
+    file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import
+    store = tmp_path / "s.db"
+    assert main(["sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store)]) == 2
+    assert "pip install 'minisim[dask]'" in capsys.readouterr().err
+    assert not store.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_whoever_is_ended_leaves_a_store_and_says_how_to_go_on(
+    number: signal.Signals, code: int, word: str, tmp_path: Path
+) -> None:
+    file, path = tmp_path / "e.toml", tmp_path / "s.db"
+    file.write_text("horizon = 600\nseeds = 5000\n")
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
+         "sweep", str(file), "--out", str(path), "--jobs", "1"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    kept = 0
+    while not kept:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+        if path.exists() and path.stat().st_size:
+            with Store(path) as store:
+                kept = len(store)
+    process.send_signal(number)
+    out, error = process.communicate(timeout=30)
+    assert process.returncode == code
+    assert out == ""
+    said, last = error.splitlines()
+    assert last == f"minisim: {word}"
+    with Store(path) as store:
+        assert 0 < len(store) < 200
+        assert said == (
+            f"minisim: {len(store)} of 5000 runs are in {path}; the same command goes on from there"
+        )

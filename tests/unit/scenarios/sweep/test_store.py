@@ -1,0 +1,305 @@
+"""The store: what it keeps, what it refuses, and what a full disk does to it."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dim import Dim
+from minisim.errors import FileError, InputError
+from scenarios import four_way, three_way
+from scenarios.cli import main
+from scenarios.sweep import experiment as experiment_module
+from scenarios.sweep import sweep
+from scenarios.sweep.experiment import Experiment, Outcome, failed, run_experiment
+from scenarios.sweep.store import APPLICATION, SCHEMA, Store
+from tests import ROOT
+
+
+def experiment(seed: int = 1) -> Experiment:
+    return Experiment(three_way(200, horizon=60), Dim(), seed)
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Outcome:
+    return run_experiment(experiment())
+
+
+def test_a_row_comes_back_as_it_was(tmp_path: Path, outcome: Outcome) -> None:
+    with Store(tmp_path / "s.db") as store:
+        store.put(experiment(), outcome)
+    with Store(tmp_path / "s.db", create=False) as store:
+        assert store.valid([experiment().key]) == {experiment().key: outcome.row}
+        assert store.valid([experiment(2).key]) == {}
+        pd.testing.assert_frame_equal(store.frame(), pd.DataFrame([outcome.row]))
+    assert [file.name for file in tmp_path.iterdir()] == ["s.db"], "one file"
+
+
+def test_the_file_tells_how_to_run_it_again(tmp_path: Path, outcome: Outcome) -> None:
+    with Store(tmp_path / "s.db") as store:
+        store.put(experiment(), outcome)
+    database = sqlite3.connect(tmp_path / "s.db")
+    description, provenance = database.execute("SELECT experiment, provenance FROM runs").fetchone()
+    database.close()
+    recipe = json.loads(description)
+    assert recipe["scenario"]["demand"]["density"] == 200.0
+    assert recipe["controller"]["class"] == "dim.controller.Dim"
+    assert recipe["controller"]["zones"]["red"] == 30.0
+    assert set(json.loads(provenance)) >= {"minisim", "python", "numpy"}
+
+
+def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[int] = []
+    original = run_experiment
+
+    def watched(wanted: Experiment) -> Outcome:
+        if wanted.scenario.horizon > 1:  # not the one that compiles
+            ran.append(wanted.seed)
+        return original(wanted)
+
+    monkeypatch.setattr("scenarios.sweep.runner.run_experiment", watched)
+    with Store(tmp_path / "s.db") as store:
+        first = sweep([experiment(1), experiment(2)], jobs=1, store=store)
+        again = sweep([experiment(1), experiment(2)], jobs=1, store=store)
+        pd.testing.assert_frame_equal(first, again)
+        assert ran == [1, 2]
+        store.put(experiment(2), failed(experiment(2), MemoryError()))
+        sweep([experiment(1), experiment(2), experiment(3)], jobs=1, store=store)
+        assert ran == [1, 2, 2, 3], "what failed, and what is new"
+        monkeypatch.setattr(experiment_module, "RESULTS", experiment_module.RESULTS + 1)
+        sweep([experiment(1)], jobs=1, store=store)
+        assert ran == [1, 2, 2, 3, 1], "what another version computed"
+        assert len(store) == 3
+
+
+def test_order_is_by_what_was_run(tmp_path: Path, outcome: Outcome) -> None:
+    with Store(tmp_path / "s.db") as store:
+        for seed in (3, 1, 2):
+            row = {**outcome.row, "seed": seed}
+            store.put(experiment(seed), Outcome(row, outcome.provenance))
+        assert store.frame()["seed"].tolist() == [1, 2, 3]
+
+
+def newer(path: Path) -> None:
+    Store(path).close()
+    database = sqlite3.connect(path)
+    database.execute(f"PRAGMA user_version = {SCHEMA + 1}")
+    database.close()
+
+
+def foreign(path: Path) -> None:
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE mine (x)")
+    database.commit()
+    database.close()
+
+
+def other_columns(path: Path) -> None:
+    Store(path).close()
+    database = sqlite3.connect(path)
+    database.executescript("DROP TABLE runs; CREATE TABLE runs (key, row)")
+    database.close()
+
+
+def filled(path: Path) -> None:
+    result = run_experiment(experiment())
+    with Store(path) as store:
+        for seed in range(40):
+            store.put(experiment(seed), result)
+
+
+def truncated(path: Path) -> None:
+    filled(path)
+    path.write_bytes(path.read_bytes()[:-20_000])
+
+
+def beheaded(path: Path) -> None:
+    filled(path)
+    path.write_bytes(path.read_bytes()[:60])
+
+
+def scribbled(path: Path) -> None:
+    filled(path)
+    data = bytearray(path.read_bytes())
+    data[4096 : 4096 * 3] = b"x" * 8192
+    path.write_bytes(data)
+
+
+def text(path: Path) -> None:
+    path.write_text("controller,seed\ndim,1\n")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (newer, "has layout 2, this version of minisim reads layout 1"),
+        (foreign, "is not a store of minisim"),
+        (text, "is not a store of minisim"),
+        (other_columns, "is not a store of minisim"),
+        (beheaded, "is not a store of minisim"),
+        (truncated, "malformed|damaged"),
+        (scribbled, "malformed|damaged"),
+    ],
+)
+def test_a_bad_store_is_told_and_left_alone(
+    spoil: Callable[[Path], None],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, file = tmp_path / "s.db", tmp_path / "e.toml"
+    spoil(path)
+    file.write_text("seeds = 1\nhorizon = 10\n")
+    before = path.read_bytes()
+    with pytest.raises(FileError, match=message):
+        Store(path)
+    assert main(["sweep", str(file), "--out", str(path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert path.read_bytes() == before
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["e.toml", "s.db"]
+
+
+@pytest.mark.parametrize("name", ["folder", "missing/s.db", "folder/../nul\0l.db"])
+def test_a_place_for_no_store(name: str, tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(FileError, match="cannot open store"):
+        Store(f"{tmp_path}/{name}")
+
+
+def test_reading_makes_no_store(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="there is no store"):
+        Store(tmp_path / "s.db", create=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_empty_file_becomes_a_store(tmp_path: Path) -> None:
+    """What is left of a store whose maker was killed in its first moment."""
+    path = tmp_path / "s.db"
+    path.touch()
+    with Store(path) as store:
+        assert len(store) == 0
+    assert int.from_bytes(path.read_bytes()[68:72], "big") == APPLICATION
+
+
+@pytest.mark.parametrize("text", ["{", "[1,2]", "{}", "null"])
+def test_a_broken_row_is_told(text: str, tmp_path: Path, outcome: Outcome) -> None:
+    with Store(tmp_path / "s.db") as store:
+        store.put(experiment(), outcome)
+        store._database.execute("UPDATE runs SET row = ?", (text,))
+        with pytest.raises(FileError, match="damaged"):
+            store.frame()
+        with pytest.raises(FileError, match="damaged"):
+            sweep([experiment()], jobs=1, store=store)
+
+
+def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
+    class Odd(Dim):
+        pass
+
+    odd = Odd()
+    object.__setattr__(odd, "period", lambda: 1)
+    with Store(tmp_path / "s.db") as store, pytest.raises(InputError, match="cannot be stored"):
+        sweep([replace(experiment(), controller=odd)], jobs=1, store=store)
+
+
+def test_another_writer_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome
+) -> None:
+    monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
+    with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
+        ours.put(experiment(1), outcome)
+        theirs.put(experiment(2), outcome)
+        theirs.put(experiment(1), outcome)  # what both computed is one row
+        assert len(ours) == len(theirs) == 2
+        theirs._database.execute("BEGIN IMMEDIATE")
+        with pytest.raises(FileError, match=r"cannot write store .* locked; what was stored"):
+            ours.put(experiment(3), outcome)
+        theirs._database.execute("ROLLBACK")
+        ours.put(experiment(3), outcome)
+        assert len(ours) == 3
+
+
+def test_a_store_that_another_holds_is_told_soon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scenarios.sweep.store.OPENING", 0.1)
+    Store(tmp_path / "s.db").close()
+    theirs = sqlite3.connect(tmp_path / "s.db", isolation_level=None)
+    theirs.execute("PRAGMA locking_mode = EXCLUSIVE")
+    theirs.execute("BEGIN EXCLUSIVE")
+    began = time.monotonic()
+    with pytest.raises(FileError, match=r"cannot open store .* locked"):
+        Store(tmp_path / "s.db")
+    assert time.monotonic() - began < 5.0
+    theirs.close()
+
+
+FULL_DISK = """
+import resource, sys
+from dim import Dim
+from minisim.errors import FileError
+from scenarios import three_way
+from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.store import Store
+from scenarios.sweep import sweep
+from minisim.simulation import simulate
+
+simulate(three_way(200, horizon=1), Dim())  # compile, and write what that writes, before the limit
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+try:
+    with Store(sys.argv[1]) as store:
+        todo = [Experiment(three_way(200, horizon=20), Dim(), seed) for seed in range(60)]
+        sweep(todo, jobs=1, store=store)
+except FileError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX's")
+@pytest.mark.parametrize("limit", [100, 40_000, 150_000])
+def test_a_full_disk_is_told_and_what_was_stored_stays(tmp_path: Path, limit: int) -> None:
+    path = tmp_path / "s.db"
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(path), str(limit)],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert "cannot" in done.stdout
+    assert str(path) in done.stdout
+    assert done.stderr == ""
+    with Store(path) as store:  # there is room again
+        kept = len(store)
+        assert kept == len(store.frame())
+        assert kept < 60
+        assert kept > 0 or limit < 150_000
+        rows = sweep(
+            [Experiment(three_way(200, horizon=20), Dim(), seed) for seed in range(5)],
+            jobs=1, store=store,
+        )  # fmt: skip
+        assert rows["error"].isna().all()
+        assert len(store) == max(kept, 5)
+
+
+def test_four_way_and_label_are_other_experiments() -> None:
+    base = experiment()
+    others = [
+        replace(base, seed=2),
+        replace(base, label="x"),
+        replace(base, on_collision="record"),
+        replace(base, controller=Dim(gate="harmonious")),
+        replace(base, scenario=four_way(200, horizon=60)),
+        replace(base, scenario=three_way(200, horizon=60, profile="fair")),
+        replace(base, scenario=three_way(200, horizon=60, turns=(1, 2))),
+        replace(base, scenario=three_way(200, horizon=60, split=(2, 1, 1))),
+        replace(base, scenario=replace(base.scenario, recorded=base.scenario.arrivals(1))),
+        replace(base, scenario=replace(base.scenario, recorded=base.scenario.arrivals(2))),
+    ]
+    assert len({base.key, *(other.key for other in others)}) == len(others) + 1

@@ -1,0 +1,205 @@
+"""Sweeps whose processes die: workers, and the sweep itself, at any moment."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import BrokenExecutor
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from dim import Dim
+from minisim.errors import FileError
+from scenarios import three_way
+from scenarios.sweep import Experiment, sweep
+from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.file import read_experiments
+from scenarios.sweep.pool import pooled, processes
+from scenarios.sweep.store import Store
+from tests import ROOT
+from tests.builders import Deadly, killing
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
+
+EMPTY = three_way(0, horizon=1)
+
+
+def quick(count: int) -> list[Experiment]:
+    return [Experiment(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
+
+
+def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.drop(columns=list(MEASURED))
+
+
+def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
+    once = Experiment(EMPTY, Deadly(str(tmp_path / "killed")))
+    todo = [*quick(3), once, *quick(6)[3:]]
+    rows = sweep(todo, jobs=2)
+    assert (tmp_path / "killed").exists()
+    assert rows["error"].isna().all()
+    pd.testing.assert_frame_equal(repeatable(rows), repeatable(sweep(todo, jobs=1)))
+
+
+def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
+    todo = [*quick(6)[:2], Experiment(EMPTY, Deadly()), *quick(6)[2:]]
+    with Store(tmp_path / "s.db") as store:
+        rows = sweep(todo, jobs=2, store=store)
+        assert len(store) == 7
+    assert rows["error"].isna().tolist() == [True, True, False, True, True, True, True]
+    assert rows["error"][2].startswith("BrokenProcessPool: ")
+    assert rows["controller"][2] == "deadly"
+
+
+def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
+    """Whose process dies is tried alone; what dies every time is lost, and nothing else."""
+    once = {k: str(tmp_path / "killed") if k == 1 else "" for k in range(3)}
+    answers = dict(pooled(killing, once, 2, pool_of=processes))
+    assert answers == {0: 7, 1: 7, 2: 7}
+    assert (tmp_path / "killed").exists()
+    always = {0: "", 1: "always", 2: ""}
+    answers = dict(pooled(killing, always, 2, pool_of=processes))
+    assert (answers[0], answers[2]) == (7, 7)
+    assert isinstance(answers[1], BrokenExecutor)
+
+
+def test_giving_up_ends_what_runs() -> None:
+    results = pooled(time.sleep, {0: 0.0, **dict.fromkeys(range(1, 6), 600.0)}, 1,
+                     pool_of=processes)  # fmt: skip
+    assert next(results) == (0, None)
+    began = time.monotonic()
+    results.close()
+    assert time.monotonic() - began < 20.0
+
+
+PARENT = """
+import os, time
+from scenarios.sweep.pool import workers
+if __name__ == "__main__":
+    pool = workers(2)
+    held = [pool.submit(time.sleep, 0.5) for _ in range(2)]
+    print(*{pool.submit(os.getpid).result() for _ in range(8)}, flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads /proc")
+def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    parent = subprocess.Popen(
+        [sys.executable, script], env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert parent.stdout is not None
+    with parent.stdout:
+        pids = parent.stdout.readline().split()
+        assert pids
+        assert all(map(alive, pids))
+        parent.kill()
+        parent.wait(timeout=20)
+    deadline = time.monotonic() + 20
+    while any(map(alive, pids)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(alive, pids))
+
+
+def alive(pid: str) -> bool:
+    """Whether the process runs; one that only waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+SWEEP = """
+seeds = {seeds}
+scenario = ["three-way", "four-way"]
+density = [150, 300]
+controller = ["dim", "fixed-time"]
+horizon = {horizon}
+"""
+
+
+def stored(path: Path) -> int:
+    try:
+        with Store(path, create=False) as store:
+            return len(store)
+    except FileError:
+        assert not path.exists() or not path.stat().st_size, "never a broken store"
+        return 0
+
+
+def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, horizon: int) -> None:
+    """Kill a sweep at random moments: in the end its rows are those of an undisturbed one.
+
+    Every second kill comes up to 0.3 s after something was stored, when the sweep certainly is at
+    work, the others at any moment from the start of the process on.
+    """
+    chance = random.Random(4)
+    file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
+    file.write_text(SWEEP.format(seeds=seeds, horizon=horizon))
+    command = [
+        sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
+        "sweep", str(file), "--out", str(path), "--jobs", str(jobs),
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    total = 8 * seeds
+    counts = []
+    for kill in range(kills):
+        before = stored(path)
+        process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        if kill % 2:
+            deadline = time.monotonic() + 60
+            while stored(path) == before and process.poll() is None:
+                assert time.monotonic() < deadline
+                time.sleep(0.02)
+        time.sleep(chance.uniform(0.0, 0.3 if kill % 2 else 2.0))
+        process.send_signal(signal.SIGKILL)
+        process.wait(timeout=20)
+        counts.append(stored(path))
+    assert counts == sorted(counts), "nothing is ever lost"
+    assert any(0 < count < total for count in counts), "some kill was in the middle"
+    subprocess.run(command, env=environment, check=True, capture_output=True)
+    todo = read_experiments(file)
+    with Store(path, create=False) as store:
+        assert len(store) == len(todo) == total
+        kept = store.valid([experiment.key for experiment in todo])
+    rows = pd.DataFrame([kept[experiment.key] for experiment in todo])
+    pd.testing.assert_frame_equal(repeatable(rows), repeatable(sweep(todo, jobs=1)))
+
+
+def test_a_killed_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
+    killed_and_restarted(tmp_path, kills=3, jobs=1, seeds=10, horizon=150)
+
+
+@pytest.mark.slow
+def test_a_sweep_killed_twenty_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
+    killed_and_restarted(tmp_path, kills=20, jobs=2, seeds=60, horizon=600)
+
+
+def test_two_sweeps_may_share_a_store(tmp_path: Path) -> None:
+    file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
+    file.write_text(SWEEP.format(seeds=3, horizon=60))
+    command = [
+        sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
+        "sweep", str(file), "--out", str(path), "--jobs", "1",
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    both = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    said = [process.communicate(timeout=120)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert all(f"24 runs in {path}" in text for text in said)
+    with Store(path, create=False) as store:
+        assert len(store) == 24

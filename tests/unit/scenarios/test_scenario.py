@@ -1,0 +1,138 @@
+"""Scenarios and profiles: the paper's numbers, and eager checks."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+
+from minisim.arrivals import Arrivals, Demand
+from minisim.errors import InputError
+from minisim.junction.geometry import Intersection
+from minisim.vehicle import VehicleType
+from scenarios.scenario import (
+    FAIR,
+    PAPER,
+    PROFILES,
+    Profile,
+    Scenario,
+    parse_split,
+    profile_named,
+)
+
+FOUR = Intersection((0.0, 90.0, 180.0, 270.0))
+DEMAND = Demand(density=350.0)
+BASE: dict[str, object] = {"name": "x", "intersection": FOUR, "demand": DEMAND}
+
+
+def table(*rows: tuple[float, int, int]) -> Arrivals:
+    time, lane, manoeuvre = (np.array(column) for column in zip(*rows, strict=True))
+    return Arrivals(time, lane, manoeuvre)
+
+
+def test_paper_profile_is_what_the_text_prescribes() -> None:
+    """§III: 40 km/h, comfortable deceleration 2 m/s², cars of 4 m with 2 m of headway."""
+    assert PAPER.speed_limit == pytest.approx(11.111, abs=1e-3)
+    assert (PAPER.vehicle.length, PAPER.vehicle.min_gap) == (4.0, 2.0)
+    assert PAPER.vehicle.deceleration == 2.0
+
+
+def test_fair_profile_is_sumos_passenger_car_on_the_authors_roads() -> None:
+    assert FAIR.vehicle == VehicleType()
+    assert FAIR.speed_limit == 14.0
+
+
+def test_profiles_are_found_by_name() -> None:
+    assert set(PROFILES) >= {"paper", "fair"}
+    for name, profile in PROFILES.items():
+        assert profile.name == name
+        assert profile_named(name) is profile
+        assert profile_named(profile) is profile
+    with pytest.raises(InputError, match=r"unknown profile 'fare'.*did you mean 'fair'"):
+        profile_named("fare")
+
+
+def test_site_carries_everything_a_controller_may_know() -> None:
+    scenario = Scenario(
+        name="x", intersection=FOUR, demand=Demand(density=350, split=(4, 3, 2, 1)), profile=FAIR
+    )
+    site = scenario.site(seed=5)
+    assert site.intersection is FOUR
+    assert (site.vehicle, site.speed_limit, site.dt) == (FAIR.vehicle, 14.0, 0.1)
+    assert site.demand == pytest.approx((560.0, 420.0, 280.0, 140.0))
+    assert site.seed == 5
+    assert scenario.density == pytest.approx(350.0)
+
+
+def test_arrivals_come_from_the_demand_and_the_seed_alone() -> None:
+    one = Scenario(name="x", intersection=FOUR, demand=DEMAND, profile=PAPER)
+    other = Scenario(name="y", intersection=FOUR, demand=DEMAND, profile=FAIR)
+    np.testing.assert_array_equal(one.arrivals(3).time, other.arrivals(3).time)
+    assert one.arrivals(3).time.max() < 3600.0
+
+
+def test_recorded_arrivals_replace_the_demand() -> None:
+    recorded = table((0.0, 0, 1), (1.0, 0, 2), (2.0, 3, 3))
+    scenario = Scenario(
+        name="x", intersection=FOUR, demand=DEMAND, horizon=1800.0, recorded=recorded
+    )
+    assert scenario.arrivals(1) is recorded
+    assert scenario.rates == pytest.approx((4.0, 0.0, 0.0, 2.0))
+    assert scenario.density == pytest.approx(1.5)
+
+
+def test_scenarios_are_frozen_hashable_and_survive_pickling() -> None:
+    scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND)
+    again = pickle.loads(pickle.dumps(scenario))
+    assert again == scenario
+    assert hash(again) == hash(scenario)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scenario.horizon = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": 4}, "scenario name"),
+        ({"intersection": (0, 90, 180)}, "intersection must be"),
+        ({"demand": 350}, "demand must be a Demand"),
+        ({"profile": "paper"}, "profile must be a Profile"),
+        ({"horizon": 0}, "horizon .* above 0"),
+        ({"horizon": -1}, "horizon"),
+        ({"demand": Demand(density=350, split=(1, 1, 1))}, "split has 3 shares for 4 lanes"),
+        ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
+        ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
+        ({"demand": Demand(density=900, model="shifted", min_headway=4)}, "leave no room for"),
+        ({"recorded": "file.csv"}, "recorded must be an Arrivals"),
+        ({"recorded": table((0.0, 4, 1))}, "lane e is not in the geometry"),
+        ({"recorded": table((0.0, 0, 4))}, "manoeuvre 4 does not exist with 4 arms"),
+    ],
+)
+def test_scenarios_are_checked(change: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Scenario(**{**BASE, **change})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": None}, "profile name"),
+        ({"vehicle": "car"}, "vehicle must be a VehicleType"),
+        ({"speed_limit": 0}, "speed_limit"),
+        ({"depart_speed": 15}, "depart_speed .* at most 14"),
+        ({"dt": 0}, "dt"),
+    ],
+)
+def test_profiles_are_checked(change: dict[str, object], message: str) -> None:
+    options = {"name": "x", "vehicle": VehicleType(), "speed_limit": 14.0}
+    with pytest.raises(InputError, match=message):
+        Profile(**{**options, **change})  # type: ignore[arg-type]
+
+
+def test_a_split_is_read_from_text() -> None:
+    assert parse_split("4:3:2:1") == (4.0, 3.0, 2.0, 1.0)
+    for text in ("", "4,3", "4:x", "::", None, 5, b"1:2"):
+        with pytest.raises(InputError, match="written like 4:3:2:1"):
+            parse_split(text)  # type: ignore[arg-type]
