@@ -119,7 +119,7 @@ def _verdicts() -> dict[str, dict[str, int | None]]:
         path.name.removesuffix(".meta"): json.loads(path.read_text(encoding="utf-8"))[
             "exit_code_by_key"
         ]
-        for path in sorted(Path("mutants/dim").glob("*.py.meta"))
+        for path in sorted(Path("mutants/dim").rglob("*.py.meta"))
     }
 
 
