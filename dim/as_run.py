@@ -40,7 +40,7 @@ from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, number
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 
 #: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
 #: numbers are the authors' (`JUNC_BOUND` of their three drivers).

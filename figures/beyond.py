@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from figures import lines, style
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.studies.archive import (

@@ -13,7 +13,7 @@ from dim import HarmonyMatrix
 from figures import style
 from figures.beyond import crossing_rows, losses
 from figures.tables import Table
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.library import MAKERS
 from scenarios.studies.archive import Archive, missing_note, smoke_test
 from scenarios.studies.comparison import causes, compare, labels, score
@@ -75,7 +75,7 @@ def harmony_table(arms: int) -> Table:
     )
     return Table(
         f"Harmony matrix of the {arms}-way junction: 1 harmony, 0 conflict",
-        ("", *paper.labels), rows, notes=(said,),
+        ("", *paper.movements.names), rows, notes=(said,),
     )  # fmt: skip
 
 

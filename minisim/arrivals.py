@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, choice, instance, integer, number, numbers, show
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.streams import stream
 
 Floats = npt.NDArray[np.float64]

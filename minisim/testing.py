@@ -40,7 +40,8 @@ from minisim.errors import (
     number,
     numbers,
 )
-from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType

@@ -24,7 +24,8 @@ from figures.film.encode import animation_format, palette_of, write_gif, write_h
 from figures.film.frames import Film
 from figures.junction import drawing
 from minisim.errors import number
-from minisim.junction.geometry import Floats, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.paths import Floats
 from minisim.results.run import Run
 from minisim.results.trajectories import replacing
 

@@ -39,7 +39,7 @@ def harmony(
 ) -> None:  # fmt: skip
     """Print which movements can be driven at once: the harmony matrix."""
     from dim import HarmonyMatrix
-    from minisim.control import CLEARANCE
+    from minisim.junction.conflicts import CLEARANCE
 
     if csv and as_json:
         raise InputError("--csv and --json exclude each other; give one")
@@ -53,7 +53,7 @@ def harmony(
             "scenario": what.name,
             "side": side,
             "clearance_m": room,
-            "movements": list(matrix.labels),
+            "movements": list(matrix.movements.names),
             "harmony": matrix.values.astype(int).tolist(),
         })  # fmt: skip
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from minisim.errors import InputError, choice
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import (
     AsJson,

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.trips import METRICS
 from scenarios.statistics import FILLING, growing, mean_interval, prediction_interval
 

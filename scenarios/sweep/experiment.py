@@ -20,7 +20,7 @@ import numpy as np
 from minisim.control import Controller
 from minisim.errors import InputError, MinisimError, choice, instance, integer, show
 from minisim.hosting import ON_COLLISION
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.trips import Trips
 from minisim.version import __version__
 from scenarios.mixing import driver_means

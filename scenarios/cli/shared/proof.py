@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from dim.proofs.modelcheck import Exploration, Lasso
