@@ -49,7 +49,7 @@ def decide(
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, HarmonyMatrix, explain
-    from scenarios.cli.shared.files import check_file
+    from minisim.files import check_file
 
     if plot is not None:
         from figures.style import figure_format

@@ -83,7 +83,7 @@ def protocol(
     from dim import HarmonyMatrix
     from dim.proofs.modelcheck import explore, starvation
     from dim.proofs.protocol import Protocol
-    from scenarios.cli.shared.files import check_file
+    from minisim.files import check_file
 
     if counterexample is not None:
         choice("suffix of --counterexample:", counterexample.suffix.lower(), [".csv"])

@@ -42,7 +42,7 @@ def verify(
     """Try every case that a junction can decide: the paper's claims, one by one."""
     from dim import HarmonyMatrix
     from dim.proofs.verification import analyse, most_cliques
-    from scenarios.cli.shared.files import check_file
+    from minisim.files import check_file
 
     if plot is not None:
         from figures.style import figure_format
