@@ -52,9 +52,9 @@ def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval
 def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
     """Where one more independent value would lie, t·s·√(1 + 1/n) about the mean of n.
 
-    One published run is compared with this interval, not with that of the mean. For normally distributed
-    values it holds the next one with probability `confidence` (Hahn & Meeker 1991, Statistical
-    Intervals, §4.7).
+    One published run is compared with this interval, not with that of the mean. For normally
+    distributed values it holds the next one with probability `confidence` (Hahn & Meeker 1991,
+    Statistical Intervals, §4.7).
 
     Raises:
         InputError: as `mean_interval`.
