@@ -144,21 +144,6 @@ def test_too_many_states_are_refused() -> None:
         explore(Protocol(paper(4)), max_states=100)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"matrix": "paper"}, "matrix must be a HarmonyMatrix"),
-        ({"order": "sizes"}, "unknown order 'sizes'"),
-        ({"gate": "closed"}, "unknown gate 'closed'"),
-        ({"commit": "never"}, "unknown commit rule 'never'"),
-        ({"priorities": "inflow"}, "unknown priorities 'inflow'"),
-    ],
-)
-def test_rules_are_checked(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Protocol(**{"matrix": paper(4), **arguments})  # type: ignore[arg-type]
-
-
 # --- the agents ------------------------------------------------------------------------------
 
 
