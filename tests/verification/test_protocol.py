@@ -1,4 +1,4 @@
-"""All states of the protocol: safe, live, and which lanes starve. Agents decide as the model does."""
+"""All states of the protocol: safe, live, which lanes starve; agents decide as the model does."""
 
 from __future__ import annotations
 
