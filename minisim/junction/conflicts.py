@@ -41,18 +41,23 @@ AREA_STEP = 0.1
 
 
 def by_size(
-    function: Callable[Concatenate[Intersection, Size, _P], _R],
-) -> Callable[Concatenate[Intersection, VehicleType | Size, _P], _R]:
-    """Keep what a function returns for a junction and the size of a vehicle."""
-    kept: Any = lru_cache(maxsize=4096)(function)
+    kept: int,
+) -> Callable[
+    [Callable[Concatenate[Intersection, Size, _P], _R]],
+    Callable[Concatenate[Intersection, VehicleType | Size, _P], _R],
+]:
+    """Keep that many results of a function of a junction and the size of a vehicle."""
 
-    @wraps(function)
-    def look_up(
-        intersection: Intersection, vehicle: VehicleType | Size, /, *args: Any, **options: Any
-    ) -> Any:
-        return kept(intersection, Size(vehicle.length, vehicle.width), *args, **options)
+    def decorate(function: Any) -> Any:
+        known = lru_cache(maxsize=kept)(function)
 
-    return look_up
+        @wraps(function)
+        def look_up(intersection: Intersection, vehicle: VehicleType | Size, *more: Any) -> Any:
+            return known(intersection, Size(vehicle.length, vehicle.width), *more)
+
+        return look_up
+
+    return decorate
 
 
 class Areas(NamedTuple):
@@ -80,13 +85,13 @@ def bodies(path: Path, fronts: Floats, vehicle: VehicleType | Size) -> Shapes:
     return np.asarray(shapely.polygons(path.bodies(fronts, vehicle)))
 
 
-@by_size
+@by_size(256)
 def corridors(intersection: Intersection, vehicle: Size) -> Shapes:
     """The corridors of all movements, prepared for many tests, shape (m,)."""
     return _prepared([corridor(path, vehicle) for path in intersection.paths])
 
 
-@by_size
+@by_size(256)
 def separation(intersection: Intersection, vehicle: Size) -> Floats:
     """Distance [m] between the corridors of every two movements, shape (m, m).
 
@@ -107,7 +112,7 @@ def conflicts(
     return np.asarray(separation(intersection, vehicle) <= clearance)
 
 
-@by_size
+@by_size(256)
 def entry_room(intersection: Intersection, vehicle: Size) -> float:
     """Distance [m] between a vehicle held at any entry and the corridors of other arms.
 
@@ -121,7 +126,7 @@ def entry_room(intersection: Intersection, vehicle: Size) -> float:
     return float(distance[movements.origins[:, None] != np.arange(intersection.n)].min())
 
 
-@by_size
+@by_size(256)
 def conflict_zones(intersection: Intersection, vehicle: Size) -> Floats:
     """The conflict zones of all movements, shape (m, m, 2) [m].
 
@@ -147,7 +152,7 @@ def conflict_zones(intersection: Intersection, vehicle: Size) -> Floats:
     return _fixed(zones)
 
 
-@by_size
+@by_size(256)
 def clearing_distances(intersection: Intersection, vehicle: Size) -> Floats:
     """How far past the junction entry a vehicle's front is when it has left another's way.
 
@@ -172,7 +177,7 @@ def clearing_distances(intersection: Intersection, vehicle: Size) -> Floats:
     return _fixed(distances)
 
 
-@by_size
+@by_size(256)
 def conflict_areas(intersection: Intersection, vehicle: Size) -> Areas:
     """Where on its path a vehicle is in the way of another movement, inside the junction."""
     paths = intersection.paths

@@ -70,7 +70,7 @@ class Region(NamedTuple):
         return float(rows[-1] + 1) * STEP if len(rows) else 0.0
 
 
-@by_size
+@by_size(4096)
 def region(intersection: Intersection, vehicle: Size, first: int, second: int) -> Region | None:
     """The forbidden region of two movements by index; None where bodies never come near."""
     near, close = _grids(intersection, vehicle, min(first, second), max(first, second))
@@ -114,7 +114,7 @@ def _free(blocked: Bools, first: float, second: float) -> float:
     return max(int(row + ahead[0]) * STEP - first, 0.0)
 
 
-@by_size
+@by_size(4096)
 def _squeezes(
     intersection: Intersection, vehicle: Size, first: int, x: float, second: int, y: float
 ) -> bool:
@@ -126,7 +126,7 @@ def _squeezes(
     return bool((shapely.distance(moves, stands) > TIGHT).all())
 
 
-@by_size
+@by_size(4096)
 def _grids(
     intersection: Intersection, vehicle: Size, first: int, second: int
 ) -> tuple[Bools, Bools]:

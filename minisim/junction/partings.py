@@ -16,7 +16,7 @@ from minisim.junction.paths import Floats, Size
 BRANCH_ROOM = 0.5
 
 
-@by_size
+@by_size(256)
 def branch(intersection: Intersection, vehicle: Size) -> Floats:
     """Where movements from one arm part, shape (m, m) [m].
 

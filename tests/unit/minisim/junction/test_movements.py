@@ -1,4 +1,4 @@
-"""Movements and their indices, and that nobody counts them by hand."""
+"""Movements and their indices, and that no other room counts them by hand."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_the_tables_agree_with_each_other(n: int) -> None:
     assert (movements.apart == (movements.origins[:, None] != movements.origins)).all()
 
 
-def test_they_are_one_object_an_arm_count_and_nobody_can_change_them() -> None:
+def test_there_is_one_object_for_an_arm_count_and_it_is_read_only() -> None:
     assert pickle.loads(pickle.dumps(movements_of(4))) is movements_of(4)
     with pytest.raises(ValueError, match="read-only"):
         movements_of(4).index_of[0, 1] = 7
