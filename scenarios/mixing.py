@@ -1,31 +1,12 @@
-"""Human drivers among the vehicles of a run: who they are, and how they fare beside the others."""
+"""How human drivers fare beside the other vehicles of a run."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from dim import Dim, Mixed
-from minisim.control import Controller
-from minisim.errors import InputError, number
+from dim import Mixed
 from minisim.results.run import Run
 from minisim.results.trips import group_means
-
-
-def with_humans(controller: Controller, share: float) -> Controller:
-    """The controller with a share of human drivers, 0 … 1; with none it is the controller itself.
-
-    Raises:
-        InputError: a share out of range, or humans where the controller is not DIM.
-    """
-    share = number("share of humans", share, low=0, high=1)
-    if share == 0.0:
-        return controller
-    if not isinstance(controller, Dim):
-        raise InputError(
-            f"humans drive among vehicles of DIM (dim, dim-harmonious, …), not with "
-            f"{controller.name!r}"
-        )
-    return Mixed(controller, share)
 
 
 def driver_means(run: Run) -> dict[str, dict[str, Any]]:

@@ -170,12 +170,12 @@ def _cases(wanted: Wanted) -> list[Case]:
 
 def _check(cases: list[Case]) -> None:
     """Raise `InputError` for a cell that cannot run, before any does."""
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
     from scenarios.sweep.file import check_can_run
 
     with bar("checking"):
         check_can_run(
-            Experiment(case.scenario, case.decider(), label=case.controller) for case in cases
+            Recipe(case.scenario, case.decider(), label=case.controller) for case in cases
         )
 
 

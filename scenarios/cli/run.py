@@ -17,11 +17,9 @@ from scenarios.cli.shared.options import (
     Bearings,
     ControllerName,
     Density,
-    ErrorKind,
     Gui,
     Host,
     Humans,
-    IntentError,
     KeepFiles,
     ProfileName,
     ScenarioName,
@@ -52,7 +50,8 @@ HOSTS = ("minisim", "sumo")
     "minisim run five-way -c dim-harmonious -d 350 --profile fair --json\n\n"
     "minisim run four-way -c fixed-time -d 200 --split 4:3:2:1 --trips trips.csv\n\n"
     "minisim run four-way -c dim-harmonious -d 200 --profile fair --humans 0.3\n\n"
-    "minisim run four-way -d 250 --intent-error 0.15 --on-collision record\n\n"
+    "minisim run four-way -d 250 -c 'dim:perception=noisy(intent_error=0.15)' "
+    "--on-collision record\n\n"
     "minisim run custom --bearings 0,80,190,260 --side right -c dim --fcd fcd.xml\n\n"
     "minisim run four-way -c dim -d 200 --profile fair --host sumo\n\n"
     "[bold]Exit codes[/bold]\n\n"
@@ -63,8 +62,6 @@ def run(
     scenario: ScenarioName,
     controller: ControllerName = "dim",
     humans: Humans = 0.0,
-    intent_error: IntentError = 0.0,
-    error_kind: ErrorKind = None,
     density: Density = None,
     split: Split = None,
     turns: Turns = None,
@@ -110,13 +107,12 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
-    from dim import NoisyPerception
     from minisim.results.safety import safety_summary
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.cli.shared.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
-    from scenarios.misreading import counted, with_perception
-    from scenarios.mixing import driver_means, with_humans
+    from scenarios.mixing import driver_means
+    from scenarios.recipe import Recipe
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -128,28 +124,23 @@ def run(
     for xml in (fcd, sumo_fcd):
         if xml is not None:
             check_fcd(xml)
-    what = build_scenario(
+    junction = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    senses = NoisyPerception(intent_error, error_kind or "missed")
-    if error_kind is not None and senses.period is None:
-        raise InputError(f"--error-kind {error_kind} needs --intent-error P above 0")
-    dim = with_perception(controller_named(controller, profile), senses)
-    who = counted(with_humans(dim, humans))
+    recipe = Recipe(
+        junction, controller_named(controller, profile), seed, humans, on_collision=on_collision
+    )
     everything = fcd is not None or trajectories is not None
-    options = {
-        "record": "all" if everything else "junction" if safety else None,
-        "on_collision": on_collision,
-    }
+    record = "all" if everything else "junction" if safety else None
     sumo = {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
     files = [path for path in (trips, trajectories, fcd, sumo_fcd) if path is not None]
     try:
         if choice("host", host, HOSTS) == "sumo":
-            result = simulate_in_sumo(what, who, seed, **options, **sumo)
+            result = recipe.run(simulate_in_sumo, record=record, **sumo)
         else:
             _check_minisim_can(on_collision, **sumo)
-            result = simulate(what, who, seed, **options)
+            result = recipe.run(simulate, record=record)
     except CollisionError as error:
         error.add_note(_unwritten(files))
         raise

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
 #: Key of a file -> its value where it is left out, as `scenarios.sweep.file` has it.
@@ -136,7 +136,7 @@ def sweep(
         raise typer.Exit(1)
 
 
-def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Experiment]:
+def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
     """A study's, or those of a file; a word that is neither is taken for a study's name."""
     from scenarios.studies.study import STUDIES
     from scenarios.sweep.file import check_can_run, read_experiments
@@ -162,11 +162,12 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
 
 
 def _run(
-    experiments: list[Experiment], executor: Executor | None, jobs: int, store: Store, out: Path
+    experiments: list[Recipe], executor: Executor | None, jobs: int, store: Store, out: Path
 ) -> pd.DataFrame:
     """The rows in the order of the experiments, with a bar that tells of failures."""
     import pandas as pd
 
+    from scenarios.sweep.keys import key_of
     from scenarios.sweep.runner import finished
 
     rows: dict[int, dict[str, object]] = {}
@@ -179,7 +180,7 @@ def _run(
                 progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
                 progress(len(rows), len(experiments))
     except (KeyboardInterrupt, Terminated):
-        kept = len(store.valid(experiment.key for experiment in experiments))
+        kept = len(store.valid(map(key_of, experiments)))
         typer.echo(
             f"minisim: {kept} of {len(experiments)} runs are in {out}; the same command goes on "
             "from there",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,9 +12,8 @@ from dim.senses.intent import KINDS, RATES
 from dim.senses.noise import CLASSIFIER, UNSIGNALLED
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.misreading import counted, with_perception
+from scenarios.recipe import Recipe
 from scenarios.statistics import poisson_interval
-from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,12 +73,14 @@ class Misreading(NamedTuple):
         """What tells it from other cases of its series, but for the demand."""
         return f"{self.arms} arms, {self.perception.name}"
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions and wrong decisions are counted."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, profile="fair", horizon=horizon)
-        controller = with_perception(controller_named(self.series, "fair"), self.perception)
-        return Experiment(scenario, counted(controller), seed, on_collision="record")
+        controller = controller_named(self.series, "fair")
+        if self.perception.period is not None:
+            controller = replace(controller, perception=self.perception)  # type: ignore[type-var]
+        return Recipe(scenario, controller, seed, on_collision="record")
 
     def __str__(self) -> str:
         return f"{self.series}, {self.where}, {self.density:g} veh/h/lane"

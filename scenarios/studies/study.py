@@ -13,12 +13,11 @@ from minisim.control import Controller
 from minisim.errors import choice
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.mixing import with_humans
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
+from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario, parse_split
 from scenarios.studies.misreading import ERRORS, MISREADERS, THRESHOLD_CASES
-from scenarios.sweep.experiment import Experiment
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
 AS_RUN = "as-run"
@@ -49,15 +48,16 @@ class Case(NamedTuple):
     density: float
     humans: float = 0.0
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions are counted, for some published rules have them."""
         if self.profile == AS_RUN:
             scenario, controller = self._published(horizon)
         else:
             scenario = self._drawn(horizon)
             controller = controller_named(self.controller, self.profile)
-            controller = with_humans(controller, self.humans)
-        return Experiment(scenario, controller, seed, label=self.label, on_collision="record")
+        return Recipe(
+            scenario, controller, seed, self.humans, label=self.label, on_collision="record"
+        )
 
     @property
     def label(self) -> str:
@@ -104,7 +104,7 @@ class AnyCase(Protocol):
     def where(self) -> str:
         """What tells it from other cases of its series, but for the demand."""
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed."""
 
     def _asdict(self) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class Study:
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, cases: Iterable[AnyCase] | None = None
-    ) -> list[tuple[AnyCase, Experiment]]:
+    ) -> list[tuple[AnyCase, Recipe]]:
         """The seeds 1 … `seeds` of all cases or some, seed by seed within each case."""
         return [
             (case, case.experiment(seed, horizon))

@@ -42,11 +42,13 @@ from minisim.errors import (
     number,
     show,
 )
+from minisim.hosting import ON_COLLISION
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
-from scenarios.mixing import with_humans
+from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario, parse_split, profile_named
-from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.keys import key_of
+from scenarios.sweep.rows import identity_of
 
 #: More is surely a typing error.
 MAX_EXPERIMENTS = 1_000_000
@@ -80,7 +82,7 @@ JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_l
 
 def read_experiments(
     path: str | os.PathLike[str], *, seeds: int | None = None, horizon: float | None = None
-) -> list[Experiment]:
+) -> list[Recipe]:
     """The experiments of a file, each once; `seeds` and `horizon` replace what it says of them.
 
     Raises:
@@ -98,7 +100,7 @@ def read_experiments(
         _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
         if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
             raise InputError("experiments are written [[experiment]], with two brackets")
-    found: dict[str, Experiment] = {}
+    found: dict[str, Recipe] = {}
     for number_, block in enumerate(blocks, start=1):
         with _at(f"{place}: [[experiment]] {number_}" if len(blocks) > 1 else place):
             _check_keys("key", block, [*AXES, *SINGLE])
@@ -109,13 +111,13 @@ def read_experiments(
                 )
             merged = {**table, **block, **overrides}
             for experiment in _block(merged, Path(path).parent):
-                found.setdefault(experiment.key, experiment)
+                found.setdefault(key_of(experiment), experiment)
     with _at(place):
         _check_names(found.values())
     return list(found.values())
 
 
-def check_can_run(experiments: Iterable[Experiment]) -> None:
+def check_can_run(experiments: Iterable[Recipe]) -> None:
     """Start every controller at every site once, since most that cannot work says so there.
 
     Raises:
@@ -123,14 +125,14 @@ def check_can_run(experiments: Iterable[Experiment]) -> None:
     """
     tried: set[tuple[str, ...]] = set()
     for experiment in experiments:
-        what = experiment.identity()
+        what = identity_of(experiment)
         del what["seed"]
         cell = tuple(map(str, what.values()))
         if cell in tried:
             continue
         tried.add(cell)
         try:
-            experiment.controller.start(experiment.scenario.site(experiment.seed))
+            experiment.driven.start(experiment.scenario.site(experiment.seed))
         except MinisimError as error:
             raise InputError(
                 f"{experiment.name} cannot serve {what['scenario']} at {what['density']:g} "
@@ -149,7 +151,7 @@ def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise FileError(f"cannot read experiments from {os.fspath(path)}: {reason}") from error
 
 
-def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
+def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     """Every combination of a block."""
     if "arrivals" in block:
         clash = [key for key in DRAWN if key in block]
@@ -161,6 +163,7 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
     if count > MAX_EXPERIMENTS:
         raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
+    choice("on_collision", single["on_collision"], ON_COLLISION)
     seeds, controllers, shares = (axes.pop(key) for key in ("seeds", "controller", "humans"))
     for values in product(*axes.values()):
         chosen = dict(zip(axes, values, strict=True))
@@ -168,10 +171,8 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
         for given, share in product(controllers, shares):
             with _at("controller"):
                 controller, label = _controller(given, scenario.profile.name)
-            with _at("humans"):
-                controller = with_humans(controller, share)
             for seed in seeds:
-                yield Experiment(scenario, controller, seed, label, single["on_collision"])
+                yield Recipe(scenario, controller, seed, share, label, single["on_collision"])
 
 
 def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path) -> Scenario:
@@ -285,11 +286,11 @@ def _check_keys(what: str, table: Mapping[str, Any], known: Iterable[str]) -> No
         choice(what, key, allowed)
 
 
-def _check_names(experiments: Iterable[Experiment]) -> None:
+def _check_names(experiments: Iterable[Recipe]) -> None:
     """Rows of different experiments must be told apart by what they say of themselves."""
     seen: set[tuple[str, ...]] = set()
     for experiment in experiments:
-        what = experiment.identity()
+        what = identity_of(experiment)
         row = tuple(map(str, what.values()))
         if row in seen:
             raise InputError(

@@ -51,22 +51,6 @@ Humans = Annotated[
         "With the controllers of DIM.",
     ),
 ]
-IntentError = Annotated[
-    float,
-    typer.Option(
-        metavar="P",
-        help="Probability that vehicles of DIM misread another's intent, 0 … 1. Collisions are "
-        "then likely: see --on-collision.",
-    ),
-]
-ErrorKind = Annotated[
-    str | None,
-    typer.Option(
-        metavar="missed|symmetric",
-        help="What --intent-error does: miss the signal of a turn (default), or take any manoeuvre "
-        "for each other one alike. Everybody errs alike, for as long as they meet.",
-    ),
-]
 Density = Annotated[
     float | None,
     typer.Option(

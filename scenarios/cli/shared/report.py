@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from dim import Explanation, HarmonyMatrix
     from figures.gallery import Item
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
 
 #: Metric of a summary -> heading.
 HEADINGS = {
@@ -166,7 +166,7 @@ def _settled(cell: Mapping[Hashable, Any]) -> str:
     return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
 
 
-def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
+def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know of the table: growing queues, capped signals, the first failure."""
     text = Text()
     if "too_short" in cells and cells["too_short"].eq(True).any():
@@ -194,7 +194,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[E
     return text
 
 
-def _capped(experiments: Sequence[Experiment]) -> list[str]:
+def _capped(experiments: Sequence[Recipe]) -> list[str]:
     """A line for each signal whose demand is beyond Webster's formula."""
     from baselines import FixedTime
 

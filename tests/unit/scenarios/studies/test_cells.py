@@ -13,6 +13,7 @@ from dim import Dim
 from minisim.errors import InputError
 from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.controllers import controller_named
+from scenarios.recipe import Recipe
 from scenarios.statistics import (
     growing,
     mean_interval,
@@ -21,7 +22,8 @@ from scenarios.statistics import (
 )
 from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
+from scenarios.sweep.keys import RESULTS, canonical, key_of
+from scenarios.sweep.rows import outcome_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -129,16 +131,13 @@ def present(times: Floats, end: float) -> float:
     ],
 )
 def test_real_runs(scenario: Scenario, controller: str, expected: bool) -> None:
-    rows = [
-        run_experiment(Experiment(scenario, controller_named(controller), seed)).row
-        for seed in (1, 2)
-    ]
+    rows = [outcome_of(Recipe(scenario, controller_named(controller), seed)).row for seed in (1, 2)]
     (cell,) = cells(pd.DataFrame(rows)).to_dict("records")
     assert cell["growing"] is expected
 
 
 def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
-    row = run_experiment(Experiment(four_way(350, horizon=100), Dim(), 1)).row
+    row = outcome_of(Recipe(four_way(350, horizon=100), Dim(), 1)).row
     (cell,) = cells(pd.DataFrame([row])).to_dict("records")
     assert row["queue_growth"] > 0.0
     assert cell["too_short"]
@@ -151,7 +150,7 @@ def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
 @pytest.fixture(scope="module")
 def rows() -> pd.DataFrame:
     todo = [
-        Experiment(four_way(density, horizon=300), controller_named(name), seed)
+        Recipe(four_way(density, horizon=300), controller_named(name), seed)
         for density in (150, 300)
         for name in ("dim", "dim-harmonious", "unregulated")
         for seed in (1, 2, 3)
@@ -221,7 +220,7 @@ def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
 
 
 def test_equal_numbers_are_one_experiment() -> None:
-    assert Experiment(four_way(350), Dim()).key == Experiment(four_way(350.0), Dim()).key
+    assert key_of(Recipe(four_way(350), Dim())) == key_of(Recipe(four_way(350.0), Dim()))
     assert canonical(2**60 + 1) != canonical(2**60)
     assert canonical({"b": 1, "a": (2, None)}) == canonical({"a": [2.0, None], "b": 1.0})
     assert canonical(frozenset({2, 1})) == canonical(frozenset({1, 2}))
@@ -259,7 +258,7 @@ def test_whoever_changes_results_raises_their_version(
     The numbers are what these runs gave under `RESULTS` = 2, no more; put in what they give now.
     """
     recipe = controller_named(controller, scenario.profile)
-    row = run_experiment(Experiment(scenario, recipe, 1, on_collision="record")).row
+    row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
     columns = (
         "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
     )  # fmt: skip

@@ -13,11 +13,12 @@ from minisim.errors import FileError, InputError, MinisimError
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.cli import main, sweep
 from scenarios.cli.sweep import DEFAULTS
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
 from scenarios.sweep.file import AXES, CUSTOM, SINGLE, check_can_run, read_experiments
+from scenarios.sweep.rows import identity_of
 
 
-def read(tmp_path: Path, text: str) -> list[Experiment]:
+def read(tmp_path: Path, text: str) -> list[Recipe]:
     file = tmp_path / "e.toml"
     file.write_text(text)
     return read_experiments(file)
@@ -38,7 +39,7 @@ def test_the_help_has_the_values_of_what_is_left_out() -> None:
 
 def test_a_short_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
     found = read(tmp_path, "horizon = 3600")
-    assert found == [Experiment(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
+    assert found == [Recipe(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
 
 
 def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
@@ -48,7 +49,7 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
         'controller = ["dim", "fixed-time"]\nprofile = "fair"\nhorizon = 600\n',
     )
     assert found == [
-        Experiment(make(density, profile="fair", horizon=600.0), controller, seed)
+        Recipe(make(density, profile="fair", horizon=600.0), controller, seed)
         for make in (three_way, five_way)
         for density in (150.0, 350.0)
         for controller in (Dim(), FixedTime())
@@ -82,8 +83,8 @@ def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
     assert found.controller.priorities == "inflow"
     assert (found.controller.zones.red, found.controller.zones.yellow) == (20, 6)
     assert (found.name, found.seed, found.on_collision) == ("inflow", 5, "record")
-    assert found.identity()["split"] == "4:3:2:1"
-    assert found.identity()["turns"] == "1:2:1"
+    assert identity_of(found)["split"] == "4:3:2:1"
+    assert identity_of(found)["turns"] == "1:2:1"
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -95,11 +96,11 @@ def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
         "[[experiment]]\n",
     )
     assert found == [
-        Experiment(four_way(150.0), FixedTime(), 1),
-        Experiment(three_way(300.0), Dim(), 1),
-        Experiment(four_way(150.0), Dim(), 1),  # and not a second time by the last block
-        Experiment(four_way(150.0), Dim(), 2),
-        Experiment(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, "x"),
+        Recipe(four_way(150.0), FixedTime(), 1),
+        Recipe(three_way(300.0), Dim(), 1),
+        Recipe(four_way(150.0), Dim(), 1),  # and not a second time by the last block
+        Recipe(four_way(150.0), Dim(), 2),
+        Recipe(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, "x"),
     ]
 
 
@@ -110,7 +111,7 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     assert found.scenario.recorded is not None
     assert found.scenario.recorded.time.tolist() == arrivals.time.tolist()
     assert found.scenario.density == pytest.approx(len(arrivals) * 36 / 4)
-    assert found.identity()["split"] == "recorded"
+    assert identity_of(found)["split"] == "recorded"
 
 
 def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
