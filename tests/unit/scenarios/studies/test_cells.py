@@ -255,7 +255,7 @@ def test_whoever_changes_results_raises_their_version(
 ) -> None:
     """Stores keep rows by version: one that gives other rows needs another `RESULTS`.
 
-    The numbers are what these runs gave under `RESULTS` = 2, no more; put in what they give now.
+    The numbers are what these runs gave under `RESULTS` = 3, no more; put in what they give now.
     """
     recipe = controller_named(controller, scenario.profile)
     row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
@@ -263,5 +263,5 @@ def test_whoever_changes_results_raises_their_version(
         "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
     )  # fmt: skip
     found = [row[column] for column in columns]
-    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.experiment.RESULTS"
-    assert RESULTS == 2
+    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
+    assert RESULTS == 3

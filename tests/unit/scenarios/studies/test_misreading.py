@@ -130,32 +130,10 @@ RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", 
 
 
 def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
-    assert main([*RUN, "--intent-error", "0.25", "--error-kind", "symmetric"]) == 0
-    text = capsys.readouterr().out
-    assert "dim-symmetric-0.25" in text
-    assert "false grants" in text
+    assert main([*RUN, "-c", "dim-symmetric-0.15"]) == 0
+    assert "false grants" in capsys.readouterr().out
     assert main([*RUN, "--json", "-c", "dim-unsignalled"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["crossings"] >= found["trips"] - found["unfinished"]
     assert main(RUN) == 0
     assert "false grants" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--intent-error", "1.5"), "intent_error must be at least 0 and at most 1, got 1.5"),
-        (("--intent-error", "nan"), "intent_error must be"),
-        (("--error-kind", "mised"), "did you mean 'missed'"),
-        (("--error-kind", "symmetric"), "--error-kind symmetric needs --intent-error P above 0"),
-        (("-c", "dim-occlusion", "--intent-error", "0.1"), "has a perception of its own"),
-        (("--intent-error", "0.1", "-c", "fixed-time"), "not those of 'fixed-time'"),
-    ],
-)
-def test_bad_values_exit_2(capsys: Captured, options: tuple[str, ...], message: str) -> None:
-    assert main([*RUN, *options]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("minisim: ")
-    assert message in captured.err
-    assert captured.err.count("\n") == 1

@@ -102,7 +102,7 @@ def test_the_humans_study_tells_its_shares_apart() -> None:
     assert len(study.cases) == len(set(study.cases)) == 2 * (2 * 7 + 1)
     runs = study.runs(2)
     assert len({(e.name, e.scenario.density, e.seed) for _, e in runs}) == len(runs)
-    shares = {c.humans: c.experiment(1).controller for c in study.cases if c.series == "dim"}
+    shares = {c.humans: c.experiment(1).driven for c in study.cases if c.series == "dim"}
     assert shares[0.0] == Dim()
     assert shares[0.4] == Mixed(Dim(), 0.4)
     assert str(Case("fair", "dim", "dim", 4, "balanced", 150.0, 0.4)).startswith("dim, 40% humans,")

@@ -60,7 +60,7 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
 def test_shares_of_humans(tmp_path: Path) -> None:
     found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim-harmonious"\n')
     dim = Dim(gate="harmonious")
-    assert [e.controller for e in found] == [dim, Mixed(dim, 0.25)]
+    assert [e.driven for e in found] == [dim, Mixed(dim, 0.25)]
     assert [e.name for e in found] == ["dim-harmonious", "dim-harmonious-humans-0.25"]
 
 
@@ -100,7 +100,7 @@ def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
         Recipe(three_way(300.0), Dim(), 1),
         Recipe(four_way(150.0), Dim(), 1),  # and not a second time by the last block
         Recipe(four_way(150.0), Dim(), 2),
-        Recipe(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, "x"),
+        Recipe(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, label="x"),
     ]
 
 
@@ -158,9 +158,9 @@ WRONG = [
     ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 experiments are more than"),
     ("horizon = 0", r"horizon"),
     ("horizon = [1]", r"horizon"),
-    ('humans = 1.5', r"humans: share of humans must be at least 0 and at most 1, got 1.5"),
-    ('humans = "all"', r"humans: share of humans must be a number, got 'all'"),
-    ('humans = 0.1\ncontroller = "fixed-time"', r"humans: .*not with 'fixed-time'"),
+    ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
+    ('humans = "all"', r"share of humans must be a number, got 'all'"),
+    ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
