@@ -22,7 +22,7 @@ from minisim.errors import InputError
 from minisim.results.trips import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
-from scenarios.cli.shared.report import harmony_table
+from scenarios.cli.shared.proof import harmony_table
 from scenarios.cli.shared.terminal import show
 from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.demo import Tour
