@@ -24,6 +24,8 @@ Ints = npt.NDArray[np.int64]
 
 MODELS = ("poisson", "exponential", "shifted")
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
+#: Words for equal shares of the lanes and of the manoeuvres.
+BALANCED, UNIFORM = "balanced", "uniform"
 #: More than any lane can carry; beyond it a density is surely a typing error.
 MAX_DENSITY = 3600.0
 #: The longest duration and the latest demand time [s].
@@ -89,8 +91,8 @@ class Demand:
 
     Attributes:
         density: mean inflow a lane [veh/h]; with a split, the mean over all lanes.
-        split: shares of the lanes, such as (4, 3, 2, 1); None is balanced.
-        turns: shares of the manoeuvres 1 … n−1, the same on every lane; None is uniform.
+        split: shares of the lanes, such as (4, 3, 2, 1) or "4:3:2:1"; None is "balanced".
+        turns: shares of the manoeuvres 1 … n−1, the same on every lane; None is "uniform".
         model: of the arrivals: "poisson" counts in every second (the paper's), "exponential"
             headways, or headways "shifted" by `min_headway` (all with the same mean).
         min_headway: of the shifted model [s].
@@ -104,13 +106,8 @@ class Demand:
 
     def __post_init__(self) -> None:
         number("density [veh/h/lane]", self.density, low=0, high=MAX_DENSITY)
-        for name in ("split", "turns"):
-            value = getattr(self, name)
-            if value is not None:
-                shares = numbers(name, value)
-                if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
-                    raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
-                object.__setattr__(self, name, shares)
+        object.__setattr__(self, "split", read_shares("split", self.split, BALANCED))
+        object.__setattr__(self, "turns", read_shares("turns", self.turns, UNIFORM))
         choice("arrival model", self.model, MODELS)
         number("min_headway [s]", self.min_headway, low=0, high=60)
 
@@ -164,6 +161,34 @@ class Demand:
             last = float(times[-1][-1])
         drawn = np.concatenate(times)
         return drawn[drawn < duration]
+
+
+def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
+    """Shares given as numbers or as a text such as "4:3:2:1"; None where they are equal.
+
+    Args:
+        name: what messages call them.
+        value: the shares; None and the word `equal` stand for equal ones.
+        equal: that word.
+
+    Raises:
+        InputError: no finite numbers, a negative one, or only zeros.
+    """
+    if value is None:
+        return None
+    if isinstance(value, str):
+        if value == equal:
+            return None
+        try:
+            value = numbers(name, tuple(map(float, value.split(":"))))
+        except ValueError:
+            raise InputError(
+                f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
+            ) from None
+    shares = numbers(name, value)
+    if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
+        raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
+    return shares
 
 
 def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:

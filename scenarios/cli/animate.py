@@ -70,7 +70,7 @@ def animate(
     number("--seconds", seconds, above=0, high=3600)
     frame_times(start, seconds, fps, profile_named(profile).dt)
     junction = build_scenario(
-        scenario, bearings, arrivals, density, split, turns,
+        scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=start + seconds,
     )  # fmt: skip
     recipe = Recipe(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 DEFAULTS = {
     "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
     "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
-    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "on_collision": "stop",
+    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
 }  # fmt: skip
 #: A junction of one's own, as a file has it, and how the help shows brackets.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
@@ -44,7 +44,7 @@ PAPER = {"paper": "text"}
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
     "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
-    f"on_collision; what it leaves out is {LEFT_OUT}. A junction of one's own is written\n\n"
+    f"warmup, on_collision; what it leaves out is {LEFT_OUT}. Your own junction is written\n\n"
     f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "

@@ -16,7 +16,7 @@ from scenarios.library import MAKERS, regular
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
 from scenarios.recipe import Recipe
-from scenarios.scenario import Scenario, parse_split
+from scenarios.scenario import Scenario
 from scenarios.studies.misreading import ERRORS, MISREADERS, THRESHOLD_CASES
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
@@ -65,9 +65,8 @@ class Case(NamedTuple):
         return f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
 
     def _drawn(self, horizon: float) -> Scenario:
-        shares = None if self.split == "balanced" else parse_split(self.split)
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
-        return make(self.density, split=shares, profile=self.profile, horizon=horizon)
+        return make(self.density, split=self.split, profile=self.profile, horizon=horizon)
 
     def _published(self, horizon: float) -> tuple[Scenario, Controller]:
         """What ran, also where that is not what the label says."""

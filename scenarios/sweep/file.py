@@ -39,14 +39,13 @@ from minisim.errors import (
     choice,
     instance,
     integer,
-    number,
     show,
 )
 from minisim.hosting import ON_COLLISION
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
 from scenarios.recipe import Recipe
-from scenarios.scenario import Scenario, parse_split, profile_named
+from scenarios.scenario import Scenario, profile_named
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import identity_of
 
@@ -68,10 +67,15 @@ AXES: dict[str, Any] = {
     "seeds": 10,
 }
 #: What holds for a whole block.
-SINGLE: dict[str, Any] = {"horizon": 3600.0, "min_headway": 1.5, "on_collision": "stop"}
+SINGLE: dict[str, Any] = {
+    "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+}  # fmt: skip
 
 #: What recorded arrivals replace.
 DRAWN = ("density", "split", "turns", "model", "min_headway")
+
+#: Shares, written "4:3:2:1" or [4, 3, 2, 1]; of several, either way, every one is run.
+SHARES = ("split", "turns")
 
 #: A junction of one's own.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
@@ -192,9 +196,10 @@ def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path
         model=_text("model", chosen["model"]),
         min_headway=single["min_headway"],
         density=chosen["density"],
-        split=_shares("split", chosen["split"], "balanced"),
-        turns=_shares("turns", chosen["turns"], "uniform"),
-        horizon=number("horizon [s]", single["horizon"], above=0),
+        split=chosen["split"],
+        turns=chosen["turns"],
+        horizon=single["horizon"],
+        warmup=single["warmup"],
     )
     return replace(
         made, name=label or made.name, recorded=_recorded(chosen["arrivals"], folder, made)
@@ -251,10 +256,16 @@ def _table(given: object) -> dict[str, Any]:
 
 
 def _listed(key: str, value: object) -> list[Any]:
-    values = value if isinstance(value, list) else [value]
+    one = key in SHARES and isinstance(value, list) and not any(map(_is_many, value))
+    values = [value] if one or not isinstance(value, list) else value
     if not values:
         raise InputError(f"{key} is an empty list; leave it out, or list something")
     return values
+
+
+def _is_many(value: object) -> bool:
+    """Whether it is shares of its own, and no single one."""
+    return isinstance(value, (str, list))
 
 
 def _seeds(value: object) -> list[int]:
@@ -267,16 +278,9 @@ def _seeds(value: object) -> list[int]:
     return list(range(1, count + 1))
 
 
-def _shares(key: str, value: object, equal: str) -> Any:
-    """Shares are written "4:3:2:1"; equal ones have a name."""
-    with _at(key):
-        return None if value == equal else parse_split(_text(key, value, such_as="4:3:2:1"))
-
-
-def _text(key: str, value: object, such_as: str = "") -> str:
+def _text(key: str, value: object) -> str:
     if not isinstance(value, str):
-        example = f' such as "{such_as}"' if such_as else ""
-        raise InputError(f"{key} must be a text{example}, got {show(value)}")
+        raise InputError(f"{key} must be a text, got {show(value)}")
     return value
 
 

@@ -27,7 +27,7 @@ from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
-from scenarios.scenario import FAIR, Profile, Scenario, parse_split, profile_named
+from scenarios.scenario import FAIR, Profile, Scenario, profile_named
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)
 FOUR = Intersection(BEARINGS, arm_length=60.0)
@@ -92,7 +92,6 @@ CASES = {
         {"bearings": BEARINGS, "name": "x", **GEOMETRY, **TRAFFIC, **RUN},
     ),
     "profile_named": Case(profile_named, {"name": "fair"}),
-    "parse_split": Case(parse_split, {"text": "4:3:2:1"}),
     "HarmonyMatrix": Case(HarmonyMatrix, {"n": 3, "values": np.zeros((6, 6), dtype=int)}),
     "HarmonyMatrix.paper": Case(HarmonyMatrix.paper, {"n": 4}),
     "HarmonyMatrix.from_geometry": Case(

@@ -206,7 +206,7 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
         ({"split": (0, 0)}, "split must be shares"),
         ({"split": (1, -1)}, "split must be shares"),
         ({"split": (1e308, 1e308)}, "split must be shares"),
-        ({"turns": "ab"}, "turns must be a sequence"),
+        ({"turns": "ab"}, "turns is uniform or written like"),
         ({"model": "possion"}, "did you mean 'poisson'"),
         ({"min_headway": -1}, "min_headway"),
     ],

@@ -87,6 +87,19 @@ def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
     assert identity_of(found)["turns"] == "1:2:1"
 
 
+def test_shares_are_numbers_or_a_text(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, "seeds = [1]\nsplit = [4, 3, 2, 1]\nturns = [1, 2, 1]\n")
+    assert one.scenario == four_way(split="4:3:2:1", turns="1:2:1")
+    several = read(tmp_path, 'seeds = [1]\nsplit = [[4, 3, 2, 1], "balanced", "4:1:4:1"]\n')
+    splits = ("4:3:2:1", None, "4:1:4:1")
+    assert [e.scenario for e in several] == [four_way(split=split) for split in splits]
+
+
+def test_a_warmup_holds_for_the_block(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, "seeds = [1]\nwarmup = 600\n")
+    assert one.scenario == four_way(warmup=600.0)
+
+
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
     found = read(
         tmp_path,
@@ -131,7 +144,8 @@ WRONG = [
     ('scenario = {name = "custom", bearing = [0]}', r"key of a scenario 'bearing'.*'bearings'"),
     ('scenario = {bearings = [0]}', r"has no name"),
     ('scenario = "custom"', r"needs bearings, such as scenario = { name = \"custom\", bea"),
-    ("split = [4, 3, 2, 1]", r'split must be a text such as "4:3:2:1", got 4'),
+    ("split = [[4, 3], 2]", r"split has 2 shares for 4 lanes"),
+    ("warmup = 3600", r"warmup \[s\] must be .*below 3600"),
     ('scenario = {name = "four-way", label = 3}', r"label must be a str"),
     ("scenario = 4", r"scenario: must be a name"),
     ('controller = "dmi"', r"controller: unknown controller 'dmi'.*'dim'"),
@@ -142,7 +156,7 @@ WRONG = [
     ('controller = {name = "unregulated", x = 3}', r"parameter of unregulated 'x'"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"profile must be a text"),
-    ('split = "4-3"', r"split: a split is written like"),
+    ('split = "4-3"', r"split is balanced or written like"),
     ('split = "4:3"', r"split has 2 shares for 4 lanes"),
     ('turns = "1:2"', r"turns has 2 shares for 3 manoeuvres"),
     ('side = "middle"', r"'middle'"),
