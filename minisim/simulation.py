@@ -29,7 +29,6 @@ from minisim.engine.state import (
     OBSERVED,
     TRACE,
     Records,
-    build_engine,
     build_lanes,
     build_law,
     build_road,
@@ -100,8 +99,8 @@ class Simulation:
             record=record,
             record_window=checked_window(record_window),
         )
-        self._engine = build_engine(self.site)
         self._vehicles = build_vehicles(self.site, arrivals)
+        self._motion = kernel.build_motion(self.site, self._vehicles)
         self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
@@ -153,7 +152,7 @@ class Simulation:
                 self._lanes,
                 self._road,
                 self._law,
-                self._engine,
+                self._motion,
                 self._trace,
                 self._traced,
                 self._bodies,

@@ -34,8 +34,9 @@ from minisim.control import (
 )
 from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, TRACE, Records, first_tick
+from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
-from minisim.sumo.steering import Car, limits, steering_of
+from minisim.sumo.steering import Car, Follower, Steering, limits
 
 #: Lines of a recording that are kept as Python objects.
 TRACE_LINES = 100_000
@@ -55,7 +56,9 @@ class Worker:
     def __init__(self, job: Job, libsumo: Any, caller: Caller) -> None:
         self._job, self._libsumo, self._caller = job, libsumo, caller
         road, law = job.road, job.law
-        self._steering = steering_of(job, libsumo)
+        self._steering: Steering = (
+            Follower(job, libsumo) if job.motion is None else Cruiser(job, libsumo, job.motion)
+        )
         self._limits = limits(job)
         self._marks = road.marks.tolist()
         self._exit, self._end = road.ends[:, 0].tolist(), road.ends[:, 1].tolist()
@@ -181,7 +184,7 @@ class Worker:
         law = self._job.law
         car.present = True
         car.seen = self._tick
-        car.s = law.length + law.slack
+        car.s = law.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         self._lanes[car.lane].append(car)
         self._steering.depart(car)
@@ -246,7 +249,7 @@ class Worker:
     def _position(self, p: int, travelled: float) -> float:
         """`s` on path p of a vehicle that has driven so far since its insertion [m]."""
         law, network = self._job.law, self._job.network
-        inside = travelled + law.length + law.slack - network.approach[p]
+        inside = travelled + law.length + law.margin - network.approach[p]
         if inside <= 0.0:
             return float(law.entry + inside)
         if inside <= network.inside[p]:
