@@ -241,6 +241,11 @@ def first_tick(time: float, dt: float) -> int:
     return NEVER if time / dt >= NEVER else math.ceil(time / dt - 1e-6)
 
 
+def time_of(tick: int, dt: float) -> float:
+    """Simulated time at a tick [s], free of rounding."""
+    return round(tick * dt, 6)
+
+
 def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     """All vehicles of an arrival table, sorted by (lane, demand time), none on the road yet."""
     n = site.intersection.n

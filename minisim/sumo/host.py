@@ -20,7 +20,7 @@ from typing import IO, Any
 
 from minisim.control import Command, Controller, View
 from minisim.engine.kernel import build_motion
-from minisim.engine.state import build_law, build_road, build_vehicles, first_tick
+from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
 from minisim.errors import (
     FileError,
     InputError,
@@ -93,7 +93,7 @@ def simulate(
 
     Args:
         scenario: what to simulate.
-        controller: who decides; its session runs here, in the caller's process.
+        controller: what decides; its session runs here, in the caller's process.
         seed: of the arrivals and of SUMO.
         model: SUMO's car-following model: "IDM", "Krauss" (without its random part), or "CC" for
             a `CruiseVehicle`. By default SUMO's model of the vehicles' own law.
@@ -146,7 +146,7 @@ class _Request:
     until: float = math.inf
 
     def replay(self, time: float, seconds: float = 10.0) -> Run:
-        """Run again up to a little after `time`; records the last `seconds` before it."""
+        """Run again until shortly after `time`; record the last `seconds` before it."""
         again = replace(
             self, record="all", record_window=(max(0.0, time - seconds), math.inf),
             on_collision="record", keep_files=None, fcd=None, gui=False, progress=None,
@@ -280,7 +280,7 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
-    """SUMO's model for the vehicles; raises `InputError` where it does not fit them."""
+    """SUMO's model that is to drive the vehicles; raises `InputError` where it cannot."""
     own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
     fitting = [model for model in MODELS if model == own or model in stand_ins]
     model = own if asked is None else asked
@@ -316,7 +316,7 @@ def _session(request: _Request, beginning: Beginning, job: Job) -> Callable[[Ask
     def answer(asked: Asked) -> list[Command]:
         if request.progress is not None:
             request.progress(asked.tick, job.horizon)
-        view = View(round(asked.tick * dt, 6), asked.vehicles)
+        view = View(time_of(asked.tick, dt), asked.vehicles)
         return ask(
             beginning.session, view, asked.tick,
             controller=request.controller, site=beginning.site, vehicles=len(job.vehicles),
@@ -394,7 +394,7 @@ def _cause(code: int) -> str:
 
 
 def _last_words(complaints: IO[bytes]) -> str:
-    """The end of what it wrote, in one line."""
+    """The last lines that it wrote, as one line."""
     complaints.seek(0)
     lines = complaints.read().decode(errors="replace").split("\n")
     words = "; ".join(line.strip() for line in lines[-8:] if line.strip())
