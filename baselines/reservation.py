@@ -46,7 +46,7 @@ from minisim.control import (
 )
 from minisim.errors import InputError, instance, number
 from minisim.junction.zones import conflict_zones
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import CruiseVehicle
 
 #: Differences from the prediction that are none [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -143,9 +143,9 @@ class Manager:
 
     def __init__(self, site: Site, buffer: float) -> None:
         instance("site", site, Site)
-        if isinstance(site.vehicle, EngineVehicle):
+        if isinstance(site.vehicle, CruiseVehicle):
             raise InputError(
-                "reservation predicts vehicles that follow the IDM, not an EngineVehicle; "
+                "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
                 "use the profile paper or fair"
             )
         self.slots: dict[int, Slot] = {}

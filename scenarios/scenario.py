@@ -7,7 +7,7 @@ from minisim.control import Site
 from minisim.errors import InputError, choice, number
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 
 KMH = 1.0 / 3.6
 
@@ -50,7 +50,7 @@ FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 #: has none of: the strongest braking that the cruise control itself asks for.
 AS_RUN = Profile(
     name="as_run",
-    vehicle=EngineVehicle(
+    vehicle=CruiseVehicle(
         length=4.0,
         min_gap=2.0,
         acceleration=4.0,
