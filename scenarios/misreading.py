@@ -20,13 +20,13 @@ def with_perception(controller: Controller, perception: Perception) -> Controlle
         return controller
     if not isinstance(controller, Dim):
         raise InputError(
-            f"vehicles of DIM (dim, dim-harmonious, … in profiles other than as_run) can misread "
+            f"vehicles of DIM (dim with any parameters, in profiles other than as_run) can misread "
             f"each other, not those of {controller.name!r}"
         )
     if controller.perception.period is not None:
         raise InputError(
             f"{controller.name!r} has a perception of its own; misread intents go with those that "
-            "have none, such as dim or dim-monitored"
+            "have none, such as dim or dim:monitor=on"
         )
     return replace(controller, perception=perception)
 

@@ -22,7 +22,7 @@ def with_humans(controller: Controller, share: float) -> Controller:
         return controller
     if not isinstance(controller, Dim):
         raise InputError(
-            f"humans drive among vehicles of DIM (dim, dim-harmonious, …), not with "
+            f"humans drive among vehicles of DIM (dim with any parameters), not with "
             f"{controller.name!r}"
         )
     return Mixed(controller, share)

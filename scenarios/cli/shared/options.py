@@ -28,19 +28,9 @@ ScenarioName = Annotated[
 ControllerName = Annotated[
     str,
     typer.Option(
-        "--controller", "-c", metavar="NAME",
-        help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
-        "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
-        "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
-        "dim-paper-commit, dim-monitored (a safety monitor in every vehicle), "
-        "dim-symmetric-0.15 (15 % of intents misread), dim-unsignalled "
-        "(turns without signal at published rates), dim-occlusion (bodies block the view), "
-        "dim-as-run, "
-        "dim-as-run-size, dim-as-run-exit-14, fixed-time, "
-        "fixed-time-equal, adaptive, actuated, all-way-stop, longest-queue, "
-        "v2ic (serving list and speed advice; the published run's under the profile as_run), "
-        "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
-        "unregulated.",
+        "--controller", "-c", metavar="NAME[:KEY=VALUE,…]",
+        help="The controller, such as dim or dim:gate=harmonious; `minisim controllers` lists "
+        "them.",
     ),
 ]  # fmt: skip
 Humans = Annotated[

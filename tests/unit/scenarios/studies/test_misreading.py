@@ -118,7 +118,7 @@ def test_all_cases_meet_the_same_arrivals_and_count(name: str) -> None:
 
 def test_a_row_holds_what_was_counted() -> None:
     row, _ = run_experiment(Misreading("dim", "symmetric", 0.25).experiment(1, 300.0))
-    assert row["controller"] == "dim-symmetric-0.25"
+    assert row["controller"] == "dim:perception=noisy(intent_error=0.25,kind=symmetric)"
     assert row["crossings"] > 50
     assert row["false_grants"] > 0
     assert row["disagreement_s"] > 0.0
@@ -149,9 +149,9 @@ RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", 
 def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
     assert main([*RUN, "--intent-error", "0.25", "--error-kind", "symmetric"]) == 0
     text = capsys.readouterr().out
-    assert "dim-symmetric-0.25" in text
+    assert "dim:perception=noisy(intent_error=0.25,kind=symmetric)" in text
     assert "false grants" in text
-    assert main([*RUN, "--json", "-c", "dim-unsignalled"]) == 0
+    assert main([*RUN, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["crossings"] >= found["trips"] - found["unfinished"]
     assert main(RUN) == 0
@@ -165,7 +165,10 @@ def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
         (("--intent-error", "nan"), "intent_error must be"),
         (("--error-kind", "mised"), "did you mean 'missed'"),
         (("--error-kind", "symmetric"), "--error-kind symmetric needs --intent-error P above 0"),
-        (("-c", "dim-occlusion", "--intent-error", "0.1"), "has a perception of its own"),
+        (
+            ("-c", "dim:perception=noisy(occlusion=true)", "--intent-error", "0.1"),
+            "has a perception of its own",
+        ),
         (("--intent-error", "0.1", "-c", "fixed-time"), "not those of 'fixed-time'"),
     ],
 )
