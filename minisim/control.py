@@ -298,7 +298,10 @@ class Unregulated:
     For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """
 
-    name: str = "unregulated"
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        return "unregulated"
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""

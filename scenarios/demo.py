@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {
     "dim": "DIM, paper's gate",
-    "dim-harmonious": "DIM, harmonious gate",
+    "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
 #: Averaged over seeds: column of a sweep -> heading.

@@ -103,10 +103,10 @@ class Ran(NamedTuple):
 #: fixed-time signal's unbalanced runs was that of DIM: their driver switches its ACC on, the trips
 #: have a speed factor of 1.00 and the 0.16 s of waiting with which that vehicle starts.
 RAN: dict[tuple[str, str], Ran] = {
-    ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run-14"),
+    ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
     ("ats", "4:3:2:1"): Ran(controller="actuated"),
-    ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run-14"),
+    ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN),
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }

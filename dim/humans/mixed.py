@@ -131,11 +131,6 @@ class _Cautious:
     mixed: Mixed
 
     @property
-    def name(self) -> str:
-        """That of what they see at all."""
-        return self.perception.name
-
-    @property
     def period(self) -> float | None:
         """That of what they see at all; the humans ask for more views while they are there."""
         return self.perception.period

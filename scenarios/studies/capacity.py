@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from minisim.errors import InputError, integer, number
+from scenarios.controllers import RIVALS
 from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.studies.results import Find
-from scenarios.studies.study import RIVALS, Case
+from scenarios.studies.study import Case
 
 #: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
 TOLERANCE = 0.02

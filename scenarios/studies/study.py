@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 from minisim.control import Controller
 from minisim.errors import choice
-from scenarios.controllers import controller_named
+from scenarios.controllers import RIVALS, controller_named
 from scenarios.library import MAKERS, regular
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
@@ -139,7 +139,7 @@ class Study:
 
 #: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
 #: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
-_UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
+_UNBALANCED = {"dim": "dim:priorities=inflow", "fixed-time": "fixed-time:equal_greens=true"}
 
 
 def _as_text(cell: Cell) -> Case:
@@ -163,17 +163,11 @@ _FEW = {"v2ic": 3}
 #: more with a monitor.
 _FEW_MISREAD = dict.fromkeys(MISREADERS, 5)
 
-#: Everything that is compared on equal terms; the paper's four first.
-RIVALS = (
-    "dim", "dim-harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop", "reservation",
-    "longest-queue",
-)  # fmt: skip
-
 #: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].
 FAIR_DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
 
 #: Rules of priority that need no communication.
-PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
+PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 
 #: Shares of human drivers, from none to all.
@@ -184,7 +178,7 @@ HUMAN_DENSITIES = (150.0, 250.0)
 
 
 #: Who drives among humans, and what humans alone are compared with.
-HUMAN_GATES = ("dim", "dim-harmonious")
+HUMAN_GATES = ("dim", "dim:gate=harmonious")
 STOP = "all-way-stop"
 
 
@@ -217,7 +211,7 @@ STUDIES: MappingProxyType[str, Study] = MappingProxyType({
         Study("fair", "Which controller is best with one vehicle and speed limit for all?",
               _cases(RIVALS, (4,), FAIR_DENSITIES)),
         Study("gate", "What does entering beside crossing vehicles in harmony gain?",
-              _cases(("dim", "dim-harmonious"), (3, 4, 5), DENSITIES)),
+              _cases(("dim", "dim:gate=harmonious"), (3, 4, 5), DENSITIES)),
         Study("fairness", "Who waits under which rule of priority?",
               _cases(PRIORITIES, (4,), DENSITIES)),
         Study("humans", "What do human drivers cost, and whom?", _human_cases()),

@@ -25,7 +25,7 @@ def main() -> None:
     """Print both wall times and their ratio."""
     todo = [
         Recipe(four_way(350, profile="fair", horizon=HOURS * 3600.0), controller_named(name), seed)
-        for name in ("dim-harmonious", "fixed-time")
+        for name in ("dim:gate=harmonious", "fixed-time")
         for seed in range(RUNS // 2)
     ]
     print(f"{RUNS} runs of {HOURS} simulated hours; load before: {os.getloadavg()[0]:.1f}")

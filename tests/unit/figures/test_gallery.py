@@ -20,6 +20,7 @@ from figures.gallery import GALLERY, item_named, write
 from figures.paper_tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
+from scenarios.controllers import RIVALS
 from scenarios.paper import SERIES, Cell, reference_value
 from scenarios.recipe import Recipe
 from scenarios.studies.archive import Archive, MissingRunsError, missing_note
@@ -27,7 +28,7 @@ from scenarios.studies.capacity import Search
 from scenarios.studies.cells import saturated
 from scenarios.studies.reproduction import CAPACITY, PARTS, Made
 from scenarios.studies.results import Effort
-from scenarios.studies.study import RIVALS, STUDIES
+from scenarios.studies.study import STUDIES
 from scenarios.sweep.keys import key_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
@@ -210,7 +211,11 @@ def test_growing_queues_get_an_arrow(archive: Archive) -> None:
 
 
 def test_series_are_told_apart_without_colour() -> None:
-    together = [RIVALS, ("dim", "dim-rotating", "dim-waiting"), ("dim-3", "dim-4", "dim-5")]
+    together = [
+        RIVALS,
+        ("dim", "dim:priorities=rotating", "dim:priorities=waiting"),
+        ("dim-3", "dim-4", "dim-5"),
+    ]
     for group in together:
         looks = [style.look(name) for name in group]
         assert len({look.marker for look in looks}) == len(looks)

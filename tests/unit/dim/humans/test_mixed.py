@@ -143,7 +143,7 @@ def test_what_the_host_has_to_provide() -> None:
     assert hasty.sight == alone.sight
     noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
     assert Mixed(noisy).start(SITE).plan.period == 0.2
-    assert Mixed(noisy).name == "dim-missed-0.15-humans-0.2"
+    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15)-humans-0.2"
 
 
 def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:
@@ -311,7 +311,7 @@ def test_the_groups_of_a_run_make_up_the_whole() -> None:
 
 def test_a_mixed_controller_is_a_value() -> None:
     mixed = Mixed(Dim(gate="harmonious"), 0.25)
-    assert mixed.name == "dim-harmonious-humans-0.25"
+    assert mixed.name == "dim:gate=harmonious-humans-0.25"
     assert pickle.loads(pickle.dumps(mixed)) == mixed
     assert hash(mixed) == hash(Mixed(Dim(gate="harmonious"), 0.25))
 

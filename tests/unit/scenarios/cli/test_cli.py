@@ -323,7 +323,7 @@ def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
     points = pd.read_csv(folder / "demo.csv")
-    assert sorted(points["controller"].unique()) == ["dim", "dim-harmonious", "fixed-time"]
+    assert sorted(points["controller"].unique()) == ["dim", "dim:gate=harmonious", "fixed-time"]
     assert set(points["density"]) == {150.0, 350.0}
     assert (points["waiting_time_s_ci95"] > 0).all()
     assert (points["collisions"] == 0).all()
@@ -579,7 +579,7 @@ def test_protocol_writes_a_counterexample_that_collides(
     assert "safe         no: arrive b1, look, roll b1, arrive a2, look," in text
     assert f"wrote {file}" in text
     run = ("run", "three-way", "--arrivals", str(file), "-c")
-    assert "touched" in fails(capsys, *run, "dim-paper-commit", "--horizon", "120", code=1)
+    assert "touched" in fails(capsys, *run, "dim:commit=paper", "--horizon", "120", code=1)
     assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
 
 

@@ -124,7 +124,7 @@ def present(times: Floats, end: float) -> float:
     ("scenario", "controller", "expected"),
     [
         (five_way(350), "dim", True),  # the paper's own: lane e keeps queueing
-        (five_way(350, profile="fair"), "dim-harmonious", False),
+        (five_way(350, profile="fair"), "dim:gate=harmonious", False),
         (four_way(150), "dim", False),
         (four_way(350), "fixed-time", False),  # x = 0.96, with swings of 25 vehicles a cycle
         (four_way(500), "fixed-time", True),
@@ -152,7 +152,7 @@ def rows() -> pd.DataFrame:
     todo = [
         Recipe(four_way(density, horizon=300), controller_named(name), seed)
         for density in (150, 300)
-        for name in ("dim", "dim-harmonious", "unregulated")
+        for name in ("dim", "dim:gate=harmonious", "unregulated")
         for seed in (1, 2, 3)
     ]
     return sweep(todo, jobs=1)
@@ -161,7 +161,7 @@ def rows() -> pd.DataFrame:
 def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     found = cells(rows)
     assert list(zip(found["density"], found["controller"], strict=True))[:2] == [
-        (150, "dim"), (150, "dim-harmonious"),
+        (150, "dim"), (150, "dim:gate=harmonious"),
     ]  # fmt: skip
     first = found.iloc[0]
     group = rows[:3]
@@ -184,13 +184,13 @@ def test_a_cell_of_failures_has_no_means(rows: pd.DataFrame) -> None:
 
 
 def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
-    found = differences(rows, "complete_waiting_time_s", "dim", "dim-harmonious")
+    found = differences(rows, "complete_waiting_time_s", "dim", "dim:gate=harmonious")
     assert found["density"].tolist() == [150, 300]
     assert found["pairs"].tolist() == [3, 3]
     values = rows[rows["density"] == 300].set_index(["controller", "seed"])[
         "complete_waiting_time_s"
     ]
-    expected = (values["dim"] - values["dim-harmonious"]).mean()
+    expected = (values["dim"] - values["dim:gate=harmonious"]).mean()
     assert found["difference"][1] == pytest.approx(expected)
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
 
@@ -209,11 +209,11 @@ def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
     with pytest.raises(InputError, match="did not meet the same arrivals"):
-        differences(other, "waiting_time_s", "dim", "dim-harmonious")
+        differences(other, "waiting_time_s", "dim", "dim:gate=harmonious")
     with pytest.raises(InputError, match="unknown controller of these rows 'dmi'"):
         differences(rows, "waiting_time_s", "dmi", "dim")
     with pytest.raises(InputError, match="unknown metric 'wait'"):
-        differences(rows, "wait", "dim", "dim-harmonious")
+        differences(rows, "wait", "dim", "dim:gate=harmonious")
 
 
 # --- experiments -----------------------------------------------------------------------------
@@ -239,7 +239,7 @@ def test_what_has_no_canonical_form(odd: object) -> None:
         (four_way(300, horizon=900), "dim", (273, 30, 2.33, 95.61, 8.65)),
         (
             three_way(350, horizon=900, profile="fair"),
-            "dim-harmonious",
+            "dim:gate=harmonious",
             (253, 15, 0.99, 77.94, 7.12),
         ),
         (

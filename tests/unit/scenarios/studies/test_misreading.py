@@ -101,7 +101,7 @@ def test_all_cases_meet_the_same_arrivals_and_count(name: str) -> None:
 
 def test_a_row_holds_what_was_counted() -> None:
     row, _ = outcome_of(Misreading("dim", "symmetric", 0.25).experiment(1, 300.0))
-    assert row["controller"] == "dim-symmetric-0.25"
+    assert row["controller"] == "dim:perception=noisy(intent_error=0.25,kind=symmetric)"
     assert row["crossings"] > 50
     assert row["false_grants"] > 0
     assert row["disagreement_s"] > 0.0
@@ -130,9 +130,9 @@ RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", 
 
 
 def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
-    assert main([*RUN, "-c", "dim-symmetric-0.15"]) == 0
+    assert main([*RUN, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)"]) == 0
     assert "false grants" in capsys.readouterr().out
-    assert main([*RUN, "--json", "-c", "dim-unsignalled"]) == 0
+    assert main([*RUN, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["crossings"] >= found["trips"] - found["unfinished"]
     assert main(RUN) == 0

@@ -19,6 +19,7 @@ from figures.gallery import GALLERY
 from figures.tables import Table
 from minisim.errors import InputError
 from scenarios import four_way
+from scenarios.controllers import RIVALS
 from scenarios.recipe import Recipe
 from scenarios.statistics import GROWTH_SCORE
 from scenarios.studies.archive import Archive
@@ -41,7 +42,7 @@ from scenarios.studies.crossing import (
 )
 from scenarios.studies.fairness import gini, lane_waits
 from scenarios.studies.results import Effort, collect
-from scenarios.studies.study import RIVALS, STUDIES, Case, study_named
+from scenarios.studies.study import STUDIES, Case, study_named
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import outcome_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
@@ -64,7 +65,7 @@ def test_the_paper_s_grid_is_700_hours(name: str) -> None:
 
 def test_priorities_by_inflow_where_the_text_has_them() -> None:
     """The highest is that "with the maximum incoming traffic": a and c, then b and d."""
-    wanted = Case("paper", "dim", "dim-inflow", 4, "4:1:4:1", 200.0)
+    wanted = Case("paper", "dim", "dim:priorities=inflow", 4, "4:1:4:1", 200.0)
     assert wanted in STUDIES["text"].cases
     experiment = wanted.experiment(1)
     assert isinstance(experiment.controller, Dim)
@@ -120,12 +121,12 @@ def test_results_say_what_is_missing() -> None:
     def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         rows: list[Mapping[str, Any] | None] = [dict(row) for row in map(synthetic_row, asked)]
         for k, experiment in enumerate(asked):
-            if experiment.label == "dim-harmonious":
+            if experiment.label == "dim:gate=harmonious":
                 rows[k] = None if experiment.seed == 1 else {**rows[k], "error": "broken"}  # type: ignore[dict-item]
         return rows
 
     results = collect(study, effort, find)
-    assert {case.series for case in results.missing} == {"dim-harmonious"}
+    assert {case.series for case in results.missing} == {"dim:gate=harmonious"}
     assert len(results.missing) == len(study.cases) // 2 == len(results.failed)
     assert len(results.good) == len(study.cases)
     nothing = collect(study, effort, lambda asked: [None] * len(asked))

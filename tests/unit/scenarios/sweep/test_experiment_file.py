@@ -58,10 +58,10 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
 
 
 def test_shares_of_humans(tmp_path: Path) -> None:
-    found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim-harmonious"\n')
+    found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim:gate=harmonious"\n')
     dim = Dim(gate="harmonious")
     assert [e.driven for e in found] == [dim, Mixed(dim, 0.25)]
-    assert [e.name for e in found] == ["dim-harmonious", "dim-harmonious-humans-0.25"]
+    assert [e.name for e in found] == ["dim:gate=harmonious", "dim:gate=harmonious-humans-0.25"]
 
 
 def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
