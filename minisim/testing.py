@@ -69,6 +69,7 @@ class SmallScenario:
         density: mean inflow a lane while demand lasts [veh/h].
         demand_time: vehicles come until then [s].
         drain: how much longer the run goes on [s].
+        warmup: trips demanded before it do not count [s].
         vehicle: type of the vehicles.
         speed_limit: [m/s].
         arm_length: [m].
@@ -80,6 +81,7 @@ class SmallScenario:
     density: float = 350.0
     demand_time: float = 300.0
     drain: float = 0.0
+    warmup: float = 0.0
     vehicle: VehicleType = field(default_factory=VehicleType)
     speed_limit: float = 14.0
     arm_length: float = 500.0
@@ -92,6 +94,7 @@ class SmallScenario:
         object.__setattr__(self, "bearings", numbers("bearings", self.bearings))
         number("drain [s]", self.drain, low=0, high=1e6)
         number("demand_time [s]", self.demand_time, above=0, high=1e6)
+        number("warmup [s]", self.warmup, low=0, below=self.horizon)
         self.site(0)
 
     @property

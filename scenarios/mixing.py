@@ -1,14 +1,10 @@
-"""Human drivers among the vehicles of a run: who they are, and how they fare beside the others."""
+"""Human drivers among the vehicles of a run."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from dim import Dim, Mixed
 from minisim.control import Controller
 from minisim.errors import InputError, number
-from minisim.results.run import Run
-from minisim.results.trips import group_means
 
 
 def with_humans(controller: Controller, share: float) -> Controller:
@@ -26,17 +22,3 @@ def with_humans(controller: Controller, share: float) -> Controller:
             f"{controller.name!r}"
         )
     return Mixed(controller, share)
-
-
-def driver_means(run: Run) -> dict[str, dict[str, Any]]:
-    """Means of human drivers (`human`) and of the others (`automated`) in one run.
-
-    Empty without humans. Keys of each group as in `minisim.results.trips.group_means`.
-    """
-    if not isinstance(run.controller, Mixed):
-        return {}
-    human = run.controller.human(run.seed, len(run.columns.lane))
-    return {
-        "human": group_means(run.columns, human),
-        "automated": group_means(run.columns, ~human),
-    }

@@ -111,6 +111,7 @@ class Scenario:
         demand: what to draw arrivals from.
         profile: vehicle, speeds and step.
         horizon: simulated time [s]; arrivals come until then.
+        warmup: trips demanded before it do not count in any mean or number of trips [s].
         recorded: an arrival table to replay instead of drawing one.
     """
 
@@ -119,6 +120,7 @@ class Scenario:
     demand: Demand
     profile: Profile = PAPER
     horizon: float = 3600.0
+    warmup: float = 0.0
     recorded: Arrivals | None = None
 
     def __post_init__(self) -> None:
@@ -127,6 +129,7 @@ class Scenario:
         instance("demand", self.demand, Demand)
         instance("profile", self.profile, Profile)
         number("horizon [s]", self.horizon, above=0, high=1e7)
+        number("warmup [s]", self.warmup, low=0, below=self.horizon)
         n = self.intersection.n
         self.demand.rates(n)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:

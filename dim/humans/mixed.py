@@ -89,7 +89,7 @@ class MixedSession:
     """One run: a session of DIM for some vehicles, and the humans."""
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
-        drivers = Drivers(mixed.humans, mixed.share, site.seed)
+        drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
         cautious = _Cautious(mixed.dim.perception, mixed)
         self._dim = DimSession(
             replace(mixed.dim, perception=cautious), site, lambda id: not drivers[id].human
@@ -101,6 +101,10 @@ class MixedSession:
             marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another comes first
             sight=max(plan.sight, self._humans.sight),
         )
+
+    def kind(self, vehicle: int) -> str:
+        """ "human" or "automated"."""
+        return "human" if self._drivers[vehicle].human else "automated"
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let everybody decide, from the same view."""

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from minisim.control import Site
 from minisim.errors import FileError, InputError, MissingExtraError, choice, instance
 from minisim.junction.geometry import ARM_NAMES, Floats, Movement
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,7 +22,7 @@ __all__ = ["COMMANDS", "app", "main"]
 #: In the order of the help; the module of that name beside this one adds the command to the app.
 COMMANDS = (
     "demo", "run", "sweep", "figures", "reproduce", "crossval", "harmony", "decide", "animate",
-    "verify", "protocol",
+    "verify", "protocol", "metrics",
 )  # fmt: skip
 
 for _command in COMMANDS:

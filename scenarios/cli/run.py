@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import numpy as np
 import typer
 
 from minisim.errors import CollisionError, InputError, choice
@@ -15,6 +14,7 @@ from scenarios.cli.shared.options import (
     Arrivals,
     AsJson,
     Bearings,
+    By,
     ControllerName,
     Density,
     ErrorKind,
@@ -23,6 +23,7 @@ from scenarios.cli.shared.options import (
     Humans,
     IntentError,
     KeepFiles,
+    Metrics,
     ProfileName,
     ScenarioName,
     Seed,
@@ -32,14 +33,10 @@ from scenarios.cli.shared.options import (
     SumoModel,
     Turns,
     build_scenario,
+    chosen_metrics,
 )
 from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
 from scenarios.cli.shared.terminal import bar, show, show_json
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from minisim.results.run import Run
 
 HOSTS = ("minisim", "sumo")
 
@@ -107,16 +104,19 @@ def run(
     gui: Gui = False,
     keep_files: KeepFiles = None,
     sumo_fcd: SumoFcd = None,
+    metrics: Metrics = None,
+    by: By = "lane",
     as_json: AsJson = False,
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from dim import NoisyPerception
-    from minisim.results.safety import safety_summary
+    from minisim.results.metrics import SAFETY, Metric, recording
+    from minisim.results.summary import GROUPS
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.cli.shared.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
     from scenarios.misreading import counted, with_perception
-    from scenarios.mixing import driver_means, with_humans
+    from scenarios.mixing import with_humans
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -128,6 +128,8 @@ def run(
     for xml in (fcd, sumo_fcd):
         if xml is not None:
             check_fcd(xml)
+    asked, by = chosen_metrics(metrics), choice("--by", by, GROUPS)
+    measured: tuple[str | Metric, ...] = (*asked, *(SAFETY if safety else ()))
     what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,
@@ -139,7 +141,7 @@ def run(
     who = counted(with_humans(dim, humans))
     everything = fcd is not None or trajectories is not None
     options = {
-        "record": "all" if everything else "junction" if safety else None,
+        "record": "all" if everything else recording(measured),
         "on_collision": on_collision,
     }
     sumo = {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
@@ -153,11 +155,8 @@ def run(
     except CollisionError as error:
         error.add_note(_unwritten(files))
         raise
-    summary = result.summary()
-    if drivers := driver_means(result):
-        summary["drivers"] = drivers
     with bar("measuring"):
-        summary["safety"] = safety_summary(_near_junction(result), result.site) if safety else None
+        summary = result.summary(measured, [by])
         if trips is not None:
             write_trips(result.trips, trips)
         if trajectories is not None:
@@ -167,9 +166,18 @@ def run(
     if as_json:
         show_json(summary)
         return
-    from scenarios.cli.shared.report import run_table, run_title, safety_line, tally_line
+    from scenarios.cli.shared.report import (
+        number_lines,
+        run_table,
+        run_title,
+        safety_line,
+        tally_line,
+    )
 
-    show(run_title(summary), run_table(summary), safety_line(summary), *tally_line(result.counts))
+    show(
+        run_title(summary), run_table(summary, asked, by), safety_line(summary),
+        *tally_line(result.counts), *number_lines(summary, asked),
+    )  # fmt: skip
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
     for path in files:
@@ -195,20 +203,3 @@ def _unwritten(files: Sequence[Path]) -> str:
     """What is not there after a collision has stopped the run, and how to get it."""
     wrote = f"{', '.join(map(str, files))} not written; " if files else ""
     return f"{wrote}--on-collision record notes collisions and goes on"
-
-
-def _near_junction(run: Run) -> pd.DataFrame:
-    """The trajectories as far as `record="junction"` keeps them.
-
-    A recording of everything then gives the same safety numbers.
-    """
-    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
-    from minisim.results.trajectories import S, movement_index
-
-    frame, paths = run.trajectories, run.site.intersection.paths
-    if run.record == "junction":
-        return frame
-    last = np.array([path.exit + RECORD_PAST for path in paths])
-    s = frame[S].to_numpy()
-    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, run.site)])
-    return frame[near]

@@ -109,7 +109,7 @@ def sweep(
     from minisim.results.trajectories import write_table
     from scenarios.cli.shared.files import check_apart, check_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
-    from scenarios.studies.cells import cells
+    from scenarios.sweep.cells import cells
     from scenarios.sweep.store import Store
 
     if seeds is not None:

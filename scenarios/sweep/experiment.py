@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from numbers import Integral, Real
-from typing import Any, NamedTuple
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,15 +22,18 @@ from minisim.control import Controller
 from minisim.errors import InputError, MinisimError, choice, instance, integer, show
 from minisim.hosting import ON_COLLISION
 from minisim.junction.geometry import ARM_NAMES
+from minisim.results.metrics import Metric, named_metrics, recording
 from minisim.results.trips import Trips
 from minisim.version import __version__
-from scenarios.mixing import driver_means
 from scenarios.scenario import Scenario
-from scenarios.statistics import growing, queue_growth
+from scenarios.statistics import growing
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Raised by one whenever the same experiment gives another row than before, while the version of
 #: the package stays: rows of older results are then computed again.
-RESULTS = 2
+RESULTS = 3
 
 #: Columns that a repetition of the same run measures anew.
 MEASURED = ("cpu_s",)
@@ -60,6 +64,7 @@ class Experiment:
         scenario, controller, seed: of the run.
         label: what rows call the controller; empty is its own name.
         on_collision: "stop" makes a run that collides a failed one, "record" counts and goes on.
+        metrics: what its row has besides the usual (`minisim.results.metrics`).
     """
 
     scenario: Scenario
@@ -67,6 +72,7 @@ class Experiment:
     seed: int = 0
     label: str = ""
     on_collision: str = "stop"
+    metrics: tuple[str | Metric, ...] = ()
 
     def __post_init__(self) -> None:
         instance("scenario", self.scenario, Scenario)
@@ -77,6 +83,7 @@ class Experiment:
         integer("seed", self.seed, low=0)
         instance("label", self.label, str)
         choice("on_collision", self.on_collision, ON_COLLISION)
+        object.__setattr__(self, "metrics", named_metrics(self.metrics))
 
     @property
     def name(self) -> str:
@@ -113,6 +120,7 @@ class Experiment:
             "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
             "seed": self.seed,
             "horizon_s": scenario.horizon,
+            "warmup_s": scenario.warmup,
         }
 
 
@@ -124,9 +132,9 @@ def key_of(description: str) -> str:
 def canonical(value: object) -> Any:
     """The parameters of a recipe as JSON values, alike for equal recipes.
 
-    Dataclasses become their class and fields, those of others also what tells versions of their
-    code apart (`_code`), numbers floats (350 and 350.0 are the same density),
-    arrays their type, shape and SHA-256.
+    Dataclasses become their class and fields, functions their name and what they enclose, and both
+    what tells versions of their code apart (`_code`). Numbers become floats (350 and 350.0 are the
+    same density), arrays their type, shape and SHA-256.
 
     Raises:
         InputError: anything else, since what cannot be compared cannot be found again.
@@ -146,6 +154,14 @@ def canonical(value: object) -> Any:
             **_code(kind),
             **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
         }
+    if inspect.isfunction(value):
+        return {
+            "function": f"{value.__module__}.{value.__qualname__}",
+            "line": value.__code__.co_firstlineno,  # tells two lambdas apart
+            "defaults": canonical([value.__defaults__, value.__kwdefaults__]),
+            "encloses": canonical([cell.cell_contents for cell in value.__closure__ or ()]),
+            **_code(value),
+        }
     if isinstance(value, tuple | list):
         return [canonical(item) for item in value]
     if isinstance(value, Mapping):
@@ -155,13 +171,13 @@ def canonical(value: object) -> Any:
         return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
     raise InputError(
         f"{show(value)} cannot be stored: experiments are made of dataclasses, numbers, texts, "
-        "arrays and collections of them"
+        "functions, arrays and collections of them"
     )
 
 
 @cache
-def _code(kind: type) -> dict[str, Any]:
-    """What tells versions of a class apart: its `version`, or else the text of its modules.
+def _code(kind: type | FunctionType) -> dict[str, Any]:
+    """What tells versions of a class or function apart: its `version`, or the text of its modules.
 
     Nothing for our own classes, whose rows have the version of the results. A recipe's rules are
     in its session as a rule, so the whole file counts; what that imports does not.
@@ -171,7 +187,7 @@ def _code(kind: type) -> dict[str, Any]:
     """
     modules = sorted({
         parent.__module__
-        for parent in kind.__mro__
+        for parent in (kind.__mro__ if isinstance(kind, type) else (kind,))
         if parent.__module__.partition(".")[0] not in sys.stdlib_module_names | {*OURS}
     })  # fmt: skip
     if not modules:
@@ -184,7 +200,7 @@ def _code(kind: type) -> dict[str, Any]:
     except (OSError, TypeError, KeyError) as error:
         raise InputError(
             f"{kind.__qualname__} cannot be stored, for its code is in no file by which a changed "
-            "one could be told: give the class a text or an integer `version`"
+            "one could be told: give it a text or an integer `version`"
         ) from error
     return {"code": hashlib.sha256(texts.encode()).hexdigest()}
 
@@ -198,20 +214,23 @@ def run_experiment(experiment: Experiment) -> Outcome:
     """Run one experiment; a `MinisimError` becomes part of the row."""
     from minisim.simulation import simulate
 
-    scenario, controller = experiment.scenario, experiment.controller
     began = time.thread_time()
     try:
-        run = simulate(scenario, controller, experiment.seed, on_collision=experiment.on_collision)
+        run = simulate(
+            experiment.scenario,
+            experiment.controller,
+            experiment.seed,
+            record=recording(experiment.metrics),
+            on_collision=experiment.on_collision,
+        )
+        cpu = time.thread_time() - began
+        summary = dict(_flat(run.summary(("queue_growth", *experiment.metrics))))
     except MinisimError as error:
         return failed(experiment, error)
-    cpu = time.thread_time() - began
     identity = experiment.identity()
-    summary = {key: value for key, value in _flat(run.summary()) if key not in identity}
     row = {
-        **identity,
-        **summary,
-        **dict(_flat(driver_means(run))),
-        **_growth(run.columns, scenario.intersection.n),
+        **(identity | summary | identity),  # columns in this order, the name from the label
+        "growing": grows(summary, experiment.scenario.intersection.n),
         "arrivals": _fingerprint(run.columns),
         "cpu_s": cpu,
         "version": results_version(),
@@ -227,22 +246,17 @@ def failed(experiment: Experiment, error: BaseException) -> Outcome:
     return Outcome(row, _provenance())
 
 
-def _growth(trips: Trips, n: int) -> Row:
-    """Growth of the queues, total and by lane, and whether it is more than chance."""
-    demanded = trips.demand_time <= trips.end
-    leave = np.where(trips.arrived, trips.arrival, math.inf)
+def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
+    """Whether the queues of the junction or of a lane kept growing.
 
-    def of(chosen: Any) -> tuple[float, int]:
-        grown = queue_growth(trips.demand_time[chosen], leave[chosen], trips.end)
-        return grown, int(chosen.sum())
-
-    lanes = [of(demanded & (trips.lane == lane)) for lane in range(n)]
-    total = of(demanded)
-    return {
-        "queue_growth": total[0],
-        **{f"lanes_{ARM_NAMES[i]}_queue_growth": grown for i, (grown, _) in enumerate(lanes)},
-        "growing": any(growing(*tested) for tested in (total, *lanes)),
-    }
+    Args:
+        row: of a run, or the sums over several.
+        arms: of the junction.
+    """
+    return any(
+        growing(float(row[f"{of}queue_growth"]), int(row[f"{of}trips"]))
+        for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
+    )
 
 
 def _fingerprint(trips: Trips) -> str:

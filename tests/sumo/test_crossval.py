@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from minisim.results.trips import METRICS
+from minisim.results.metrics import MEANS
 from scenarios.cli import main
 
 

@@ -14,6 +14,7 @@ from minisim.junction.geometry import ARM_NAMES
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals as ArrivalTable
+    from minisim.results.metrics import Metric
     from scenarios.scenario import Scenario
 
 ScenarioName = Annotated[
@@ -158,7 +159,23 @@ SumoFcd = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Write SUMO's own floating-car data (XML) of every step."),
 ]
+Metrics = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME,NAME",
+        help="Measure these, means with median, 95th percentile and maximum; minisim metrics "
+        "lists them.",
+    ),
+]
+By = Annotated[str, typer.Option(metavar="lane|movement|kind", help="What the table is by.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def chosen_metrics(text: str | None) -> tuple[Metric, ...]:
+    """The metrics that an option names; raises `InputError` for an unknown one."""
+    from minisim.results.metrics import asked_metrics
+
+    return asked_metrics([] if text is None else [name.strip() for name in text.split(",")])
 
 
 def build_scenario(

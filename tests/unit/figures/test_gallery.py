@@ -23,10 +23,10 @@ from minisim.errors import FileError, InputError
 from scenarios.paper import SERIES, Cell, reference_value
 from scenarios.studies.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.capacity import Search
-from scenarios.studies.cells import saturated
 from scenarios.studies.reproduction import CAPACITY, PARTS, Made
 from scenarios.studies.results import Effort
 from scenarios.studies.study import RIVALS, STUDIES
+from scenarios.sweep.cells import saturated
 from scenarios.sweep.experiment import Experiment
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 

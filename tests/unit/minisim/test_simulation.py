@@ -30,7 +30,8 @@ from minisim.control import (
     Wake,
 )
 from minisim.errors import CollisionError, ControllerError, InputError
-from minisim.results.trips import METRICS, TRIP_COLUMNS
+from minisim.results.metrics import MEANS
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.simulation import Simulation
 from minisim.vehicle import EngineVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way

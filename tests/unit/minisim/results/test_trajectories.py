@@ -27,7 +27,7 @@ from minisim.results.trajectories import (
     write_trajectories,
     write_trips,
 )
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.testing import small_scenario
 
 

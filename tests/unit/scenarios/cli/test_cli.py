@@ -19,7 +19,7 @@ from PIL import Image
 import minisim.simulation
 from dim import HarmonyMatrix
 from minisim.errors import InputError
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
 from scenarios.cli.shared.report import harmony_table

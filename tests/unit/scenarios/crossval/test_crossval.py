@@ -25,7 +25,8 @@ from figures.crossval import DODGE, crossval_figures
 from minisim.errors import InputError, SumoError
 from minisim.junction.geometry import Floats
 from minisim.results.run import Run
-from minisim.results.trips import METRICS, Trips
+from minisim.results.metrics import MEANS
+from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.cli import main

@@ -22,7 +22,6 @@ from scenarios import four_way
 from scenarios.statistics import GROWTH_SCORE
 from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import Capacity, Search, capacities, grows
-from scenarios.studies.cells import saturated
 from scenarios.studies.comparison import (
     causes,
     compare,
@@ -41,6 +40,7 @@ from scenarios.studies.crossing import (
 from scenarios.studies.fairness import gini, lane_waits
 from scenarios.studies.results import Effort, collect
 from scenarios.studies.study import RIVALS, STUDIES, Case, study_named
+from scenarios.sweep.cells import saturated
 from scenarios.sweep.experiment import Experiment, run_experiment
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 

@@ -19,8 +19,8 @@ from scenarios.statistics import (
     prediction_interval,
     queue_growth,
 )
-from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.sweep import sweep
+from scenarios.sweep.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
 
 Floats = npt.NDArray[np.float64]
