@@ -146,7 +146,7 @@ def test_quick_effort_and_bad_ones() -> None:
 def free_flow(seconds: float) -> dict[str, float | None]:
     """Columns of a run of an hour with this travel time on a free road."""
     return {
-        "horizon_s": 3600.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
+        "horizon_s": 3600.0, "warmup_s": 0.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
         "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
     }  # fmt: skip
 
