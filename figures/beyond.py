@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from figures import lines, style
 from minisim.junction.geometry import ARM_NAMES
+from scenarios.controllers import RIVALS
 from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.studies.archive import (
@@ -30,10 +31,10 @@ from scenarios.studies.crossing import (
     with_total_delay,
 )
 from scenarios.studies.fairness import LANE_WAIT, lane_waits
-from scenarios.studies.study import PRIORITIES, RIVALS
+from scenarios.studies.study import PRIORITIES
 
 #: The two gates whose losses are asked for, and whom they may lose to.
-GATES = ("dim", "dim-harmonious")
+GATES = ("dim", "dim:gate=harmonious")
 OTHERS = tuple(name for name in RIVALS if name not in GATES)
 #: Arms -> colour and marker of a capacity.
 ARMS: Mapping[int, tuple[str, str]] = MappingProxyType({

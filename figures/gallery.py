@@ -109,7 +109,7 @@ def _beyond() -> Iterable[Item]:
     )  # fmt: skip
     yield Item(
         "perception-monitored", "the same with a safety monitor in every vehicle",
-        partial(misreading.perception_figure, series="dim-monitored"), ("perception",),
+        partial(misreading.perception_figure, series="dim:monitor=on"), ("perception",),
     )  # fmt: skip
     yield Item(
         "perception-table", "outcomes of 15 % misread intents", misreading.perception_table,

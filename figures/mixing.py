@@ -25,7 +25,7 @@ GROUPS: Mapping[str, style.Look] = MappingProxyType({
     "automated": style.Look("vehicles of DIM", style.BLUE, "o", "-"),
 })  # fmt: skip
 #: Gate -> line.
-DASHES: Mapping[str, Literal["-", ":"]] = MappingProxyType({"dim": "-", "dim-harmonious": ":"})
+DASHES: Mapping[str, Literal["-", ":"]] = MappingProxyType({"dim": "-", "dim:gate=harmonious": ":"})
 #: Sideways shift of the second gate [%], so that bars do not cover each other.
 SHIFT = 1.2
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,13 +11,13 @@ from rich import box
 from rich.table import Table
 
 from minisim.errors import InputError, MinisimError, integer, number, numbers
-from minisim.results.trajectories import replacing
+from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import Experiment
 from scenarios.sweep.pool import workers
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {
     "dim": "DIM, paper's gate",
-    "dim-harmonious": "DIM, harmonious gate",
+    "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
 #: Averaged over seeds: column of a sweep -> heading.
@@ -76,10 +75,10 @@ class Tour:
             film_seconds=10.0,
         )  # fmt: skip
 
-    def experiments(self) -> list[Experiment]:
+    def experiments(self) -> list[Recipe]:
         """Every density under every controller with every seed."""
         return [
-            Experiment(
+            Recipe(
                 four_way(density, profile=PROFILE, horizon=self.horizon),
                 controller_named(name, PROFILE),
                 seed,
@@ -91,16 +90,10 @@ class Tour:
 
     def film(self) -> Run:
         """The run of the animation."""
-        from minisim.simulation import simulate
-
         end = self.film_start + self.film_seconds
-        return simulate(
-            four_way(self.densities[-1], profile=PROFILE, horizon=end),
-            controller_named(self.controllers[0], PROFILE),
-            seed=1,
-            record="all",
-            record_window=(self.film_start, end),
-        )
+        scenario = four_way(self.densities[-1], profile=PROFILE, horizon=end)
+        recipe = Recipe(scenario, controller_named(self.controllers[0], PROFILE), seed=1)
+        return recipe.run(record="all", record_window=(self.film_start, end))
 
 
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
@@ -168,20 +161,9 @@ def demo_table(points: pd.DataFrame) -> Table:
 
 def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
     """Write demo.csv and demo.md, each whole or not at all; raises `FileError`."""
-    buffer = io.StringIO()
-    points.round(6).to_csv(buffer, index=False, lineterminator="\n")
-    headings = _headings()
-    lines = [
-        f"{demo_title(tour)}. minisim {__version__}.",
-        "",
-        f"| {' | '.join(headings)} |",
-        f"|{'|'.join('---' if k == 1 else '---:' for k in range(len(headings)))}|",
-        *(f"| {' | '.join(row)} |" for row in _cells(points)),
-        "",
-    ]
-    for name, text in (("demo.csv", buffer.getvalue()), ("demo.md", "\n".join(lines))):
-        with replacing(folder / name) as part:
-            part.write_text(text, encoding="utf-8")
+    write_table(points, folder / "demo.csv")
+    table = markdown_table(_headings(), _cells(points), words=(1,))
+    write_text(folder / "demo.md", f"{demo_title(tour)}. minisim {__version__}.\n\n{table}\n")
 
 
 def _headings() -> list[str]:

@@ -28,8 +28,8 @@ import numpy as np
 from minisim.control import Controller, Plan, Session, Site
 from minisim.engine.collision import Collision
 from minisim.errors import FileError, InputError, MinisimError, MissingExtraError, instance, show
+from minisim.files import replacing
 from minisim.results.run import Run
-from minisim.results.trajectories import replacing
 from minisim.results.trips import TRIP_ARRAYS, Trips
 
 if TYPE_CHECKING:

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from minisim.errors import InputError, integer, number
+from scenarios.controllers import RIVALS
+from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.studies.results import Find
-from scenarios.studies.study import RIVALS, Case
-from scenarios.sweep.experiment import Experiment
+from scenarios.studies.study import Case
 
 #: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
 TOLERANCE = 0.02
@@ -156,6 +157,6 @@ def _ends(bracket: tuple[int, int], search: Search) -> tuple[float, float]:
     return low * search.step, math.inf if high == search.steps else high * search.step
 
 
-def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Experiment:
+def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Recipe:
     density = sum(bracket) // 2 * search.step
     return case._replace(density=density).experiment(seed, search.horizon)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,11 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from dim import NoisyPerception
 from dim.senses.intent import KINDS, RATES
 from dim.senses.noise import CLASSIFIER, UNSIGNALLED
+from minisim.parameters import spelled
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.misreading import counted, with_perception
+from scenarios.recipe import Recipe
 from scenarios.statistics import poisson_interval
-from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ MANNERS = {
 }
 #: Whose vehicles misread: the rules alone, with a safety monitor, and with the highest-priority
 #: lane first.
-MISREADERS = ("dim", "dim-monitored", "dim-lanes")
+MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
 #: Thresholds of confidence; 0 takes every reading as it is.
 THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 
@@ -71,14 +72,16 @@ class Misreading(NamedTuple):
     @property
     def where(self) -> str:
         """What tells it from other cases of its series, but for the demand."""
-        return f"{self.arms} arms, {self.perception.name}"
+        return f"{self.arms} arms, {spelled('noisy', self.perception)}"
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions and wrong decisions are counted."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, profile="fair", horizon=horizon)
-        controller = with_perception(controller_named(self.series, "fair"), self.perception)
-        return Experiment(scenario, counted(controller), seed, on_collision="record")
+        controller = controller_named(self.series, "fair")
+        if self.perception.period is not None:
+            controller = replace(controller, perception=self.perception)  # type: ignore[type-var]
+        return Recipe(scenario, controller, seed, on_collision="record")
 
     def __str__(self) -> str:
         return f"{self.series}, {self.where}, {self.density:g} veh/h/lane"
@@ -93,7 +96,7 @@ ERRORS = (
         for kind, (shared, persistent), rate in product(KINDS, MANNERS, RATES[1:])
     ),
     *(
-        Misreading("dim-lanes", kind, CLASSIFIER, shared, persistent)
+        Misreading("dim:order=lanes", kind, CLASSIFIER, shared, persistent)
         for kind, (shared, persistent) in product(KINDS, MANNERS)
     ),
     *(Misreading(series, unsignalled=True) for series in MISREADERS),
@@ -102,7 +105,7 @@ ERRORS = (
 #: Over the threshold of confidence. Lanes first: with the largest clique first, unknown intents
 #: block the junction.
 THRESHOLD_CASES = tuple(
-    Misreading("dim-lanes", kind, CLASSIFIER, confidence=threshold)
+    Misreading("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
     for kind, threshold in product(KINDS, THRESHOLDS)
 )
 

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from minisim.errors import choice
+from scenarios.recipe import Recipe
 from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import CASES, Search, capacities
 from scenarios.studies.results import Effort, Find
 from scenarios.studies.study import STUDIES
-from scenarios.sweep.experiment import Experiment, Row
+from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import workers
+from scenarios.sweep.rows import Row
 from scenarios.sweep.runner import finished
 from scenarios.sweep.store import Store
 
@@ -109,8 +111,8 @@ def reproduce(plan: Plan, store: Store, jobs: int, report: Report) -> list[Made]
 def find_in(store: Store) -> Find:
     """Looks experiments up in a store: a failed or outdated run counts as none."""
 
-    def find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
-        keys = [experiment.key for experiment in experiments]
+    def find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        keys = [key_of(experiment) for experiment in experiments]
         rows = store.valid(keys)
         return [rows.get(key) for key in keys]
 
@@ -145,7 +147,7 @@ def _capacity(plan: Plan, store: Store, jobs: int, report: Report) -> Made:
     began = time.monotonic()
     with workers(jobs) as executor:
 
-        def run(experiments: Sequence[Experiment]) -> list[Row | None]:
+        def run(experiments: Sequence[Recipe]) -> list[Row | None]:
             nonlocal known, asked, cpu
             known += sum(row is not None for row in find_in(store)(experiments))
             rows: dict[int, Row] = {}

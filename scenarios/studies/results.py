@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import integer, number, numbers
+from scenarios.recipe import Recipe
 from scenarios.studies.study import AnyCase, Study
-from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: Gives for each experiment its row of a sweep, or None where it was never run.
-Find = Callable[[Sequence[Experiment]], Sequence[Mapping[str, Any] | None]]
+Find = Callable[[Sequence[Recipe]], Sequence[Mapping[str, Any] | None]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Effort:
         found = tuple(case for case in study.cases if chosen is None or case.density in chosen)
         return found or study.cases
 
-    def runs(self, study: Study) -> list[tuple[AnyCase, Experiment]]:
+    def runs(self, study: Study) -> list[tuple[AnyCase, Recipe]]:
         """The runs of a study, seed by seed within each case."""
         return study.runs(self.seeds, self.horizon, self.cases(study))
 

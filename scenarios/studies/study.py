@@ -11,14 +11,13 @@ from typing import Any, NamedTuple, Protocol
 
 from minisim.control import Controller
 from minisim.errors import choice
-from scenarios.controllers import controller_named
+from scenarios.controllers import RIVALS, controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.mixing import with_humans
 from scenarios.paper import BASELINE_GRID, DENSITIES, GRID, SERIES, Cell, controller_of
 from scenarios.paper import scenario as published_scenario
-from scenarios.scenario import Scenario, parse_split
+from scenarios.recipe import Recipe
+from scenarios.scenario import Scenario
 from scenarios.studies.misreading import ERRORS, MISREADERS, THRESHOLD_CASES
-from scenarios.sweep.experiment import Experiment
 
 #: Stands for the profile and controller of a published run, see `scenarios.paper`.
 AS_RUN = "as-run"
@@ -49,15 +48,16 @@ class Case(NamedTuple):
     density: float
     humans: float = 0.0
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions are counted, for some published rules have them."""
         if self.profile == AS_RUN:
             scenario, controller = self._published(horizon)
         else:
             scenario = self._drawn(horizon)
             controller = controller_named(self.controller, self.profile)
-            controller = with_humans(controller, self.humans)
-        return Experiment(scenario, controller, seed, label=self.label, on_collision="record")
+        return Recipe(
+            scenario, controller, seed, self.humans, label=self.label, on_collision="record"
+        )
 
     @property
     def label(self) -> str:
@@ -65,9 +65,8 @@ class Case(NamedTuple):
         return f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
 
     def _drawn(self, horizon: float) -> Scenario:
-        shares = None if self.split == "balanced" else parse_split(self.split)
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
-        return make(self.density, split=shares, profile=self.profile, horizon=horizon)
+        return make(self.density, split=self.split, profile=self.profile, horizon=horizon)
 
     def _published(self, horizon: float) -> tuple[Scenario, Controller]:
         """What ran, also where that is not what the label says."""
@@ -104,7 +103,7 @@ class AnyCase(Protocol):
     def where(self) -> str:
         """What tells it from other cases of its series, but for the demand."""
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed."""
 
     def _asdict(self) -> dict[str, Any]:
@@ -129,7 +128,7 @@ class Study:
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, cases: Iterable[AnyCase] | None = None
-    ) -> list[tuple[AnyCase, Experiment]]:
+    ) -> list[tuple[AnyCase, Recipe]]:
         """The seeds 1 … `seeds` of all cases or some, seed by seed within each case."""
         return [
             (case, case.experiment(seed, horizon))
@@ -140,7 +139,7 @@ class Study:
 
 #: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
 #: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
-_UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
+_UNBALANCED = {"dim": "dim:priorities=inflow", "fixed-time": "fixed-time:equal_greens=true"}
 
 
 def _as_text(cell: Cell) -> Case:
@@ -164,17 +163,11 @@ _FEW = {"v2ic": 3}
 #: more with a monitor.
 _FEW_MISREAD = dict.fromkeys(MISREADERS, 5)
 
-#: Everything that is compared on equal terms; the paper's four first.
-RIVALS = (
-    "dim", "dim-harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop", "reservation",
-    "longest-queue",
-)  # fmt: skip
-
 #: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].
 FAIR_DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
 
 #: Rules of priority that need no communication.
-PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
+PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 
 #: Shares of human drivers, from none to all.
@@ -185,7 +178,7 @@ HUMAN_DENSITIES = (150.0, 250.0)
 
 
 #: Who drives among humans, and what humans alone are compared with.
-HUMAN_GATES = ("dim", "dim-harmonious")
+HUMAN_GATES = ("dim", "dim:gate=harmonious")
 STOP = "all-way-stop"
 
 
@@ -218,7 +211,7 @@ STUDIES: MappingProxyType[str, Study] = MappingProxyType({
         Study("fair", "Which controller is best with one vehicle and speed limit for all?",
               _cases(RIVALS, (4,), FAIR_DENSITIES)),
         Study("gate", "What does entering beside crossing vehicles in harmony gain?",
-              _cases(("dim", "dim-harmonious"), (3, 4, 5), DENSITIES)),
+              _cases(("dim", "dim:gate=harmonious"), (3, 4, 5), DENSITIES)),
         Study("fairness", "Who waits under which rule of priority?",
               _cases(PRIORITIES, (4,), DENSITIES)),
         Study("humans", "What do human drivers cost, and whom?", _human_cases()),

@@ -13,7 +13,7 @@ from minisim.errors import InputError, choice
 from minisim.results.metrics import AVERAGED, Metric
 from minisim.results.summary import GROUPS
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
-from scenarios.sweep.experiment import grows
+from scenarios.sweep.rows import grows
 
 if TYPE_CHECKING:
     import pandas as pd

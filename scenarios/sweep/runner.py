@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, instance, integer
 from minisim.results.metrics import Metric, asked_metrics
-from scenarios.sweep.experiment import Experiment, Row, failed, run_experiment
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import given, handed, pooled
+from scenarios.sweep.rows import Row, failed, outcome_of
 from scenarios.sweep.store import Store
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ Progress = Callable[[int, int], None]
 
 
 def sweep(
-    experiments: Iterable[Experiment],
+    experiments: Iterable[Recipe],
     executor: Executor | None = None,
     progress: Progress | None = None,
     *,
@@ -53,14 +55,14 @@ def sweep(
             a module that they can import.
 
     Returns:
-        What was run (`Experiment.identity`), the keys of `Run.summary()`, nested ones joined by
-        "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth` and `growing`
+        What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
+        ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
         (`scenarios.statistics.growing`, which says when it means nothing), `arrivals` (alike for
         common arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did
         not.
 
     Raises:
-        InputError: something other than an `Experiment` or a `Store`, or jobs beside an executor.
+        InputError: something other than a `Recipe` or a `Store`, or jobs beside an executor.
         FileError: the store cannot be written; what it has stays.
         ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died;
             what was done is in the store. Without a store, their rows have it as an error.
@@ -78,14 +80,14 @@ def sweep(
     return pd.DataFrame([rows[k] for k in range(len(todo))])
 
 
-def with_metrics(experiment: Experiment, metrics: Iterable[str | Metric]) -> Experiment:
-    """The experiment with more metrics; raises `InputError` as it does."""
-    instance("experiment", experiment, Experiment)
-    return replace(experiment, metrics=(*experiment.metrics, *metrics))
+def with_metrics(recipe: Recipe, metrics: Iterable[str | Metric]) -> Recipe:
+    """The recipe with more metrics; raises `InputError` as it does."""
+    instance("experiment", recipe, Recipe)
+    return replace(recipe, metrics=(*recipe.metrics, *metrics))
 
 
 def finished(
-    experiments: Iterable[Experiment],
+    experiments: Iterable[Recipe],
     executor: Executor | None = None,
     *,
     jobs: int | None = None,
@@ -97,7 +99,7 @@ def finished(
     """
     todo = list(experiments)
     for experiment in todo:
-        instance("experiment", experiment, Experiment)
+        instance("experiment", experiment, Recipe)
     if jobs is None:
         jobs = os.cpu_count() or 1
     integer("jobs", jobs, low=1, high=1024)
@@ -105,18 +107,16 @@ def finished(
         instance("store (open it with `Store(path)`)", store, Store)
     missing = dict(enumerate(todo))
     if store is not None:
-        keys = [experiment.key for experiment in todo]
+        keys = [key_of(experiment) for experiment in todo]
         valid = store.valid(keys)
         for k, key in enumerate(keys):
             if key in valid:
                 del missing[k]
                 yield k, valid[key]
     if executor is None:
-        results = pooled(
-            run_experiment, missing, jobs, begin=partial(_warm, list(missing.values()))
-        )
+        results = pooled(outcome_of, missing, jobs, begin=partial(_warm, list(missing.values())))
     else:
-        results = given(run_experiment, missing, executor)
+        results = given(outcome_of, missing, executor)
     lost = 0
     with closing(results):
         for k, result in results:
@@ -135,7 +135,7 @@ def finished(
         )
 
 
-def _warm(experiments: Iterable[Experiment], pool: Executor) -> None:
+def _warm(experiments: Iterable[Recipe], pool: Executor) -> None:
     """Compile once for all processes: one of them compiles to disk before the others start.
 
     Without it, every process of a fresh installation would compile for itself, at the same time.
@@ -145,7 +145,7 @@ def _warm(experiments: Iterable[Experiment], pool: Executor) -> None:
     for experiment in {type(e.scenario.profile.vehicle): e for e in experiments}.values():
         scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt, warmup=0.0)
         try:
-            tried = handed(pool, run_experiment, replace(experiment, scenario=scenario))
+            tried = handed(pool, outcome_of, replace(experiment, scenario=scenario))
         except BrokenExecutor:
             return
         tried.exception()

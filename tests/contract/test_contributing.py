@@ -19,7 +19,8 @@ from minisim.errors import InputError
 from minisim.junction.geometry import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
-from scenarios.sweep import Experiment
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import description_of, key_of
 
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
@@ -67,7 +68,7 @@ def test_it_checks_its_values(module: ModuleType) -> None:
 
 
 def key(controller: Controller) -> str:
-    return Experiment(four_way(), controller, 1).key
+    return key_of(Recipe(four_way(), controller, 1))
 
 
 def test_a_changed_rule_is_another_experiment(
@@ -78,7 +79,7 @@ def test_a_changed_rule_is_another_experiment(
     other = loaded(example().replace("nearest = min(", "nearest = max("), tmp_path)
     assert key(module.OneAtATime()) == before != key(other.OneAtATime())
     assert key(Dim()) == key(replace(Dim()))
-    assert "code" not in Experiment(four_way(), Dim(), 1).description, "RESULTS says it"
+    assert "code" not in description_of(Recipe(four_way(), Dim(), 1)), "RESULTS says it"
 
 
 def test_a_version_of_ones_own_tells_rules_apart(module: ModuleType) -> None:

@@ -9,7 +9,6 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.junction.geometry import ARM_NAMES
 from minisim.results.metrics import METRICS, SPREAD, Metric, heading
 from minisim.results.summary import GROUPS
 from scenarios.statistics import FILLING
@@ -17,9 +16,8 @@ from scenarios.statistics import FILLING
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dim import Explanation, HarmonyMatrix
     from figures.gallery import Item
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
 
 #: Closest calls that every run of the command line shows.
 CLOSEST = ("min_ttc_s", "min_pet_s")
@@ -123,42 +121,6 @@ def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
         )
 
 
-def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column a lane: ● harmony, · conflict."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("")
-    manoeuvres = range(1, matrix.n)
-    for lane in ARM_NAMES[: matrix.n]:
-        table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, values in zip(matrix.movements, matrix.values, strict=True):
-        cells = [Text(str(movement), style="bold")]
-        for first in range(0, len(values), matrix.n - 1):
-            part = values[first:].tolist()
-            cells.append(Text("").join(map(_mark, part, manoeuvres)))
-        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
-    return table
-
-
-def decision_text(explanation: Explanation) -> Text:
-    """The graph, its cliques, who goes and why."""
-    text = Text()
-    edges = "  ".join(f"{a}–{b}" for a, b in explanation.edges) or "none"
-    text.append("vehicles         ", "dim").append(_names(explanation.participants) + "\n")
-    text.append("in harmony       ", "dim").append(edges + "\n")
-    tied = len(explanation.tied) > 1
-    for k, clique in enumerate(explanation.cliques):
-        text.append("maximal cliques  " if k == 0 else " " * 17, "dim")
-        text.append(f"{{{_names(clique)}}}", "bold" if k == 0 else "")
-        if tied and clique in explanation.tied:
-            text.append("  tied", "yellow")
-        if k == 0:
-            text.append("  ← right of way", "green")
-        text.append("\n")
-    text.append("right of way     ", "dim").append(_names(explanation.right_of_way), "bold green")
-    text.append("\nwhy              ", "dim").append(explanation.reason)
-    return text
-
-
 def gallery_table(items: Iterable[Item]) -> Table:
     """Names and titles of figures and tables, and the studies that they need."""
     table = Table(box=box.SIMPLE_HEAD)
@@ -201,7 +163,7 @@ def _settled(cell: Mapping[Hashable, Any]) -> str:
     return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
 
 
-def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
+def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know of the table: growing queues, capped signals, the first failure."""
     text = Text()
     if "too_short" in cells and cells["too_short"].eq(True).any():
@@ -229,7 +191,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[E
     return text
 
 
-def _capped(experiments: Sequence[Experiment]) -> list[str]:
+def _capped(experiments: Sequence[Recipe]) -> list[str]:
     """A line for each signal whose demand is beyond Webster's formula."""
     from baselines import FixedTime
 
@@ -259,15 +221,6 @@ def _counts(means: Mapping[str, Any]) -> tuple[str, str]:
 
 def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
     return [_seconds(means[key]) if key in means else "" for key in columns]
-
-
-def _names(movements: tuple[Any, ...]) -> str:
-    return " ".join(map(str, movements))
-
-
-def _mark(harmony: bool, manoeuvre: int) -> Text:
-    width = len(str(manoeuvre)) + 2
-    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")
 
 
 def _seconds(value: float | None, unit: str = "") -> str:

@@ -20,14 +20,16 @@ from figures.gallery import GALLERY, item_named, write
 from figures.paper_tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
+from scenarios.controllers import RIVALS
 from scenarios.paper import SERIES, Cell, reference_value
+from scenarios.recipe import Recipe
 from scenarios.studies.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.capacity import Search
 from scenarios.studies.reproduction import CAPACITY, PARTS, Made
 from scenarios.studies.results import Effort
-from scenarios.studies.study import RIVALS, STUDIES
+from scenarios.studies.study import STUDIES
 from scenarios.sweep.cells import saturated
-from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.keys import key_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
 EFFORT, SEARCH = Effort(seeds=2), Search(step=20.0, steps=64, seeds=2)
@@ -38,7 +40,7 @@ def archive() -> Archive:
     return Archive(synthetic_find, EFFORT, SEARCH)
 
 
-def partial_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+def partial_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
     """A store without adaptive signals."""
     return [None if e.label == "adaptive" else synthetic_row(e) for e in experiments]
 
@@ -99,10 +101,10 @@ def test_nothing_to_draw_says_how_to_make_it() -> None:
 @pytest.mark.parametrize("study", ["text", "as-run"])
 @pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
 def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
-    runs = {experiment.key for _, experiment in EFFORT.runs(STUDIES[study])}
+    runs = {key_of(experiment) for _, experiment in EFFORT.runs(STUDIES[study])}
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
-        return [synthetic_row(e) if e.key in runs else None for e in asked]
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if key_of(e) in runs else None for e in asked]
 
     drawing = GALLERY[name].build(Archive(find, EFFORT, SEARCH))
     if isinstance(drawing, Table):
@@ -128,7 +130,7 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
 def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         lost = ("all-way-stop", 2)
         return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
 
@@ -155,7 +157,7 @@ def test_losses_end_where_the_runs_do() -> None:
         assert bars
         assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
 
-    def alone(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def alone(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [synthetic_row(e) if e.label == "dim" else None for e in asked]
 
     with pytest.raises(MissingRunsError, match="DIM and another controller"):
@@ -209,7 +211,11 @@ def test_growing_queues_get_an_arrow(archive: Archive) -> None:
 
 
 def test_series_are_told_apart_without_colour() -> None:
-    together = [RIVALS, ("dim", "dim-rotating", "dim-waiting"), ("dim-3", "dim-4", "dim-5")]
+    together = [
+        RIVALS,
+        ("dim", "dim:priorities=rotating", "dim:priorities=waiting"),
+        ("dim-3", "dim-4", "dim-5"),
+    ]
     for group in together:
         looks = [style.look(name) for name in group]
         assert len({look.marker for look in looks}) == len(looks)
@@ -347,7 +353,7 @@ def test_a_report_on_one_study_has_nothing_of_others(
 
 
 def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
 
     report.write_report(

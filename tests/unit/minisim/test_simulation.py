@@ -33,7 +33,7 @@ from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.results.metrics import MEANS
 from minisim.results.summary import TRIP_COLUMNS
 from minisim.simulation import Simulation
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.builders import Fixed, digest, replayed
@@ -159,7 +159,7 @@ LAWS = {
     "idm": VehicleType(),
     "iidm": VehicleType(model="iidm"),
     "krauss": VehicleType(model="krauss"),
-    "cc": EngineVehicle(),
+    "cc": CruiseVehicle(),
 }
 
 

@@ -125,7 +125,7 @@ def test_a_front_that_the_model_has_lost_is_refused() -> None:
     with pytest.raises(ConformanceError, match=r"^at 1\.0 s vehicle 1 came unseen$"):
         checked.decide(view(1.0, seen(1, 0, 2, 5.0, 1.0)))
     checked.state = checked.protocol.start
-    with pytest.raises(ConformanceError, match=r"^at 1\.0 s somebody of lane 0 went unseen$"):
+    with pytest.raises(ConformanceError, match=r"^at 1\.0 s a vehicle of lane 0 went unseen$"):
         checked.decide(view(1.0, seen(1, 0, 2, -1.0, 1.0)))
 
 

@@ -403,7 +403,7 @@ def test_runs_of_sumo_are_kept_and_used_again(
     files[0].write_bytes(b"PK half of a file")
     assert agreement_of(case) == 1.0
     assert len(ran) == 3, "what is not whole is run again"
-    agreement_of(Case(case.scenario, "dim-harmonious"))
+    agreement_of(Case(case.scenario, "dim:gate=harmonious"))
     assert len(ran) == 5, "another controller is another run"
 
 

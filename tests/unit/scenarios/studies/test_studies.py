@@ -19,6 +19,8 @@ from figures.gallery import GALLERY
 from figures.tables import Table
 from minisim.errors import InputError
 from scenarios import four_way
+from scenarios.controllers import RIVALS
+from scenarios.recipe import Recipe
 from scenarios.statistics import GROWTH_SCORE
 from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import Capacity, Search, capacities, grows
@@ -39,9 +41,10 @@ from scenarios.studies.crossing import (
 )
 from scenarios.studies.fairness import gini, lane_waits
 from scenarios.studies.results import Effort, collect
-from scenarios.studies.study import RIVALS, STUDIES, Case, study_named
+from scenarios.studies.study import STUDIES, Case, study_named
 from scenarios.sweep.cells import saturated
-from scenarios.sweep.experiment import Experiment, run_experiment
+from scenarios.sweep.keys import key_of
+from scenarios.sweep.rows import outcome_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
 # --- studies ---------------------------------------------------------------------------------
@@ -56,13 +59,13 @@ def test_the_paper_s_grid_is_700_hours(name: str) -> None:
     wanted = {tuple(row) for row in published_cells.itertuples(index=False)}
     assert {(c.series, c.arms, c.split, c.density) for c in cases} == wanted
     runs = STUDIES[name].runs(10)
-    assert len({experiment.key for _, experiment in runs}) == len(runs)
+    assert len({key_of(experiment) for _, experiment in runs}) == len(runs)
     assert len(runs) == 700 - 7 * sum(c.series in STUDIES[name].few for c in cases)
 
 
 def test_priorities_by_inflow_where_the_text_has_them() -> None:
     """The highest is that "with the maximum incoming traffic": a and c, then b and d."""
-    wanted = Case("paper", "dim", "dim-inflow", 4, "4:1:4:1", 200.0)
+    wanted = Case("paper", "dim", "dim:priorities=inflow", 4, "4:1:4:1", 200.0)
     assert wanted in STUDIES["text"].cases
     experiment = wanted.experiment(1)
     assert isinstance(experiment.controller, Dim)
@@ -92,7 +95,7 @@ def test_all_controllers_of_a_study_share_their_arrivals() -> None:
     runs = [c.experiment(3, 120.0) for c in same]
     for one, other in pairwise(runs):
         assert (one.scenario, one.seed) == (other.scenario, other.seed)
-        assert one.key != other.key
+        assert key_of(one) != key_of(other)
 
 
 def test_the_humans_study_tells_its_shares_apart() -> None:
@@ -100,7 +103,7 @@ def test_the_humans_study_tells_its_shares_apart() -> None:
     assert len(study.cases) == len(set(study.cases)) == 2 * (2 * 7 + 1)
     runs = study.runs(2)
     assert len({(e.name, e.scenario.density, e.seed) for _, e in runs}) == len(runs)
-    shares = {c.humans: c.experiment(1).controller for c in study.cases if c.series == "dim"}
+    shares = {c.humans: c.experiment(1).driven for c in study.cases if c.series == "dim"}
     assert shares[0.0] == Dim()
     assert shares[0.4] == Mixed(Dim(), 0.4)
     assert str(Case("fair", "dim", "dim", 4, "balanced", 150.0, 0.4)).startswith("dim, 40% humans,")
@@ -115,15 +118,15 @@ def test_results_say_what_is_missing() -> None:
     study = STUDIES["gate"]
     effort = Effort(seeds=2, horizon=120.0)
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         rows: list[Mapping[str, Any] | None] = [dict(row) for row in map(synthetic_row, asked)]
         for k, experiment in enumerate(asked):
-            if experiment.label == "dim-harmonious":
+            if experiment.label == "dim:gate=harmonious":
                 rows[k] = None if experiment.seed == 1 else {**rows[k], "error": "broken"}  # type: ignore[dict-item]
         return rows
 
     results = collect(study, effort, find)
-    assert {case.series for case in results.missing} == {"dim-harmonious"}
+    assert {case.series for case in results.missing} == {"dim:gate=harmonious"}
     assert len(results.missing) == len(study.cases) // 2 == len(results.failed)
     assert len(results.good) == len(study.cases)
     nothing = collect(study, effort, lambda asked: [None] * len(asked))
@@ -327,7 +330,7 @@ def test_capacity_says_no_more_than_the_search_knows() -> None:
 
 @pytest.mark.parametrize(("growth", "text"), [(1.0, "< 200"), (0.0, "> 600")])
 def test_capacity_beyond_the_search(growth: float, text: str) -> None:
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{"queue_growth": growth * 100.0, "trips": 100} for _ in asked]
 
     (capacity,), _ = capacities([CASE], Search.quick(), find)
@@ -337,7 +340,7 @@ def test_capacity_beyond_the_search(growth: float, text: str) -> None:
 def test_capacity_of_runs_that_fail_is_missing() -> None:
     asked: list[int] = []
 
-    def broken(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def broken(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         asked.append(len(experiments))
         return [None] * len(experiments)
 
@@ -359,16 +362,13 @@ def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
     """
     signal = FixedTime(greens=(8.0,) * 4)
 
-    def find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [
-            run_experiment(Experiment(e.scenario, signal, e.seed, label="signal")).row
-            for e in experiments
+            outcome_of(Recipe(e.scenario, signal, e.seed, label="signal")).row for e in experiments
         ]
 
     (found,), _ = capacities([CASE], Search(step=20.0, steps=32, seeds=3), find)
-    flood = run_experiment(
-        Experiment(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)
-    ).row
+    flood = outcome_of(Recipe(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)).row
     served = (flood["trips"] - flood["unfinished"]) / 4.0
     # The first 80 s pass before anybody has left; growth of 2 % still counts as served.
     expected = 1.02 * served / (1.0 - 80.0 / 3600.0)
@@ -416,7 +416,7 @@ def test_comparison_by_hand() -> None:
 
 
 def test_equal_values_make_no_interval() -> None:
-    def still(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def still(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{**synthetic_row(e), "waiting_time_s": 0.0} for e in asked]
 
     table = compare(collect(STUDIES["as-run"], Effort(seeds=2), still).good)

@@ -18,6 +18,7 @@ from minisim.results.run import Run
 from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.controllers import controller_named
+from scenarios.recipe import Recipe
 from scenarios.statistics import (
     growing,
     mean_interval,
@@ -25,7 +26,8 @@ from scenarios.statistics import (
 )
 from scenarios.sweep import sweep
 from scenarios.sweep.cells import CELL, cells, differences, pairs
-from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
+from scenarios.sweep.keys import RESULTS, canonical, key_of
+from scenarios.sweep.rows import outcome_of
 from scenarios.sweep.store import Store
 
 Floats = npt.NDArray[np.float64]
@@ -127,23 +129,20 @@ def present(times: Floats, end: float) -> float:
     ("scenario", "controller", "expected"),
     [
         (five_way(350), "dim", True),  # the paper's own: lane e keeps queueing
-        (five_way(350, profile="fair"), "dim-harmonious", False),
+        (five_way(350, profile="fair"), "dim:gate=harmonious", False),
         (four_way(150), "dim", False),
         (four_way(350), "fixed-time", False),  # x = 0.96, with swings of 25 vehicles a cycle
         (four_way(500), "fixed-time", True),
     ],
 )
 def test_real_runs(scenario: Scenario, controller: str, expected: bool) -> None:
-    rows = [
-        run_experiment(Experiment(scenario, controller_named(controller), seed)).row
-        for seed in (1, 2)
-    ]
+    rows = [outcome_of(Recipe(scenario, controller_named(controller), seed)).row for seed in (1, 2)]
     (cell,) = cells(pd.DataFrame(rows)).to_dict("records")
     assert cell["growing"] is expected
 
 
 def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
-    row = run_experiment(Experiment(four_way(350, horizon=100), Dim(), 1)).row
+    row = outcome_of(Recipe(four_way(350, horizon=100), Dim(), 1)).row
     (cell,) = cells(pd.DataFrame([row])).to_dict("records")
     assert row["queue_growth"] > 0.0
     assert cell["too_short"]
@@ -156,9 +155,9 @@ def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
 @pytest.fixture(scope="module")
 def rows() -> pd.DataFrame:
     todo = [
-        Experiment(four_way(density, horizon=300), controller_named(name), seed)
+        Recipe(four_way(density, horizon=300), controller_named(name), seed)
         for density in (150, 300)
-        for name in ("dim", "dim-harmonious", "unregulated")
+        for name in ("dim", "dim:gate=harmonious", "unregulated")
         for seed in (1, 2, 3)
     ]
     return sweep(todo, jobs=1)
@@ -167,7 +166,7 @@ def rows() -> pd.DataFrame:
 def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     found = cells(rows)
     assert list(zip(found["density"], found["controller"], strict=True))[:2] == [
-        (150, "dim"), (150, "dim-harmonious"),
+        (150, "dim"), (150, "dim:gate=harmonious"),
     ]  # fmt: skip
     first = found.iloc[0]
     group = rows[:3]
@@ -190,13 +189,13 @@ def test_a_cell_of_failures_has_no_means(rows: pd.DataFrame) -> None:
 
 
 def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
-    found = differences(rows, "complete_waiting_time_s", "dim", "dim-harmonious")
+    found = differences(rows, "complete_waiting_time_s", "dim", "dim:gate=harmonious")
     assert found["density"].tolist() == [150, 300]
     assert found["pairs"].tolist() == [3, 3]
     values = rows[rows["density"] == 300].set_index(["controller", "seed"])[
         "complete_waiting_time_s"
     ]
-    expected = (values["dim"] - values["dim-harmonious"]).mean()
+    expected = (values["dim"] - values["dim:gate=harmonious"]).mean()
     assert found["difference"][1] == pytest.approx(expected)
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
 
@@ -215,11 +214,11 @@ def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
     with pytest.raises(InputError, match="did not meet the same arrivals"):
-        differences(other, "waiting_time_s", "dim", "dim-harmonious")
+        differences(other, "waiting_time_s", "dim", "dim:gate=harmonious")
     with pytest.raises(InputError, match="unknown controller of these rows 'dmi'"):
         differences(rows, "waiting_time_s", "dmi", "dim")
     with pytest.raises(InputError, match="unknown metric 'wait'"):
-        differences(rows, "wait", "dim", "dim-harmonious")
+        differences(rows, "wait", "dim", "dim:gate=harmonious")
 
 
 def crossings_of(run: Run) -> int:
@@ -239,7 +238,7 @@ OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="tri
 
 def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
     todo = [
-        Experiment(four_way(200, horizon=120), controller_named(name), seed)
+        Recipe(four_way(200, horizon=120), controller_named(name), seed)
         for name in ("dim", "fixed-time")
         for seed in (1, 2)
     ]
@@ -270,7 +269,7 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
         return 1.0
 
     def key(of: Callable[[Run], float]) -> str:
-        return Experiment(four_way(), Dim(), metrics=(Metric("mine", of),)).key
+        return key_of(Recipe(four_way(), Dim(), metrics=(Metric("mine", of),)))
 
     def power(k: float) -> Callable[[Run], float]:
         return lambda run: k
@@ -289,7 +288,7 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
 
 def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
     wrong = Metric("mine", lambda run: "many")
-    todo = [Experiment(four_way(50, horizon=20), Dim(), 1)]
+    todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
     (error,) = sweep(todo, jobs=1, metrics=[wrong])["error"]
     assert error == "metric 'mine' must give one finite number or None, got 'many'"
 
@@ -298,7 +297,7 @@ def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
 
 
 def test_equal_numbers_are_one_experiment() -> None:
-    assert Experiment(four_way(350), Dim()).key == Experiment(four_way(350.0), Dim()).key
+    assert key_of(Recipe(four_way(350), Dim())) == key_of(Recipe(four_way(350.0), Dim()))
     assert canonical(2**60 + 1) != canonical(2**60)
     assert canonical({"b": 1, "a": (2, None)}) == canonical({"a": [2.0, None], "b": 1.0})
     assert canonical(frozenset({2, 1})) == canonical(frozenset({1, 2}))
@@ -317,7 +316,7 @@ def test_what_has_no_canonical_form(odd: object) -> None:
         (four_way(300, horizon=900), "dim", (273, 30, 2.33, 95.61, 8.65)),
         (
             three_way(350, horizon=900, profile="fair"),
-            "dim-harmonious",
+            "dim:gate=harmonious",
             (253, 15, 0.99, 77.94, 7.12),
         ),
         (
@@ -336,10 +335,10 @@ def test_whoever_changes_results_raises_their_version(
     The numbers are what these runs gave under `RESULTS` = 3, no more; put in what they give now.
     """
     recipe = controller_named(controller, scenario.profile)
-    row = run_experiment(Experiment(scenario, recipe, 1, on_collision="record")).row
+    row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
     columns = (
         "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
     )  # fmt: skip
     found = [row[column] for column in columns]
-    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.experiment.RESULTS"
+    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
     assert RESULTS == 3
