@@ -1,4 +1,4 @@
-"""What all hosts of a controller share: begin a run, wake and ask the session, report crashes."""
+"""What all hosts share: how a run begins, how a session is woken and asked, how a run stops."""
 
 from __future__ import annotations
 

@@ -100,6 +100,11 @@ def test_a_warmup_holds_for_the_block(tmp_path: Path) -> None:
     assert one.scenario == four_way(warmup=600.0)
 
 
+def test_metrics_hold_for_the_block(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, 'seeds = [1]\nmetrics = ["waiting_time_s", "min_pet_s"]\n')
+    assert one.metrics == ("waiting_time_s", "min_pet_s")
+
+
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
     found = read(
         tmp_path,
@@ -175,6 +180,8 @@ WRONG = [
     ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
     ('humans = "all"', r"share of humans must be a number, got 'all'"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
+    ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
+    ('metrics = "trips"', r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
