@@ -43,8 +43,8 @@ HOSTS = ("minisim", "sumo")
 
 
 @app.command(
-    epilog="Times are means over the trips that ended; the row [bold]with unfinished[/bold] counts "
-    "the others too. Exit codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
+    epilog="Means are over the trips that ended; [bold]with unfinished[/bold] counts all. Exit "
+    "codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
     "[bold]minisim controllers[/bold].\n\n"
     "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json\n\n"
     "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
@@ -69,6 +69,8 @@ def run(
     no_safety: Annotated[
         bool, typer.Option("--no-safety", help="Do not measure TTC and PET.")
     ] = False,
+    metrics: Metrics = None,
+    by: By = "lane",
     as_json: AsJson = False,
     arrivals: Arrivals = None,
     trips: Annotated[
@@ -94,8 +96,6 @@ def run(
     gui: Gui = False,
     keep_files: KeepFiles = None,
     sumo_fcd: SumoFcd = None,
-    metrics: Metrics = None,
-    by: By = "lane",
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from minisim.files import check_apart, check_file, check_table

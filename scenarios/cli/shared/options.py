@@ -148,13 +148,11 @@ SumoFcd = Annotated[
 ]
 Metrics = Annotated[
     str | None,
-    typer.Option(
-        metavar="NAME,NAME",
-        help="Measure these, means with median, 95th percentile and maximum; minisim metrics "
-        "lists them.",
-    ),
+    typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
 ]
-By = Annotated[str, typer.Option(metavar="lane|movement|kind", help="What the table is by.")]
+By = Annotated[
+    str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 

@@ -33,6 +33,7 @@ def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
 def test_the_help_has_the_values_of_what_is_left_out() -> None:
     drawn = {**AXES, **SINGLE}
     assert drawn.pop("arrivals") is None
+    assert drawn.pop("metrics") == ()
     assert drawn == DEFAULTS
     assert sweep.CUSTOM == CUSTOM
 
