@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from figures import lines, style
 from scenarios.statistics import mean_interval
 from scenarios.studies.archive import Archive, missing_note
-from scenarios.studies.cells import saturated
 from scenarios.studies.study import HUMAN_DENSITIES, HUMAN_GATES, HUMAN_SHARES, STOP
+from scenarios.sweep.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +73,7 @@ def delays(rows: pd.DataFrame, group: str) -> pd.Series[float]:
 
     parts = pd.DataFrame(index=rows.index)
     for metric in ("complete_time_loss_s", "complete_depart_delay_s"):
-        column = rows.get(f"{group}_{metric}", pd.Series(index=rows.index, dtype=float))
+        column = rows.get(f"kinds_{group}_{metric}", pd.Series(index=rows.index, dtype=float))
         alone = rows[metric].where((rows["humans"] == 0.0) & (group == "automated"))
         parts[metric] = column.astype(float).fillna(alone)
     return parts.sum(axis=1, skipna=False)

@@ -16,12 +16,12 @@ from minisim.errors import FileError
 from minisim.files import write_text
 from minisim.version import __version__
 from scenarios.studies.archive import Archive, MissingRunsError, make_command, smoke_test
-from scenarios.studies.cells import saturated, too_short
 from scenarios.studies.comparison import COLLIDING, SHOWN, compare, discrepancies, labels, score
 from scenarios.studies.crossing import METRICS, tried
 from scenarios.studies.reproduction import PARTS, Made
 from scenarios.studies.results import Results
 from scenarios.studies.study import STUDIES, AnyCase
+from scenarios.sweep.cells import saturated, too_short
 
 if TYPE_CHECKING:
     import pandas as pd

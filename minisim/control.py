@@ -280,6 +280,14 @@ class Counting(Session, Protocol):
 
 
 @runtime_checkable
+class Kinds(Session, Protocol):
+    """A session whose vehicles are of several kinds, by which summaries group them."""
+
+    def kind(self, vehicle: int) -> str:
+        """Kind of a vehicle, such as "human"."""
+
+
+@runtime_checkable
 class Controller(Protocol):
     """A recipe for sessions: hashable, picklable, never changed by a run."""
 

@@ -13,6 +13,7 @@ from dim import Dim, Mixed
 from minisim.control import Controller
 from minisim.errors import InputError, show
 from minisim.parameters import checked, declared, part, real, text, whole, word
+from minisim.results.metrics import Metric, named_metrics, recording
 from minisim.results.run import Run
 from scenarios.scenario import Scenario
 
@@ -52,6 +53,12 @@ class Recipe:
         ON_COLLISION, default="stop",
     )  # fmt: skip
 
+    metrics: tuple[str | Metric, ...] = checked(
+        "what rows have besides the usual (`minisim.results.metrics`)",
+        lambda _, value: named_metrics(value),
+        "names and Metrics", default=(),
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         if self.humans and not isinstance(self.controller, Dim):
             raise InputError(
@@ -72,7 +79,7 @@ class Recipe:
         return self.label or self.driven.name
 
     def run(self, host: Host | None = None, **options: Any) -> Run:
-        """Simulate it.
+        """Simulate it, and record what its metrics need.
 
         Args:
             host: `minisim.simulate`, or another function that takes the same arguments.
@@ -86,6 +93,8 @@ class Recipe:
         from minisim.simulation import simulate
 
         host = host or simulate
+        if options.get("record") is None:
+            options["record"] = recording(self.metrics)
         return host(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

@@ -204,7 +204,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     groups = ("human", "automated") if share else ()
     return {
         **{
-            f"{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+            f"kinds_{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
             for k, group in enumerate(groups)
             for key, value in times.items()
         },

@@ -89,7 +89,7 @@ class MixedSession:
     """One run: a session of DIM for some vehicles, and the humans."""
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
-        drivers = Drivers(mixed.humans, mixed.share, site.seed)
+        drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
         cautious, take = _Cautious(mixed.dim.perception, mixed), _caution(mixed, site)
         self._dim = DimSession(
             replace(mixed.dim, perception=cautious),
@@ -104,6 +104,10 @@ class MixedSession:
             marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another comes first
             sight=max(plan.sight, self._humans.sight),
         )
+
+    def kind(self, vehicle: int) -> str:
+        """ "human" or "automated"."""
+        return "human" if self._drivers[vehicle].human else "automated"
 
     @property
     def counts(self) -> Mapping[str, float]:

@@ -40,6 +40,7 @@ from minisim.hosting import (
     checked_window,
     collision_error,
     counts_of,
+    kinds_of,
 )
 from minisim.results.run import Run, ScenarioLike
 from minisim.sumo.files import (
@@ -190,6 +191,7 @@ def _run(request: _Request) -> Run:
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
         counts=counts_of(beginning.session),
+        kinds=kinds_of(beginning.session, len(beginning.arrivals)),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import numpy as np
 import typer
 
 from minisim.errors import CollisionError, InputError, choice
@@ -16,6 +15,7 @@ from scenarios.cli.shared.options import (
     Arrivals,
     AsJson,
     Bearings,
+    By,
     ControllerName,
     Density,
     Gui,
@@ -23,6 +23,7 @@ from scenarios.cli.shared.options import (
     Host,
     Humans,
     KeepFiles,
+    Metrics,
     ProfileName,
     ScenarioName,
     Seed,
@@ -33,21 +34,17 @@ from scenarios.cli.shared.options import (
     Turns,
     Warmup,
     build_scenario,
+    chosen_metrics,
 )
 from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
 from scenarios.cli.shared.terminal import bar, show, show_json
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from minisim.results.run import Run
 
 HOSTS = ("minisim", "sumo")
 
 
 @app.command(
-    epilog="Times are means over the trips that ended; the row [bold]with unfinished[/bold] counts "
-    "the others too. Exit codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
+    epilog="Means are over the trips that ended; [bold]with unfinished[/bold] counts all. Exit "
+    "codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
     "[bold]minisim controllers[/bold].\n\n"
     "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json\n\n"
     "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
@@ -72,6 +69,8 @@ def run(
     no_safety: Annotated[
         bool, typer.Option("--no-safety", help="Do not measure TTC and PET.")
     ] = False,
+    metrics: Metrics = None,
+    by: By = "lane",
     as_json: AsJson = False,
     arrivals: Arrivals = None,
     trips: Annotated[
@@ -100,10 +99,10 @@ def run(
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from minisim.files import check_apart, check_file, check_table
-    from minisim.results.safety import safety_summary
+    from minisim.results.metrics import SAFETY
+    from minisim.results.summary import GROUPS
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.controllers import controller_named
-    from scenarios.mixing import driver_means
     from scenarios.recipe import Recipe
 
     check_apart({
@@ -116,15 +115,21 @@ def run(
     for xml in (fcd, sumo_fcd):
         if xml is not None:
             check_file(xml, ".xml")
+    asked, by = chosen_metrics(metrics), choice("--by", by, GROUPS)
     junction = build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
-        junction, controller_named(controller, profile), seed, humans, on_collision=on_collision
+        junction,
+        controller_named(controller, profile),
+        seed,
+        humans,
+        on_collision=on_collision,
+        metrics=(*asked, *(() if no_safety else SAFETY)),
     )
     everything = fcd is not None or trajectories is not None
-    record = "all" if everything else None if no_safety else "junction"
+    record = "all" if everything else None
     sumo = {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
     files = [path for path in (trips, trajectories, fcd, sumo_fcd) if path is not None]
     try:
@@ -136,13 +141,8 @@ def run(
     except CollisionError as error:
         error.add_note(_unwritten(files))
         raise
-    summary = result.summary()
-    if drivers := driver_means(result):
-        summary["drivers"] = drivers
     with bar("measuring"):
-        summary["safety"] = (
-            None if no_safety else safety_summary(_near_junction(result), result.site)
-        )
+        summary = result.summary(recipe.metrics, [by])
         if trips is not None:
             write_trips(result.trips, trips)
         if trajectories is not None:
@@ -152,9 +152,18 @@ def run(
     if as_json:
         show_json(summary)
         return
-    from scenarios.cli.shared.report import run_table, run_title, safety_line, tally_line
+    from scenarios.cli.shared.report import (
+        number_lines,
+        run_table,
+        run_title,
+        safety_line,
+        tally_line,
+    )
 
-    show(run_title(summary), run_table(summary), safety_line(summary), *tally_line(result.counts))
+    show(
+        run_title(summary), run_table(summary, asked, by), safety_line(summary),
+        *tally_line(result.counts), *number_lines(summary, asked),
+    )  # fmt: skip
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
     for path in files:
@@ -180,20 +189,3 @@ def _unwritten(files: Sequence[Path]) -> str:
     """What is not there after a collision has stopped the run, and how to get it."""
     wrote = f"{', '.join(map(str, files))} not written; " if files else ""
     return f"{wrote}--on-collision record notes collisions and goes on"
-
-
-def _near_junction(run: Run) -> pd.DataFrame:
-    """The trajectories as far as `record="junction"` keeps them.
-
-    A recording of everything then gives the same safety numbers.
-    """
-    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
-    from minisim.results.trajectories import S, movement_index
-
-    frame, paths = run.trajectories, run.site.intersection.paths
-    if run.record == "junction":
-        return frame
-    last = np.array([path.exit + RECORD_PAST for path in paths])
-    s = frame[S].to_numpy()
-    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, run.site)])
-    return frame[near]

@@ -44,7 +44,8 @@ PAPER = {"paper": "text"}
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
     "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
-    f"warmup, on_collision; what it leaves out is {LEFT_OUT}. Your own junction is written\n\n"
+    "warmup, on_collision, metrics (minisim metrics lists them); what it leaves out is "
+    f"{LEFT_OUT}. Your own junction is written\n\n"
     f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
@@ -108,7 +109,7 @@ def sweep(
     from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
-    from scenarios.studies.cells import cells
+    from scenarios.sweep.cells import cells
     from scenarios.sweep.store import Store
 
     if seeds is not None:

@@ -47,7 +47,7 @@ def read_outcome(file: Path) -> Outcome | None:
     try:
         with np.load(file, allow_pickle=False) as data:
             columns = {name: data[name] for name in Trips._fields}
-            columns["end"] = float(columns["end"])
+            columns |= {name: float(columns[name]) for name in ("end", "start")}
             return Outcome(Trips(**columns), int(data["collisions"]), str(data["sumo"]))
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         return None

@@ -42,6 +42,7 @@ from minisim.errors import (
     show,
 )
 from minisim.hosting import ON_COLLISION
+from minisim.results.metrics import named_metrics
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
 from scenarios.recipe import Recipe
@@ -69,6 +70,7 @@ AXES: dict[str, Any] = {
 #: What holds for a whole block.
 SINGLE: dict[str, Any] = {
     "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+    "metrics": (),
 }  # fmt: skip
 
 #: What recorded arrivals replace.
@@ -168,6 +170,7 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     choice("on_collision", single["on_collision"], ON_COLLISION)
+    metrics = named_metrics(single["metrics"])
     seeds, controllers, shares = (axes.pop(key) for key in ("seeds", "controller", "humans"))
     for values in product(*axes.values()):
         chosen = dict(zip(axes, values, strict=True))
@@ -176,7 +179,9 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
             with _at("controller"):
                 controller, label = _controller(given, scenario.profile)
             for seed in seeds:
-                yield Recipe(scenario, controller, seed, share, label, single["on_collision"])
+                yield Recipe(
+                    scenario, controller, seed, share, label, single["on_collision"], metrics
+                )
 
 
 def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path) -> Scenario:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from numbers import Integral, Real
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,14 @@ def canonical(value: object) -> Any:
             **_code(kind),
             **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
         }
+    if inspect.isfunction(value):
+        return {
+            "function": f"{value.__module__}.{value.__qualname__}",
+            "line": value.__code__.co_firstlineno,  # tells two lambdas apart
+            "defaults": canonical([value.__defaults__, value.__kwdefaults__]),
+            "encloses": canonical([cell.cell_contents for cell in value.__closure__ or ()]),
+            **_code(value),
+        }
     if isinstance(value, tuple | list):
         return [canonical(item) for item in value]
     if isinstance(value, Mapping):
@@ -85,13 +94,13 @@ def canonical(value: object) -> Any:
         return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
     raise InputError(
         f"{show(value)} cannot be stored: recipes are made of dataclasses, numbers, texts, "
-        "arrays and collections of them"
+        "functions, arrays and collections of them"
     )
 
 
 @cache
-def _code(kind: type) -> dict[str, Any]:
-    """What tells versions of a class apart: its `version`, or else the text of its modules.
+def _code(kind: type | FunctionType) -> dict[str, Any]:
+    """What tells versions of a class or function apart: its `version`, or the text of its modules.
 
     Nothing for our own classes, for which `RESULTS` speaks. The rules of a controller are usually
     in its session, so the whole file counts; what that imports does not.
@@ -101,7 +110,7 @@ def _code(kind: type) -> dict[str, Any]:
     """
     modules = sorted({
         parent.__module__
-        for parent in kind.__mro__
+        for parent in (kind.__mro__ if isinstance(kind, type) else (kind,))
         if parent.__module__.partition(".")[0] not in sys.stdlib_module_names | {*OURS}
     })  # fmt: skip
     if not modules:
@@ -114,7 +123,7 @@ def _code(kind: type) -> dict[str, Any]:
     except (OSError, TypeError, KeyError) as error:
         raise InputError(
             f"{kind.__qualname__} cannot be stored: its code is in no file, so that a change would "
-            "go unnoticed; give the class a text or an integer `version`"
+            "go unnoticed; give it a text or an integer `version`"
         ) from error
     return {"code": hashlib.sha256(texts.encode()).hexdigest()}
 

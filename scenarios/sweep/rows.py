@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +14,12 @@ from minisim.errors import MinisimError
 from minisim.junction.geometry import ARM_NAMES
 from minisim.results.trips import Trips
 from minisim.version import __version__
-from scenarios.mixing import driver_means
 from scenarios.recipe import Recipe
-from scenarios.statistics import growing, queue_growth
+from scenarios.statistics import growing
 from scenarios.sweep.keys import RESULTS, results_version
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Columns that a repetition of the same run measures anew.
 MEASURED = ("cpu_s",)
@@ -49,6 +50,7 @@ def identity_of(recipe: Recipe) -> Row:
         "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
         "seed": recipe.seed,
         "horizon_s": scenario.horizon,
+        "warmup_s": scenario.warmup,
     }
 
 
@@ -57,16 +59,14 @@ def outcome_of(recipe: Recipe) -> Outcome:
     began = time.thread_time()
     try:
         run = recipe.run()
+        cpu = time.thread_time() - began
+        summary = dict(_flat(run.summary(("queue_growth", *recipe.metrics))))
     except MinisimError as error:
         return failed(recipe, error)
-    cpu = time.thread_time() - began
     identity = identity_of(recipe)
-    summary = {key: value for key, value in _flat(run.summary()) if key not in identity}
     row = {
-        **identity,
-        **summary,
-        **dict(_flat(driver_means(run))),
-        **_growth(run.columns, run.site.intersection.n),
+        **(identity | summary | identity),  # columns in this order, the controller's from the label
+        "growing": grows(summary, run.site.intersection.n),
         "arrivals": _fingerprint(run.columns),
         "cpu_s": cpu,
         "version": results_version(),
@@ -82,22 +82,17 @@ def failed(recipe: Recipe, error: BaseException) -> Outcome:
     return Outcome(row, _provenance())
 
 
-def _growth(trips: Trips, n: int) -> Row:
-    """Growth of the queues, total and by lane, and whether it is more than chance."""
-    demanded = trips.demand_time <= trips.end
-    leave = np.where(trips.arrived, trips.arrival, math.inf)
+def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
+    """Whether the queues of the junction or of a lane kept growing.
 
-    def of(chosen: Any) -> tuple[float, int]:
-        grown = queue_growth(trips.demand_time[chosen], leave[chosen], trips.end)
-        return grown, int(chosen.sum())
-
-    lanes = [of(demanded & (trips.lane == lane)) for lane in range(n)]
-    total = of(demanded)
-    return {
-        "queue_growth": total[0],
-        **{f"lanes_{ARM_NAMES[i]}_queue_growth": grown for i, (grown, _) in enumerate(lanes)},
-        "growing": any(growing(*tested) for tested in (total, *lanes)),
-    }
+    Args:
+        row: of a run, or the sums over several.
+        arms: of the junction.
+    """
+    return any(
+        growing(float(row[f"{of}queue_growth"]), int(row[f"{of}trips"]))
+        for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
+    )
 
 
 def _fingerprint(trips: Trips) -> str:

@@ -11,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, instance, integer
+from minisim.results.metrics import Metric, asked_metrics
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import given, handed, pooled
@@ -33,6 +34,7 @@ def sweep(
     *,
     jobs: int | None = None,
     store: Store | None = None,
+    metrics: Iterable[str | Metric] = (),
 ) -> pd.DataFrame:
     """Run all experiments and return one row each, in their order.
 
@@ -48,12 +50,16 @@ def sweep(
         progress: called with the runs done and their number, in this process.
         jobs: processes of the pool, one a core unless told; 1 runs in this process.
         store: rows go there as they come, and those that it holds are not computed again.
+        metrics: columns besides the usual: names of `minisim.results.metrics.METRICS`, or
+            `Metric`s of your own. With several processes, the function of an own one must be in
+            a module that they can import.
 
     Returns:
         What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
         ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
-        (`scenarios.statistics`, which says when it means nothing), `arrivals` (alike for common
-        arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
+        (`scenarios.statistics.growing`, which says when it means nothing), `arrivals` (alike for
+        common arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did
+        not.
 
     Raises:
         InputError: something other than a `Recipe` or a `Store`, or jobs beside an executor.
@@ -63,7 +69,8 @@ def sweep(
     """
     import pandas as pd
 
-    todo = list(experiments)
+    added = asked_metrics(metrics)
+    todo = [with_metrics(experiment, added) for experiment in experiments]
     rows: dict[int, Row] = {}
     with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
         for k, row in results:
@@ -71,6 +78,12 @@ def sweep(
             if progress is not None:
                 progress(len(rows), len(todo))
     return pd.DataFrame([rows[k] for k in range(len(todo))])
+
+
+def with_metrics(recipe: Recipe, metrics: Iterable[str | Metric]) -> Recipe:
+    """The recipe with more metrics; raises `InputError` as it does."""
+    instance("experiment", recipe, Recipe)
+    return replace(recipe, metrics=(*recipe.metrics, *metrics))
 
 
 def finished(
@@ -130,7 +143,7 @@ def _warm(experiments: Iterable[Recipe], pool: Executor) -> None:
     comes.
     """
     for experiment in {type(e.scenario.profile.vehicle): e for e in experiments}.values():
-        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt)
+        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt, warmup=0.0)
         try:
             tried = handed(pool, outcome_of, replace(experiment, scenario=scenario))
         except BrokenExecutor:

@@ -1,4 +1,4 @@
-"""The controller in CONTRIBUTING.md is complete and keeps the contract."""
+"""The examples in CONTRIBUTING.md are complete: a controller that keeps the contract, a metric."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -25,9 +26,10 @@ from scenarios.sweep.keys import description_of, key_of
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
 
-def example() -> str:
-    (block,) = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
-    return str(block)
+def example(number: int = 0) -> str:
+    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 2
+    return str(blocks[number])
 
 
 def loaded(text: str, folder: Path) -> ModuleType:
@@ -111,3 +113,12 @@ def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
     counts = rows[inside].groupby("time_s")["vehicle"].nunique()
     assert len(counts) > 100
     assert counts.max() == 1
+
+
+def test_its_metric_is_measured() -> None:
+    made: dict[str, Any] = {}
+    exec(example(1), made)
+    run = minisim.simulate(four_way(300, horizon=120.0), Dim(), 1)
+    complete = run.summary(metrics=[made["delay"]])["complete"]
+    expected = float((run.columns.time_loss + run.columns.depart_delay).mean())
+    assert complete["delay_s"] == pytest.approx(expected)

@@ -14,6 +14,7 @@ from minisim.junction.geometry import ARM_NAMES
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals as ArrivalTable
+    from minisim.results.metrics import Metric
     from scenarios.scenario import Scenario
 
 #: Groups of the options of `minisim run` in its help.
@@ -145,7 +146,21 @@ SumoFcd = Annotated[
     Path | None,
     typer.Option(metavar="FILE", rich_help_panel=SUMO, help="SUMO's own floating-car data (XML)."),
 ]
+Metrics = Annotated[
+    str | None,
+    typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
+]
+By = Annotated[
+    str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def chosen_metrics(text: str | None) -> tuple[Metric, ...]:
+    """The metrics that an option names; raises `InputError` for an unknown one."""
+    from minisim.results.metrics import asked_metrics
+
+    return asked_metrics([] if text is None else [name.strip() for name in text.split(",")])
 
 
 def build_scenario(

@@ -25,10 +25,10 @@ from scenarios.paper import SERIES, Cell, reference_value
 from scenarios.recipe import Recipe
 from scenarios.studies.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.capacity import Search
-from scenarios.studies.cells import saturated
 from scenarios.studies.reproduction import CAPACITY, PARTS, Made
 from scenarios.studies.results import Effort
 from scenarios.studies.study import STUDIES
+from scenarios.sweep.cells import saturated
 from scenarios.sweep.keys import key_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 

@@ -24,7 +24,6 @@ from scenarios.recipe import Recipe
 from scenarios.statistics import GROWTH_SCORE
 from scenarios.studies.archive import Archive
 from scenarios.studies.capacity import Capacity, Search, capacities, grows
-from scenarios.studies.cells import saturated
 from scenarios.studies.comparison import (
     causes,
     compare,
@@ -43,6 +42,7 @@ from scenarios.studies.crossing import (
 from scenarios.studies.fairness import gini, lane_waits
 from scenarios.studies.results import Effort, collect
 from scenarios.studies.study import STUDIES, Case, study_named
+from scenarios.sweep.cells import saturated
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import outcome_of
 from tests.builders import capacity_of, synthetic_find, synthetic_row
@@ -149,7 +149,7 @@ def test_quick_effort_and_bad_ones() -> None:
 def free_flow(seconds: float) -> dict[str, float | None]:
     """Columns of a run of an hour with this travel time on a free road."""
     return {
-        "horizon_s": 3600.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
+        "horizon_s": 3600.0, "warmup_s": 0.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
         "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
     }  # fmt: skip
 

@@ -33,6 +33,7 @@ def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
 def test_the_help_has_the_values_of_what_is_left_out() -> None:
     drawn = {**AXES, **SINGLE}
     assert drawn.pop("arrivals") is None
+    assert drawn.pop("metrics") == ()
     assert drawn == DEFAULTS
     assert sweep.CUSTOM == CUSTOM
 
@@ -98,6 +99,11 @@ def test_shares_are_numbers_or_a_text(tmp_path: Path) -> None:
 def test_a_warmup_holds_for_the_block(tmp_path: Path) -> None:
     (one,) = read(tmp_path, "seeds = [1]\nwarmup = 600\n")
     assert one.scenario == four_way(warmup=600.0)
+
+
+def test_metrics_hold_for_the_block(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, 'seeds = [1]\nmetrics = ["waiting_time_s", "min_pet_s"]\n')
+    assert one.metrics == ("waiting_time_s", "min_pet_s")
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -175,6 +181,8 @@ WRONG = [
     ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
     ('humans = "all"', r"share of humans must be a number, got 'all'"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
+    ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
+    ('metrics = "trips"', r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),

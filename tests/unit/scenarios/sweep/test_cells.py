@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +13,9 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
+from minisim.results.metrics import AVERAGED, Metric, queue_growth
+from minisim.results.run import Run
+from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
@@ -18,12 +23,12 @@ from scenarios.statistics import (
     growing,
     mean_interval,
     prediction_interval,
-    queue_growth,
 )
-from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs
 from scenarios.sweep import sweep
+from scenarios.sweep.cells import CELL, cells, differences, pairs
 from scenarios.sweep.keys import RESULTS, canonical, key_of
 from scenarios.sweep.rows import outcome_of
+from scenarios.sweep.store import Store
 
 Floats = npt.NDArray[np.float64]
 
@@ -214,6 +219,78 @@ def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
         differences(rows, "waiting_time_s", "dmi", "dim")
     with pytest.raises(InputError, match="unknown metric 'wait'"):
         differences(rows, "wait", "dim", "dim:gate=harmonious")
+
+
+def crossings_of(run: Run) -> int:
+    """A caller's own metric: how often a vehicle passed the junction's entry."""
+    return int(np.isfinite(run.columns.depart).sum())
+
+
+def slowness(run: Run) -> Floats:
+    """Another one: seconds a trip has lost over those that it drove."""
+    return np.where(
+        run.columns.travel_time > 0.0, run.columns.time_loss / run.columns.travel_time, np.nan
+    )
+
+
+OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="trip"))
+
+
+def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
+    todo = [
+        Recipe(four_way(200, horizon=120), controller_named(name), seed)
+        for name in ("dim", "fixed-time")
+        for seed in (1, 2)
+    ]
+    with Store(tmp_path / "runs.db") as store:
+        first = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
+        again = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
+        assert len(store) == 4, "the same runs have the same keys"
+        sweep(todo, jobs=1, store=store)
+        assert len(store) == 8, "runs that measure less are others"
+    pd.testing.assert_frame_equal(first, again)
+    run = simulate(todo[0].scenario, todo[0].controller, 1)
+    summary = run.summary(["waiting_time_s", *OWN])
+    for name in ("departures", "slowness", "slowness_p95", "waiting_time_s_max"):
+        assert first[name][0] == summary[name]
+    assert first["lanes_a_slowness"][0] == summary["lanes"]["a"]["slowness"]
+    assert first["complete_slowness"][0] == summary["complete"]["slowness"]
+    averages = cells(first)
+    for name in ("departures", "slowness", "complete_slowness", "slowness_p95"):
+        assert averages[name][0] == pytest.approx(first[name][:2].mean())
+        assert averages[f"{name}_ci95"].notna().all()
+    (gap,) = differences(first, OWN[1], "dim", "fixed-time").to_dict("records")
+    expected = first["slowness"][:2].mean() - first["slowness"][2:].mean()
+    assert gap["difference"] == pytest.approx(expected)
+
+
+def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
+    def one(run: Run) -> float:
+        return 1.0
+
+    def key(of: Callable[[Run], float]) -> str:
+        return key_of(Recipe(four_way(), Dim(), metrics=(Metric("mine", of),)))
+
+    def power(k: float) -> Callable[[Run], float]:
+        return lambda run: k
+
+    assert key(one) == key(one)
+    assert key(power(1.0)) == key(power(1.0)) != key(power(2.0)), "what it encloses counts"
+    first, second = (
+        lambda run: 1.0,
+        lambda run: 2.0,
+    )
+    assert key(first) != key(second)
+    told = power(1.0)
+    told.version = 2  # type: ignore[attr-defined]
+    assert key(told) != key(power(1.0))
+
+
+def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
+    wrong = Metric("mine", lambda run: "many")
+    todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
+    (error,) = sweep(todo, jobs=1, metrics=[wrong])["error"]
+    assert error == "metric 'mine' must give one finite number or None, got 'many'"
 
 
 # --- experiments -----------------------------------------------------------------------------
