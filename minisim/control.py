@@ -307,7 +307,7 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Unregulated:
-    """Everyone goes, whoever else does: what happens without any rule.
+    """All vehicles go at once: what happens without any rule.
 
     For tests of the host and for teaching; it collides as soon as there is cross traffic.
     """

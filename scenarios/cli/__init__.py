@@ -21,8 +21,8 @@ __all__ = ["COMMANDS", "app", "main"]
 
 #: In the order of the help; the module of that name beside this one adds the command to the app.
 COMMANDS = (
-    "demo", "run", "sweep", "figures", "reproduce", "crossval", "harmony", "decide", "animate",
-    "verify", "protocol",
+    "demo", "run", "controllers", "sweep", "figures", "reproduce", "crossval", "harmony", "decide",
+    "animate", "verify", "protocol",
 )  # fmt: skip
 
 for _command in COMMANDS:
