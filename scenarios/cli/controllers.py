@@ -77,8 +77,9 @@ def _parameters(make: Callable[..., Any]) -> Iterator[dict[str, Any]]:
     for name, given in inspect.signature(make).parameters.items():
         it = declared.get(name)
         kinds: Mapping[str, Callable[..., Any]] = it.kinds if it else {}
-        empty = given.empty
-        hint = "" if given.annotation is empty else str(given.annotation)
+        empty, hint = given.empty, ""
+        if given.annotation is not empty:
+            hint = inspect.formatannotation(given.annotation).strip("'")
         yield {
             "name": name,
             "default": None if given.default is empty else spelled_value(given.default, kinds),
