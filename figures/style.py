@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from minisim.errors import InputError
-from minisim.results.trajectories import replacing
+from minisim.files import replacing
 from scenarios.controllers import VARIANTS
 from scenarios.controllers import Look as Look
 
