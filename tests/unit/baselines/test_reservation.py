@@ -244,7 +244,7 @@ def test_at_low_demand_nobody_is_delayed_and_below_the_all_way_stop_at_350() -> 
 
 
 def test_bad_input() -> None:
-    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}, {"name": None}):
+    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}):
         with pytest.raises(InputError):
             Reservation(**options)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="CruiseVehicle"):
