@@ -1,4 +1,4 @@
-"""What all hosts of a controller share: begin a run, wake and ask the session, report collisions."""
+"""What all hosts share: how a run begins, how a session is woken and asked, how a run stops."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from minisim.results.run import Run, ScenarioLike
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
-#: Commands by what they are for: building a union of types for each check is slow.
+#: Commands by what they address. Building a union of types for each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
@@ -126,7 +126,7 @@ def ask(
 
 
 def counts_of(session: Session) -> dict[str, float]:
-    """What a session has counted; empty where it counts nothing."""
+    """What a session has counted; empty if it counts nothing."""
     return dict(session.counts) if isinstance(session, Counting) else {}
 
 
