@@ -83,8 +83,8 @@ def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float)
     """Krauß's safe speed: the highest at which a leader that brakes at b causes no collision.
 
     A vehicle that keeps it for `headway` and then slows by b·dt a step uses up `gap` and the
-    leader's braking distance. So the gap of equilibrium is v·headway for any step. For dt → 0 this is
-    Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
+    leader's braking distance. So the gap of equilibrium is v·headway for any step. For dt → 0 this
+    is Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
     Source: Krauß 1998, Microscopic Modeling of Traffic Flow, §3.1 (eq. 3.7, leader and follower
     alike); in whole steps of braking as SUMO's `MSCFModel::maximumSafeFollowSpeed` without the
     ballistic rule. `gap` is measured beyond the gap at standstill, as there.

@@ -87,7 +87,7 @@ def _as_given(intersection: Intersection, network: Network) -> Network:
     """The lengths of the intersection, which netconvert's are but for its rounding.
 
     One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance.
-    Positions follow from what vehicles have driven since their insertion, so such errors do not add up.
+    Positions follow from what vehicles have driven since their insertion, so errors do not add up.
 
     Raises:
         SumoError: netconvert draws other lengths.
