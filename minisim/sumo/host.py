@@ -29,6 +29,7 @@ from minisim.errors import (
     choice,
     instance,
 )
+from minisim.files import replacing
 from minisim.hosting import (
     AFTERMATH,
     ON_COLLISION,
@@ -41,7 +42,6 @@ from minisim.hosting import (
     counts_of,
 )
 from minisim.results.run import Run, ScenarioLike
-from minisim.results.trajectories import replacing
 from minisim.sumo.files import (
     CONFIGURATION,
     FCD,

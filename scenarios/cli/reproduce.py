@@ -63,7 +63,7 @@ def reproduce(
 ) -> None:  # fmt: skip
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.report import write_report
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.studies.reproduction import Plan, find_in
     from scenarios.studies.reproduction import reproduce as run_all
     from scenarios.sweep.store import Store
