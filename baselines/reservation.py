@@ -31,7 +31,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from baselines.prediction import NO_LEADER, Floats, Leader, Motion, predict, ways
+from baselines.prediction import NO_LEADER, Floats, Following, Leader, courses, predict
 from minisim.control import (
     Command,
     Go,
@@ -149,8 +149,8 @@ class Manager:
                 "use the profile paper or fair"
             )
         self.slots: dict[int, Slot] = {}
-        self._motion = Motion.of(site)
-        self._ways = ways(site)
+        self._motion = Following.of(site)
+        self._ways = courses(site)
         self._zones: list[dict[int, tuple[float, float]]] = [
             {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
             for row in conflict_zones(site).tolist()
