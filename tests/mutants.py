@@ -93,8 +93,8 @@ class Collected(PytestRunner):
         tests = _affordable(tests)
         if mutant_name is None:
             return super().run_tests(mutant_name=None, tests=tests)
-        found = {item.nodeid: item for item in self.session.items}
-        items = [found[test] for test in tests]
+        by_name = {item.nodeid: item for item in self.session.items}
+        items = [by_name[test] for test in tests]
         signal.signal(signal.SIGPROF, lambda *_: os._exit(HANGS))
         with change_cwd("mutants"):
             for item, following in zip(items, [*items[1:], None], strict=True):

@@ -147,20 +147,20 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
         rest = subset & (subset - 1)
         lowest = (subset ^ rest).bit_length() - 1
         clique[subset] = clique[rest] and rest & ~friends[lowest] == 0
-    found = [
+    maximal = [
         subset
         for subset in range(1, 1 << k)
         if clique[subset]
         and not any(clique[subset | 1 << j] for j in range(k) if not subset >> j & 1)
     ]
-    most = max((subset.bit_count() for subset in found), default=0)
+    most = max((subset.bit_count() for subset in maximal), default=0)
 
     def lanes(subset: int) -> Lanes:
         return sum(1 << m.origin for j, m in enumerate(movements) if subset >> j & 1)
 
     return Cliques(
-        tuple(map(lanes, found)),
-        tuple(lanes(subset) for subset in found if subset.bit_count() == most),
+        tuple(map(lanes, maximal)),
+        tuple(lanes(subset) for subset in maximal if subset.bit_count() == most),
     )
 
 
