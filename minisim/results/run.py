@@ -1,4 +1,4 @@
-"""`Run`, the result of a run, whoever hosted it."""
+"""`Run`, the result of a run on any host."""
 
 from __future__ import annotations
 
