@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from dim import Explanation, HarmonyMatrix
-    from figures.gallery import Item
+    from figures.studies.shared.section import Item
     from scenarios.sweep.experiment import Experiment
 
 #: Metric of a summary -> heading.
