@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from matplotlib.figure import Figure
@@ -165,16 +166,15 @@ def lane_table(archive: Archive) -> Table:
 
 
 def _items() -> Iterator[Item]:
-    for measure in MEASURES:
-        word = measure.name
-        for split in SPLITS:
-            yield Item(
-                f"{word}-{split.replace(':', '')}",
-                f"mean {word} time over demand, inflow {split}, 4 arms",
-                partial(split_figure, measure=measure, split=split), BOTH,
-            )  # fmt: skip
+    for split, measure in product(SPLITS, MEASURES):
         yield Item(
-            f"{word}-arms", f"mean {word} time under DIM on 3, 4 and 5 arms",
+            f"{measure.name}-{split.replace(':', '')}",
+            f"mean {measure.name} time over demand, inflow {split}, 4 arms",
+            partial(split_figure, measure=measure, split=split), BOTH,
+        )  # fmt: skip
+    for measure in MEASURES:
+        yield Item(
+            f"{measure.name}-arms", f"mean {measure.name} time under DIM on 3, 4 and 5 arms",
             partial(arms_figure, measure=measure), BOTH,
         )  # fmt: skip
     yield Item("lanes", "waiting time by lane at 350 veh/h/lane", lane_table, BOTH)

@@ -68,7 +68,7 @@ def sweep(
             metavar="FILE.toml|paper|STUDY", show_default=False,
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            f"study of minisim reproduce: {', '.join(STUDIES[1:])}.",
+            f"study of minisim reproduce: {', '.join(STUDIES)}.",
         ),
     ],
     out: Annotated[

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Every study, in the order in which they are run and reported.
 NAMES = (
-    "text", "as-run", "fair", "gate", "fairness", "humans", "perception", "confidence", "capacity",
+    "text", "as-run", "fair", "gate", "capacity", "fairness", "humans", "perception", "confidence",
 )  # fmt: skip
 
 #: Those that choose experiments by the results of others, and so have no list of them.
