@@ -131,17 +131,17 @@ def _report(
 
 
 def _made_table(made: Sequence[Made]) -> Table:
-    rows = [
-        (part.name, study_named(part.name).question, f"{part.runs}", f"{part.hours:.1f}",
-         f"{part.computed}", f"{part.wall_s:.0f}", f"{part.cpu_s:.0f}", f"{len(part.failed)}")
+    digits = (0, 1, 0, 0, 0, 0)
+    counts = [
+        (part.runs, part.hours, part.computed, part.wall_s, part.cpu_s, len(part.failed))
         for part in made
-    ]  # fmt: skip
-    rows.append((
-        "all", "", f"{sum(p.runs for p in made)}", f"{sum(p.hours for p in made):.1f}",
-        f"{sum(p.computed for p in made)}", f"{sum(p.wall_s for p in made):.0f}",
-        f"{sum(p.cpu_s for p in made):.0f}",
-        f"{sum(len(p.failed) for p in made)}",
-    ))  # fmt: skip
+    ]
+    names = [(part.name, study_named(part.name).question) for part in made]
+    totals = tuple(map(sum, zip(*counts, strict=True)))
+    rows = [
+        (*words, *(f"{value:.{places}f}" for value, places in zip(values, digits, strict=False)))
+        for words, values in zip([*names, ("all", "")], [*counts, totals], strict=True)
+    ]
     return Table(
         "Studies; what the store had already was not computed again",
         ("study", "question", "runs", "simulated h", "computed now", "wall [s]", "CPU [s]",

@@ -5,16 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from dim.senses.noise import CLASSIFIER
-from figures import style
-from figures.studies.shared import plots
-from figures.studies.shared.outcomes import (
-    KIND_LOOKS,
-    NOTE,
-    OUTCOMES,
-    draw_outcome,
-    outcome_axes,
-    select,
-)
+from figures.studies.shared import outcomes, plots
 from figures.studies.shared.section import Item, Section
 from scenarios.studies.confidence import THRESHOLDS
 from scenarios.studies.shared.archive import Archive, missing_note
@@ -29,18 +20,22 @@ def confidence_figure(archive: Archive) -> Figure:
     """
     (results,) = archive.need("confidence")
     rows = with_total_delay(results.good)
-    figure = style.new_figure(11.5, 4.6)
-    figure.subplots_adjust(left=0.062, right=0.988, top=0.735, bottom=0.155, wspace=0.22)
-    for axes, outcome in zip(figure.subplots(1, len(OUTCOMES)), OUTCOMES, strict=True):
-        for kind, look in KIND_LOOKS.items():
-            cells = [select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS]
-            draw_outcome(axes, range(len(THRESHOLDS)), cells, outcome, look)
+    figure, panels = plots.panels(
+        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.735,
+        bottom=0.155, wspace=0.22,
+    )  # fmt: skip
+    for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
+        for kind, look in outcomes.KIND_LOOKS.items():
+            cells = [
+                outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
+            ]
+            outcomes.draw(axes, range(len(THRESHOLDS)), cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
-        outcome_axes(axes, outcome, outcome, "least confidence that is believed", ticks)
+        outcomes.dress(axes, outcome, outcome, "least confidence that is believed", ticks)
     plots.heading(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents "
                           "misread by all alike, lasting")  # fmt: skip
-    plots.looks_legend(figure, KIND_LOOKS.values(), 0.012, 0.93, 3)
-    plots.footnote(figure, f"{NOTE}  {missing_note([results])}")
+    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.012, 0.93, 3)
+    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note([results])}")
     return figure
 
 

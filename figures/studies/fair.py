@@ -27,9 +27,9 @@ def fair_figure(archive: Archive) -> Figure:
     """
     (results,) = archive.need("fair")
     rows = with_total_delay(results.good)
-    figure = style.new_figure(11.5, 5.4)
-    panels = figure.subplots(1, len(MEASURES), sharey=True)
-    figure.subplots_adjust(left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06)
+    figure, panels = plots.panels(
+        11.5, 5.4, len(MEASURES), left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06
+    )
     for axes, (measure, column) in zip(panels, MEASURES.items(), strict=True):
         plots.draw_means(axes, rows, column, RIVALS)
         style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
@@ -65,9 +65,9 @@ def needed_losses(archive: Archive) -> tuple[Results, Mapping[tuple[str, str, st
 def crossing_figure(archive: Archive) -> Figure:
     """Demand from which on DIM loses to each rival, with both gates; see `needed_losses`."""
     results, known = needed_losses(archive)
-    figure = style.new_figure(11.0, 4.7)
-    panels = figure.subplots(1, len(MEASURES), sharey=True)
-    figure.subplots_adjust(left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06)
+    figure, panels = plots.panels(
+        11.0, 4.7, len(MEASURES), left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06
+    )
     for axes, measure in zip(panels, MEASURES, strict=True):
         for place, rival in enumerate(OTHERS):
             for gate, aside in zip(GATES, (-0.16, 0.16), strict=True):

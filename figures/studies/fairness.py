@@ -29,9 +29,9 @@ def fairness_figure(archive: Archive) -> Figure:
     """
     (results,) = archive.need("fairness")
     rows = lane_waits(results.good, 4)
-    figure = style.new_figure(11.0, 4.7)
-    by_lane, worst, spread = figure.subplots(1, 3)
-    figure.subplots_adjust(left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22)
+    figure, (by_lane, worst, spread) = plots.panels(
+        11.0, 4.7, 3, sharey=False, left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22
+    )
     compared = min(set(rows["density"]), key=lambda density: abs(density - LANE_DENSITY))
     _draw_lanes(by_lane, rows[rows["density"] == compared])
     style.plot_axes(by_lane, f"By lane, {compared:g} veh/h/lane", "lane", "mean waiting [s]")

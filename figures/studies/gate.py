@@ -19,9 +19,9 @@ def gate_figure(archive: Archive) -> Figure:
         MissingRunsError: nothing was run.
     """
     (results,) = archive.need("gate")
-    figure = style.new_figure(11.0, 4.7)
-    panels = figure.subplots(1, 3, sharey=True)
-    figure.subplots_adjust(left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.06)
+    figure, panels = plots.panels(
+        11.0, 4.7, 3, left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.06
+    )
     for axes, arms in zip(panels, (3, 4, 5), strict=True):
         rows = results.good[results.good["arms"] == arms]
         plots.draw_means(axes, rows, MEASURES["waiting time"], GATES)

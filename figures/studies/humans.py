@@ -48,10 +48,10 @@ def human_figure(archive: Archive) -> Figure:
     """
     (results,) = archive.need("humans")
     rows = results.good
-    figure = style.new_figure(11.0, 4.9)
     run = [density for density in DENSITIES if (rows["density"] == density).any()]
-    panels = figure.subplots(1, len(run), sharey=True, squeeze=False)[0]
-    figure.subplots_adjust(left=0.062, right=0.985, top=0.735, bottom=0.145, wspace=0.06)
+    figure, panels = plots.panels(
+        11.0, 4.9, len(run), left=0.062, right=0.985, top=0.735, bottom=0.145, wspace=0.06
+    )
     stop = style.look(STOP)._replace(label="all-way stop (mean)", marker="")
     for axes, density in zip(panels, run, strict=True):
         chosen = rows[rows["density"] == density]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from itertools import product
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -12,28 +13,13 @@ from matplotlib.figure import Figure
 from dim.senses.intent import KINDS, RATES
 from dim.senses.noise import CLASSIFIER
 from figures import style
-from figures.studies.shared import plots
-from figures.studies.shared.outcomes import (
-    KIND_LOOKS,
-    NOTE,
-    OUTCOMES,
-    draw_outcome,
-    outcome_axes,
-    select,
-)
+from figures.studies.shared import outcomes, plots
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.statistics import mean_interval
 from scenarios.studies.shared.archive import Archive, missing_note
 from scenarios.studies.shared.delay import TOTAL_DELAY, with_total_delay
-from scenarios.studies.shared.intent_errors import (
-    CROSSINGS,
-    DENSITY,
-    MANNERS,
-    MISREADERS,
-    Rate,
-    rate_of,
-)
+from scenarios.studies.shared.intent_errors import CROSSINGS, DENSITY, MANNERS, MISREADERS, rate_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,36 +46,35 @@ def perception_figure(archive: Archive, series: str) -> Figure:
         MissingRunsError: nothing was run.
     """
     (results,) = archive.need("perception")
-    rows = select(with_total_delay(results.good), series=series)
-    figure = style.new_figure(11.5, 7.4)
-    panels = figure.subplots(len(KINDS), len(OUTCOMES), squeeze=False)
-    figure.subplots_adjust(
-        left=0.062, right=0.988, top=0.815, bottom=0.095, wspace=0.22, hspace=0.42
-    )
+    rows = outcomes.select(with_total_delay(results.good), series=series)
+    parts = list(product(KINDS, outcomes.OUTCOMES.items()))
+    figure, panels = plots.panels(
+        11.5, 7.4, len(parts), rows=len(KINDS), sharey=False, left=0.062, right=0.988, top=0.815,
+        bottom=0.095, wspace=0.22, hspace=0.42,
+    )  # fmt: skip
     silent = rows[rows["unsignalled"].astype(bool)]
     signalled = rows[~rows["unsignalled"].astype(bool)]
-    exact = select(signalled, rate=0.0)
-    for kind, row in zip(KINDS, panels, strict=True):
-        for axes, (outcome, estimate) in zip(row, OUTCOMES.items(), strict=True):
-            for place, (manner, look) in enumerate(LOOKS.items()):
-                line = select(signalled, kind=kind, shared=manner[0], persistent=manner[1])
-                cells = [exact, *(select(line, rate=rate) for rate in RATES[1:])]
-                # Side by side, so that bars do not cover each other; rates are far from even.
-                places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
-                draw_outcome(axes, places, cells, outcome, look)
-            level = None if kind != "missed" or silent.empty else estimate(silent)
-            if level is not None:
-                axes.axhline(level.value, color=SILENT.colour, linestyle=SILENT.dashes,
-                             linewidth=1.4)  # fmt: skip
-            outcome_axes(axes, outcome, f"{outcome}, {KIND_LOOKS[kind].label}",
-                         "probability of an error", [f"{rate:g}" for rate in RATES])  # fmt: skip
+    exact = outcomes.select(signalled, rate=0.0)
+    for axes, (kind, (outcome, estimate)) in zip(panels, parts, strict=True):
+        for place, (manner, look) in enumerate(LOOKS.items()):
+            line = outcomes.select(signalled, kind=kind, shared=manner[0], persistent=manner[1])
+            cells = [exact, *(outcomes.select(line, rate=rate) for rate in RATES[1:])]
+            # Side by side, so that bars do not cover each other; rates are far from even.
+            places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
+            outcomes.draw(axes, places, cells, outcome, look)
+        level = None if kind != "missed" or silent.empty else estimate(silent)
+        if level is not None:
+            axes.axhline(level.value, color=SILENT.colour, linestyle=SILENT.dashes,
+                         linewidth=1.4)  # fmt: skip
+        outcomes.dress(axes, outcome, f"{outcome}, {outcomes.KIND_LOOKS[kind].label}",
+                     "probability of an error", [f"{rate:g}" for rate in RATES])  # fmt: skip
     label = style.look(series).label
     plots.heading(
         figure, f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
     )
     plots.looks_legend(figure, [*LOOKS.values(), SILENT], 0.012, 0.93, 3)
     note = missing_note([results], lambda point: point.series == series)
-    plots.footnote(figure, f"{NOTE}  {note}")
+    plots.footnote(figure, f"{outcomes.NOTE}  {note}")
     return figure
 
 
@@ -101,7 +86,7 @@ def perception_table(archive: Archive) -> Table:
     keys = ["series", "rate", "unsignalled", "kind", "shared", "persistent"]
     listed = []
     for (series, rate, silent, kind, shared, persistent), cell in chosen.groupby(keys, sort=False):
-        error = "exact" if rate == 0.0 else KIND_LOOKS[str(kind)].label
+        error = "exact" if rate == 0.0 else outcomes.KIND_LOOKS[str(kind)].label
         manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
         listed.append(
             (str(series), "turns without signal" if silent else error, manner, *_outcomes(cell))
@@ -112,7 +97,7 @@ def perception_table(archive: Archive) -> Table:
         ("controller", "error", "who", "crossings", f"collisions / {CROSSINGS:,} crossings",
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
-        tuple(listed), labels=3, notes=(f"{NOTE}  {missing_note([results])}",),
+        tuple(listed), labels=3, notes=(f"{outcomes.NOTE}  {missing_note([results])}",),
     )  # fmt: skip
 
 
@@ -126,13 +111,14 @@ def _outcomes(cell: pd.DataFrame) -> tuple[str, ...]:
     unfinished = 100.0 * float(cell["unfinished"].sum()) / float(cell["trips"].sum())
     return (
         f"{collisions.crossings:,}" if collisions else "0",
-        _count(collisions), _count(rate_of(cell, "false_grants")),
+        _count(cell, "collisions"), _count(cell, "false_grants"),
         f"{disagreement:.1f}", f"{deadlock:.1f}", f"{unfinished:.1f}",
         str(mean_interval(cell[TOTAL_DELAY].astype(float).tolist())),
     )  # fmt: skip
 
 
-def _count(rate: Rate | None) -> str:
+def _count(rows: pd.DataFrame, events: str) -> str:
+    rate = rate_of(rows, events)
     return f"{rate.rate:.0f} ({rate.low:.0f} … {rate.high:.0f})" if rate else "–"
 
 

@@ -110,9 +110,9 @@ def _grid_figure(
         wanted: whether a point belongs to the figure.
     """
     both = archive.need(*BOTH)
-    figure = style.new_figure(9.2, 4.9)
-    panels = figure.subplots(1, 2, sharey=True)
-    figure.subplots_adjust(left=0.07, right=0.988, top=0.735, bottom=0.15, wspace=0.07)
+    figure, panels = plots.panels(
+        9.2, 4.9, len(BOTH), left=0.07, right=0.988, top=0.735, bottom=0.15, wspace=0.07
+    )
     table = published()
     theirs = chosen(table[(table["metric"] == measure.column) & (table["lane"] == "all")])
     for axes, results in zip(panels, both, strict=True):

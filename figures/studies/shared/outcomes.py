@@ -55,7 +55,7 @@ def select(rows: pd.DataFrame, **wanted: object) -> pd.DataFrame:
     return rows
 
 
-def draw_outcome(
+def draw(
     axes: Axes, places: Iterable[float], cells: Iterable[pd.DataFrame], outcome: str,
     look: style.Look,
 ) -> None:  # fmt: skip
@@ -69,7 +69,7 @@ def draw_outcome(
         plots.draw_line(axes, [x for x, _ in drawn], [estimate for _, estimate in drawn], look)
 
 
-def outcome_axes(axes: Axes, outcome: str, title: str, xlabel: str, ticks: Sequence[str]) -> None:
+def dress(axes: Axes, outcome: str, title: str, xlabel: str, ticks: Sequence[str]) -> None:
     """Frame and scales of a panel of `OUTCOMES`."""
     counted = outcome != "Mean delay"
     style.plot_axes(axes, title, xlabel, "")

@@ -187,6 +187,16 @@ def scale_words(linear: float | None) -> str:
     return "logarithmic" if linear is None else f"log., linear below {linear:g}"
 
 
+def panels(
+    width: float, height: float, count: int, *, rows: int = 1, sharey: bool = True, **edges: float
+) -> tuple[Figure, list[Axes]]:
+    """A figure of inches with panels in rows; `edges` as of `Figure.subplots_adjust`."""
+    figure = style.new_figure(width, height)
+    drawn = figure.subplots(rows, count // rows, sharey=sharey, squeeze=False)
+    figure.subplots_adjust(**edges)
+    return figure, list(drawn.flat)
+
+
 def heading(figure: Figure, text: str) -> None:
     """The title of a figure, above its legends."""
     figure.text(0.012, 0.965, text, fontsize=13, fontweight="bold", color=style.INK, va="center")
