@@ -13,7 +13,7 @@ from figures.gallery import GALLERY, SECTIONS, STUDIES, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
 from minisim.errors import FileError
-from minisim.results.trajectories import replacing
+from minisim.files import write_text
 from minisim.version import __version__
 from scenarios.studies import NAMES, study_named
 from scenarios.studies.cells import saturated, too_short
@@ -76,8 +76,7 @@ def write_report(
     except ValueError as error:
         raise FileError(f"{pictures} is not inside {folder}") from error
     text = "\n\n".join(_report(archive, made, jobs, drawn, missing, inside, parts))
-    with replacing(folder / "report.md") as part:
-        part.write_text(text.rstrip() + "\n", encoding="utf-8")
+    write_text(folder / "report.md", text.rstrip() + "\n")
     return len(drawn)
 
 

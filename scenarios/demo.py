@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +11,7 @@ from rich import box
 from rich.table import Table
 
 from minisim.errors import InputError, MinisimError, integer, number, numbers
-from minisim.results.trajectories import replacing
+from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
@@ -168,20 +167,9 @@ def demo_table(points: pd.DataFrame) -> Table:
 
 def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
     """Write demo.csv and demo.md, each whole or not at all; raises `FileError`."""
-    buffer = io.StringIO()
-    points.round(6).to_csv(buffer, index=False, lineterminator="\n")
-    headings = _headings()
-    lines = [
-        f"{demo_title(tour)}. minisim {__version__}.",
-        "",
-        f"| {' | '.join(headings)} |",
-        f"|{'|'.join('---' if k == 1 else '---:' for k in range(len(headings)))}|",
-        *(f"| {' | '.join(row)} |" for row in _cells(points)),
-        "",
-    ]
-    for name, text in (("demo.csv", buffer.getvalue()), ("demo.md", "\n".join(lines))):
-        with replacing(folder / name) as part:
-            part.write_text(text, encoding="utf-8")
+    write_table(points, folder / "demo.csv")
+    table = markdown_table(_headings(), _cells(points), words=(1,))
+    write_text(folder / "demo.md", f"{demo_title(tour)}. minisim {__version__}.\n\n{table}\n")
 
 
 def _headings() -> list[str]:

@@ -24,9 +24,9 @@ from figures.film.encode import animation_format, palette_of, write_gif, write_h
 from figures.film.frames import Film
 from figures.junction import drawing
 from minisim.errors import number
+from minisim.files import replacing
 from minisim.junction.geometry import Floats, Intersection
 from minisim.results.run import Run
-from minisim.results.trajectories import replacing
 
 #: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.
 WIDTH, HEIGHT, DPI = 7.2, 8.8, 100

@@ -28,6 +28,7 @@ from minisim.errors import (
     choice,
     instance,
 )
+from minisim.files import replacing
 from minisim.hosting import (
     AFTERMATH,
     ON_COLLISION,
@@ -40,7 +41,6 @@ from minisim.hosting import (
     counts_of,
 )
 from minisim.results.run import Run, ScenarioLike
-from minisim.results.trajectories import replacing
 from minisim.sumo.files import (
     CONFIGURATION,
     FCD,

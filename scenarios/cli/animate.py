@@ -58,7 +58,7 @@ def animate(
     """Write an animation: who waits, who has the right of way, who crosses."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
-    from scenarios.cli.shared.files import check_apart, check_file
+    from minisim.files import check_apart, check_file
     from scenarios.controllers import controller_named
     from scenarios.mixing import with_humans
     from scenarios.scenario import profile_named

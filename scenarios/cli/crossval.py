@@ -127,8 +127,8 @@ def crossval(
     ] = False,
 ) -> None:  # fmt: skip
     """Compare minisim, SUMO and the paper on common arrivals, trip by trip."""
+    from minisim.files import make_folder
     from minisim.sumo.host import sumo_home
-    from scenarios.cli.shared.files import make_folder
 
     wanted = Wanted(
         scenarios or [], controller or [], density or [], split or [], profile, seeds, horizon,

@@ -38,7 +38,7 @@ def demo(
     ] = False,
 ) -> None:
     """The tour: DIM beside a fixed-time signal, in under a minute."""
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.demo import Tour, demo_table, demo_title, run_tour, write_tables
 
     runs = (2 if quick else 5) if seeds is None else integer("--seeds", seeds, low=2, high=1000)

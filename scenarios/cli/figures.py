@@ -48,7 +48,7 @@ def figures(
 ) -> None:  # fmt: skip
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.cli.shared.report import gallery_table
     from scenarios.studies.shared.archive import Archive, MissingRunsError, find_in
     from scenarios.studies.shared.effort import Effort

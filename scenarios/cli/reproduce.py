@@ -63,7 +63,7 @@ def reproduce(
 ) -> None:  # fmt: skip
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.reproduction_report import write_report
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.studies.shared.archive import Archive, find_in
     from scenarios.studies.shared.effort import Effort
     from scenarios.studies.shared.reproduction import reproduce as make

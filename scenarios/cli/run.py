@@ -111,9 +111,9 @@ def run(
 ) -> None:
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from dim import NoisyPerception
+    from minisim.files import check_apart, check_file, check_table
     from minisim.results.safety import safety_summary
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
-    from scenarios.cli.shared.files import check_apart, check_fcd, check_table
     from scenarios.controllers import controller_named
     from scenarios.misreading import counted, with_perception
     from scenarios.mixing import driver_means, with_humans
@@ -127,7 +127,7 @@ def run(
             check_table(table)
     for xml in (fcd, sumo_fcd):
         if xml is not None:
-            check_fcd(xml)
+            check_file(xml, ".xml")
     what = build_scenario(
         scenario, bearings, arrivals, density, split, turns,
         profile=profile, side=side, horizon=horizon,

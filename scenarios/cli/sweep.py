@@ -108,8 +108,7 @@ def sweep(
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.arrivals import MAX_TIME
-    from minisim.results.trajectories import write_table
-    from scenarios.cli.shared.files import check_apart, check_table
+    from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.studies.cells import cells
     from scenarios.sweep.store import Store

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from minisim.errors import FileError
-from minisim.results.trajectories import replacing
+from minisim.files import replacing
 from minisim.results.trips import Trips
 from scenarios.crossval.cases import Case
 from scenarios.sweep.experiment import Experiment, key_of, results_version

@@ -42,7 +42,7 @@ def start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
 
 
 def worker(address: str) -> subprocess.Popen[bytes]:
-    """A worker of one thread; without a nanny, so that who is killed stays dead."""
+    """A worker of one thread; without a nanny, so that a killed one stays dead."""
     return start(
         "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
         "--memory-limit", "0",

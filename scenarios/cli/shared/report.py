@@ -9,13 +9,11 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.junction.geometry import ARM_NAMES
 from scenarios.statistics import FILLING
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dim import Explanation, HarmonyMatrix
     from figures.studies.shared.section import Item
     from scenarios.sweep.experiment import Experiment
 
@@ -78,42 +76,6 @@ def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
             f"disagreement {counts['disagreement_s']:.1f} s   "
             f"deadlock {counts['deadlock_s']:.1f} s"
         )
-
-
-def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column a lane: ● harmony, · conflict."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("")
-    manoeuvres = range(1, matrix.n)
-    for lane in ARM_NAMES[: matrix.n]:
-        table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, values in zip(matrix.movements, matrix.values, strict=True):
-        cells = [Text(str(movement), style="bold")]
-        for first in range(0, len(values), matrix.n - 1):
-            part = values[first:].tolist()
-            cells.append(Text("").join(map(_mark, part, manoeuvres)))
-        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
-    return table
-
-
-def decision_text(explanation: Explanation) -> Text:
-    """The graph, its cliques, who goes and why."""
-    text = Text()
-    edges = "  ".join(f"{a}–{b}" for a, b in explanation.edges) or "none"
-    text.append("vehicles         ", "dim").append(_names(explanation.participants) + "\n")
-    text.append("in harmony       ", "dim").append(edges + "\n")
-    tied = len(explanation.tied) > 1
-    for k, clique in enumerate(explanation.cliques):
-        text.append("maximal cliques  " if k == 0 else " " * 17, "dim")
-        text.append(f"{{{_names(clique)}}}", "bold" if k == 0 else "")
-        if tied and clique in explanation.tied:
-            text.append("  tied", "yellow")
-        if k == 0:
-            text.append("  ← right of way", "green")
-        text.append("\n")
-    text.append("right of way     ", "dim").append(_names(explanation.right_of_way), "bold green")
-    text.append("\nwhy              ", "dim").append(explanation.reason)
-    return text
 
 
 def gallery_table(items: Iterable[Item]) -> Table:
@@ -224,15 +186,6 @@ def _counts(means: Mapping[str, Any]) -> tuple[str, str]:
 
 def _means(means: Mapping[str, Any]) -> list[str]:
     return [_seconds(means[key]) for key in HEADINGS]
-
-
-def _names(movements: tuple[Any, ...]) -> str:
-    return " ".join(map(str, movements))
-
-
-def _mark(harmony: bool, manoeuvre: int) -> Text:
-    width = len(str(manoeuvre)) + 2
-    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")
 
 
 def _seconds(value: float | None, unit: str = "") -> str:

@@ -22,7 +22,7 @@ from minisim.errors import InputError
 from minisim.results.trips import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
-from scenarios.cli.shared.report import harmony_table
+from scenarios.cli.shared.proof import harmony_table
 from scenarios.cli.shared.terminal import show
 from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.demo import Tour
@@ -511,17 +511,17 @@ def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    found = json.loads(ok(capsys, "verify", "three-way", "--json"))
-    assert (found["arms"], found["cases"], found["most_cliques_tied"]) == (3, 26, 3)
-    assert all(claim["holds"] for claim in found["claims"])
-    assert found["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
-    assert found["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
+    printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
+    assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
+    assert all(claim["holds"] for claim in printed["claims"])
+    assert printed["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
+    assert printed["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
 
 
 def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    (false,) = [claim for claim in found["claims"] if not claim["holds"]]
+    printed = json.loads(capsys.readouterr().out)
+    (false,) = [claim for claim in printed["claims"] if not claim["holds"]]
     assert (false["name"], false["failures"]) == ("largest", 1)
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
 
@@ -544,10 +544,10 @@ def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     rules = ("--order", "lanes", "--priorities", "waiting")
-    found = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
-    assert found["all_states"] is True
-    assert (found["unsafe"], found["stuck"]) == ([], None)
-    assert found["starving"] == {"a": None, "b": None, "c": None}
+    printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
+    assert printed["all_states"] is True
+    assert (printed["unsafe"], printed["stuck"]) == ([], None)
+    assert printed["starving"] == {"a": None, "b": None, "c": None}
 
 
 def test_protocol_writes_a_counterexample_that_collides(

@@ -58,7 +58,7 @@ def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
 
 
 def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
-    """Whose process dies is tried alone; what dies every time is lost, and nothing else."""
+    """A task whose process dies is tried again alone; only one that dies every time is lost."""
     once = {k: str(tmp_path / "killed") if k == 1 else "" for k in range(3)}
     answers = dict(pooled(killing, once, 2, pool_of=processes))
     assert answers == {0: 7, 1: 7, 2: 7}
