@@ -25,7 +25,7 @@ GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
 
 def example() -> str:
-    (block,) = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
+    block, *_ = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     return str(block)
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,7 @@ from figures.junction.tables import harmony_table, webster_table
 from figures.studies.shared import plots
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
+from scenarios import studies
 from scenarios.paper import SERIES, Cell, reference_value
 from scenarios.studies import NAMES, study_named
 from scenarios.studies.cells import saturated
@@ -30,6 +34,7 @@ from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import Made
 from scenarios.sweep.experiment import Experiment
+from tests import ROOT
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
 SEARCH = Search(step=20.0, steps=64, seeds=2)
@@ -70,6 +75,21 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
     needed = {need for item in GALLERY.values() for need in item.needs}
     assert needed == set(NAMES)
+
+
+def test_the_study_of_the_guide_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    for room in ("scenarios", "figures"):
+        name = f"{room}.studies.signals"
+        head = f'"""{name.replace(".", "/")}.py"""'
+        (block,) = re.findall(rf"```python\n({head}\n.*?)```", guide, re.DOTALL)
+        module = ModuleType(name)
+        monkeypatch.setitem(sys.modules, name, module)
+        exec(block, module.__dict__)
+    monkeypatch.setattr(studies, "NAMES", (*NAMES, "signals"))
+    (item,) = module.SECTION.items
+    figure = item.build(Archive(synthetic_find, EFFORT))
+    assert [len(axes.get_legend_handles_labels()[0]) for axes in figure.axes] == [2, 2, 2]
 
 
 def test_unknown_figure_names_the_nearest() -> None:
