@@ -54,7 +54,7 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
         drawable = [result for result in ordered if any(len(ours) for ours, _ in _both(result))]
-        if drawable:  # in a short run nobody may have arrived
+        if drawable:  # in a short run it may be that no vehicle has arrived
             yield _file("trips", *group), f"{title}: every trip", trips_figure(drawable)
     for result in results:
         if result.film is not None and result.film.parting is not None:
@@ -186,9 +186,9 @@ def _distributions(axes: Axes, result: Result, metric: str) -> None:
         "minisim": np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
         "SUMO": np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
     }
-    for host, found in values.items():
+    for host, seconds in values.items():
         colour, _, dashes = LOOKS[host]
-        ordered = np.sort(found)
+        ordered = np.sort(seconds)
         shares = np.arange(1, len(ordered) + 1) / len(ordered)
         axes.step(
             ordered, shares, where="post", color=colour, linestyle=dashes, linewidth=1.6, label=host
@@ -229,7 +229,7 @@ def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
-    """Write who it is, and what it wants, beside the start of its line."""
+    """Write the vehicle and its movement beside the start of its line."""
     first = trip.iloc[0]
     axes.text(
         first[TIME] - 0.25, first[S] - entry + 2.0,

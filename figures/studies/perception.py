@@ -94,7 +94,7 @@ def perception_table(archive: Archive) -> Table:
     return Table(
         f"What misread intents do, {CLASSIFIER:.0%} of them misread, on four arms, {DENSITY:g} "
         "veh/h/lane",
-        ("controller", "error", "who", "crossings", f"collisions / {CROSSINGS:,} crossings",
+        ("controller", "error", "manner", "crossings", f"collisions / {CROSSINGS:,} crossings",
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
         tuple(listed), labels=3, notes=(f"{outcomes.NOTE}  {missing_note([results])}",),

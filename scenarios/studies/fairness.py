@@ -21,7 +21,7 @@ PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
 
 STUDY = Study(
     "fairness",
-    "Who waits under which rule of priority?",
+    "Which lanes wait under which rule of priority?",
     fair_grid(PRIORITIES, (4,), DENSITIES),
 )
 
