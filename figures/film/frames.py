@@ -57,7 +57,7 @@ class Frames:
         self.bounds = np.append(first, len(ticks))
         gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
-        # A vehicle that was clear of the junction before the first frame was not served in this film.
+        # A vehicle that was clear before the first frame was not served in this film.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
         counts = np.diff(self.bounds)
         self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)

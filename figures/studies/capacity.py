@@ -9,8 +9,7 @@ from types import MappingProxyType
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.studies.capacity import STUDY, Capacity, capacities

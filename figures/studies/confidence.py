@@ -5,7 +5,8 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from dim.senses.noise import CLASSIFIER
-from figures.studies.shared import outcomes, plots
+from figures import plots
+from figures.studies.shared import outcomes
 from figures.studies.shared.section import Item, Section
 from scenarios.studies.confidence import THRESHOLDS
 from scenarios.studies.shared.archive import Archive, missing_note

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.studies.fair import GATES, OTHERS, RIVALS, losses

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from minisim.junction.geometry import ARM_NAMES
 from scenarios.studies.fairness import LANE_WAIT, PRIORITIES, lane_waits

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from scenarios.studies.fair import GATES
 from scenarios.studies.shared.archive import Archive, missing_note

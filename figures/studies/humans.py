@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from scenarios.studies.cells import saturated
 from scenarios.studies.fair import GATES

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from dim.senses.intent import KINDS, RATES
 from dim.senses.noise import CLASSIFIER
-from figures import style
-from figures.studies.shared import outcomes, plots
+from figures import plots, style
+from figures.studies.shared import outcomes
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.statistics import mean_interval

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from matplotlib.figure import Figure
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from figures.studies.shared.paper_values import (
     EXPLAINED,
     HEADINGS,

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from figures import style
-from figures.studies.shared import plots
+from figures import plots, style
 from scenarios.studies.shared.delay import TOTAL_DELAY
 from scenarios.studies.shared.intent_errors import CROSSINGS, rate_of
 

@@ -18,11 +18,10 @@ from matplotlib.lines import Line2D
 
 from baselines import webster
 from dim import HarmonyMatrix
+from figures import plots, style
 from figures import reproduction_report as report
-from figures import style
 from figures.gallery import GALLERY, SECTIONS, item_named, write
 from figures.junction.tables import harmony_table, webster_table
-from figures.studies.shared import plots
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
 from scenarios import studies

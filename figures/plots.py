@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib.axes import Axes
@@ -28,6 +29,12 @@ APART = 0.0075
 DENSITY_LABEL = "demand [veh/h/lane]"
 #: Of small print [pt].
 FOOTNOTE_SIZE = 7.5
+
+
+#: A line with few points, see `draw_line`.
+BOLD: Mapping[str, Any] = MappingProxyType(
+    {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
+)
 
 
 class Estimate(NamedTuple):
