@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
-from minisim.errors import instance, number
 from minisim.junction.clearing import clearing_distances
+from minisim.parameters import declared, real, spelled
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
 STANDING = 0.1
@@ -24,7 +23,7 @@ LINE = 1.0
 SIGHT_MARGIN = 0.5
 
 
-@dataclass(frozen=True)
+@declared
 class AllWayStop:
     """A junction where every vehicle stops, and who stopped first goes first.
 
@@ -34,19 +33,18 @@ class AllWayStop:
     conflict go together, and may overtake in the queue; but nobody is passed over for ever, since
     whoever waits keeps every later conflicting vehicle back.
 
-    Attributes:
-        reaction: how long a driver stands before it goes [s]: SUMO's `jmAllwayStopWait`, whose
-            default is a single step. 1 s is the reaction time in SUMO's safety measures
-            (device SSM, MDRAC).
-        name: short name.
     """
 
-    reaction: float = 1.0
-    name: str = "all-way-stop"
+    # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
+    # safety measures (device SSM, MDRAC).
+    reaction: float = real(
+        "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
+    )
 
-    def __post_init__(self) -> None:
-        number("reaction [s]", self.reaction, low=0, high=60)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `all-way-stop:reaction=0`."""
+        return spelled("all-way-stop", self)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""

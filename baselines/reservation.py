@@ -44,9 +44,10 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.zones import conflict_zones
-from minisim.vehicle import EngineVehicle
+from minisim.parameters import declared, real, spelled
+from minisim.vehicle import CruiseVehicle
 
 #: Differences from the prediction that are none [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -55,35 +56,30 @@ POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
 BEYOND = 60.0
 
 
-@dataclass(frozen=True)
+@declared
 class Reservation:
-    """Space-time reservation, first come first served, for vehicles that follow the IDM.
+    """Space-time reservation, first come first served, for vehicles that follow the IDM."""
 
-    Attributes:
-        reach: how far before the junction vehicles ask [m]; None is as late as they can without
-            slowing down for a refusal: stopping distance at the limit, and a period's way. Asking
-            earlier keeps room for those who are far from those who are near: at 350 veh/h/lane
-            (fair) mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
-        buffer: between one vehicle's leaving a conflict zone and the other's entering its own [s]:
-            0.25 s on either side, as at the edge tiles of the AIM4 simulator.
-        period: time between two looks at holders and requests [s].
-        name: short name.
+    # Asking earlier keeps room for vehicles far away from those that are near: at 350 veh/h/lane
+    # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
+    reach: float | None = real(
+        "how far before the junction vehicles ask; none is as late as they can without slowing "
+        "down for a refusal: the stopping distance at the limit, and a period's way", "m",
+        low=1, high=1000, optional=True, default=None,
+    )  # fmt: skip
+    # 0.25 s on either side, as at the edge tiles of the AIM4 simulator.
+    buffer: float = real(
+        "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
+        low=0, high=10, default=0.5,
+    )  # fmt: skip
+    period: float = real(
+        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
+    )
 
-    Raises:
-        InputError: a value out of range.
-    """
-
-    reach: float | None = None
-    buffer: float = 0.5
-    period: float = 0.5
-    name: str = "reservation"
-
-    def __post_init__(self) -> None:
-        if self.reach is not None:
-            number("reach [m]", self.reach, low=1, high=1000)
-        number("buffer [s]", self.buffer, low=0, high=10)
-        number("period [s]", self.period, low=0.01, high=10)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `reservation:buffer=1`."""
+        return spelled("reservation", self)
 
     def start(self, site: Site) -> ReservationSession:
         """Begin a run; raises `InputError` for vehicles whose motion is not predicted."""
@@ -143,9 +139,9 @@ class Manager:
 
     def __init__(self, site: Site, buffer: float) -> None:
         instance("site", site, Site)
-        if isinstance(site.vehicle, EngineVehicle):
+        if isinstance(site.vehicle, CruiseVehicle):
             raise InputError(
-                "reservation predicts vehicles that follow the IDM, not an EngineVehicle; "
+                "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
                 "use the profile paper or fair"
             )
         self.slots: dict[int, Slot] = {}

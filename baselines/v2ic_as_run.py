@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -34,8 +33,9 @@ import shapely
 
 from baselines.v2ic import CRAWL
 from minisim.control import Advise, Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.geometry import Intersection
+from minisim.parameters import declared, real, spelled
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
@@ -63,28 +63,20 @@ ROUNDING = 1e-9
 WIDE = 20.0
 
 
-@dataclass(frozen=True)
+@declared
 class V2ICAsRun:
-    """V2I-C as the authors of the paper ran it, for 4 arms; it may collide.
+    """V2I-C as the authors of the paper ran it, for 4 arms; it may collide."""
 
-    Attributes:
-        approach_speed: desired from insertion to the first advice [m/s]: 16.6 in the balanced
-            runs, 14 (the vehicle's own) in the others.
-
-    Raises:
-        InputError: no such speed.
-    """
-
-    approach_speed: float = 16.6
-
-    def __post_init__(self) -> None:
-        number("approach_speed [m/s]", self.approach_speed, above=0, high=100)
+    approach_speed: float = real(
+        "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "
+        "vehicle's own) in the others", "m/s",
+        above=0, high=100, default=16.6,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`v2ic-as-run`, and the approach speed where it is not that of the balanced runs."""
-        speed = "" if self.approach_speed == 16.6 else f"-{self.approach_speed:g}"
-        return f"v2ic-as-run{speed}"
+        """Its spelling, such as `v2ic-as-run:approach_speed=14`."""
+        return spelled("v2ic-as-run", self)
 
     def start(self, site: Site) -> V2ICAsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""

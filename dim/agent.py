@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from dim.decision import DecisionTable
 from dim.perception import COMMITS, Percept
-from minisim.errors import choice, instance
+from minisim.parameters import declared, part, word
 
 #: Who may enter while others cross. "clear": nobody new (the paper). "harmonious": a participant
 #: in harmony with all of them (ours); behind a vehicle of its own lane it just follows.
 GATES = ("clear", "harmonious")
 
 
-@dataclass(frozen=True)
+@declared
 class Rules:
-    """The public rules: all vehicles hold the same ones, and nothing else in common.
+    """The public rules: all vehicles hold the same ones, and nothing else in common."""
 
-    Attributes:
-        table: the decision of every case.
-        gate: who may enter while others cross, see `GATES`.
-        commit: when a vehicle is committed, see `perception.COMMITS`.
-    """
-
-    table: DecisionTable
-    gate: str = "clear"
-    commit: str = "stoppable"
-
-    def __post_init__(self) -> None:
-        instance("table", self.table, DecisionTable)
-        choice("gate", self.gate, GATES)
-        choice("commit rule", self.commit, COMMITS)
+    table: DecisionTable = part("the decision of every case", DecisionTable)
+    gate: str = word(
+        "which vehicles may enter while others cross, see `GATES`", GATES, default="clear"
+    )
+    commit: str = word(
+        "when a vehicle is committed, see `perception.COMMITS`", COMMITS,
+        default="stoppable", label="commit rule",
+    )  # fmt: skip
 
 
 class Agent:

@@ -33,14 +33,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import networkx as nx
 
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.geometry import Movement
+from minisim.parameters import checked, declared, part, real, spelled, word
 
 #: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
 #: numbers are the authors' (`JUNC_BOUND` of their three drivers).
@@ -75,41 +77,43 @@ INSERTION = 0.1
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
+def _names(title: str, value: Any) -> str:
+    """Check `AsRunDim.names`."""
+    instance(title, value, str)
+    if len(set(value)) != len(value):
+        raise InputError(f"{title} must be different letters, got {value!r}")
+    return str(value)
+
+
+@declared
 class AsRunDim:
-    """DIM as the authors ran it, for 3, 4 and 5 arms.
+    """DIM as the authors ran it for the published numbers, on 3, 4 and 5 arms; it may collide."""
 
-    Attributes:
-        order: "lanes" as in every published run, or "size" as the paper describes.
-        matrix: harmony of the movements; None is the paper's table.
-        names: what the authors called the arms, clockwise from north. Names decide who is first;
-            in the runs at 4:1:4:1 they were "acbd" instead of in alphabetical order.
-        exit_speed: desired behind the junction, 20 as in every published run of DIM [m/s].
-
-    Raises:
-        InputError: an unknown order, names that do not tell the arms apart, or an exit speed that
-            is not positive.
-    """
-
-    order: str = "lanes"
-    matrix: HarmonyMatrix | None = None
-    names: str = "abcde"
-    exit_speed: float = EXIT_SPEED
-
-    def __post_init__(self) -> None:
-        choice("order", self.order, ORDERS)
-        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
-        instance("names", self.names, str)
-        if len(set(self.names)) != len(self.names):
-            raise InputError(f"names must be different letters, got {self.names!r}")
-        number("exit_speed [m/s]", self.exit_speed, above=0.0)
+    order: str = word(
+        "what comes first: the highest-priority lanes, as in every published run, or the largest "
+        "clique, as the paper describes",
+        ORDERS, default="lanes",
+    )  # fmt: skip
+    matrix: HarmonyMatrix | None = part(
+        "harmony of the movements; none is the paper's table",
+        HarmonyMatrix,
+        kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
+        optional=True, default=None,
+    )  # fmt: skip
+    names: str = checked(
+        "the authors' letters of the arms, clockwise from north; they decide which vehicle is "
+        'first, and in the runs at 4:1:4:1 they were "acbd"',
+        _names, "different letters", default="abcde",
+    )  # fmt: skip
+    exit_speed: float = real(
+        "speed desired behind the junction, 20 in every published run of DIM", "m/s",
+        above=0.0, default=EXIT_SPEED,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`dim-as-run`, with `-size` and `-exit-14` where it differs from the published runs."""
-        size = "" if self.order == "lanes" else "-size"
-        leaves = "" if self.exit_speed == EXIT_SPEED else f"-exit-{self.exit_speed:g}"
-        return f"dim-as-run{size}{leaves}"
+        """Its spelling, such as `dim-as-run:order=size`."""
+        return spelled("dim-as-run", self)
 
     def start(self, site: Site) -> AsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""

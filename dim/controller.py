@@ -24,9 +24,8 @@ around with a period (`Perception.period`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
 
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
@@ -42,9 +41,12 @@ from dim.priorities import (
     memory_of,
     rotating,
 )
+from dim.senses.noise import NoisyPerception
+from dim.senses.tally import Tally
 from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, number, show
+from minisim.errors import InputError, choice, instance, show
+from minisim.parameters import checked, declared, part, real, spelled, word
 
 #: Lane priorities that change with time.
 CHANGING = ("rotating", "waiting")
@@ -53,76 +55,76 @@ CHANGING = ("rotating", "waiting")
 SIGHT_MARGIN = 0.5
 
 
-@dataclass(frozen=True)
+def _priorities(title: str, value: Any) -> Any:
+    """Check `Dim.priorities`."""
+    if isinstance(value, str):
+        return choice(title, value, ("inflow", *CHANGING))
+    if not isinstance(value, (tuple, list)):
+        raise InputError(f"{title} must be lane ranks or 'inflow', got {show(value)}")
+    return lane_ranks(value, len(value))
+
+
+@declared
 class Dim:
-    """Decentralised intersection management: the paper's controller and our variants.
+    """Decentralised intersection management: vehicles decide alone, by the paper's rules or ours.
 
-    Attributes:
-        order: "size", the largest clique first, or "lanes", the highest-priority lanes first.
-        commit: "stoppable", committed when comfortable braking no longer stops it before the
-            junction, or "paper", past half of the green zone.
-        gate: who may enter while others cross: "clear", nobody new (the paper); "harmonious",
-            whoever is in harmony with all of them, where vehicles of one lane just follow each
-            other.
-        priorities: rank of each lane, 0 first; "inflow" ranks by descending demand, ties by
-            lane; "rotating" and "waiting" change with time, see `dim.priorities`; None is the
-            lanes' own order.
-        zones: the road markings.
-        matrix: harmony of the movements; None derives it from geometry and vehicle.
-        perception: what vehicles see of each other.
-        turn_time: how long a lane comes first in "rotating" and among equals in "waiting" [s].
-        sensor_range: how far vehicles see the others' approach lanes and yellow zones [m]; what
-            "waiting" may remember depends on it.
-        monitor: a safety monitor in every vehicle, or None.
-        period: look around every so many seconds too; None is as often as the perception needs,
-            which is never where it is exact.
-
-    Raises:
-        InputError: an unknown rule, or priorities that are no ranks.
+    `gate="harmonious"`, priorities other than the lanes' own order, and the monitor are ours.
     """
 
-    order: str = "size"
-    commit: str = "stoppable"
-    gate: str = "clear"
-    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = None
-    zones: Zones = field(default_factory=Zones)
-    matrix: HarmonyMatrix | None = None
-    perception: Perception = field(default_factory=ExactPerception)
-    turn_time: float = TURN_TIME
-    sensor_range: float = SENSOR_RANGE
-    monitor: Monitor | None = None
-    period: float | None = None
-
-    def __post_init__(self) -> None:
-        choice("order", self.order, ORDERS)
-        choice("commit rule", self.commit, COMMITS)
-        choice("gate", self.gate, GATES)
-        if isinstance(self.priorities, str):
-            choice("priorities", self.priorities, ("inflow", *CHANGING))
-        elif self.priorities is not None:
-            object.__setattr__(self, "priorities", _own_ranks(self.priorities))
-        instance("zones", self.zones, Zones)
-        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
-        instance("perception", self.perception, Perception)
-        instance("monitor", self.monitor, (Monitor, type(None)))
-        number("turn_time [s]", self.turn_time, low=1, high=3600)
-        number("sensor_range [m]", self.sensor_range, low=1, high=1000)
-        if self.period is not None:
-            number("period [s]", self.period, above=0)
+    order: str = word(
+        "what comes first: the largest clique, or the highest-priority lanes",
+        ORDERS, default="size",
+    )  # fmt: skip
+    commit: str = word(
+        "when a vehicle is committed: when comfortable braking no longer stops it before the "
+        "junction, or past half of the green zone",
+        COMMITS, default="stoppable", label="commit rule",
+    )  # fmt: skip
+    gate: str = word(
+        "which vehicles may enter while others cross: none (the paper), or those in harmony with "
+        "all of them; vehicles of one lane just follow each other",
+        GATES, default="clear",
+    )  # fmt: skip
+    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = checked(
+        "rank of each lane, 0 first: given, by descending demand, or changing with time (see "
+        "`dim.priorities`); none is the lanes' own order",
+        _priorities, "ranks | inflow | rotating | waiting", optional=True, default=None,
+    )  # fmt: skip
+    zones: Zones = part("the road markings", Zones, kinds={"zones": Zones}, default=Zones())
+    matrix: HarmonyMatrix | None = part(
+        "harmony of the movements; none derives it from geometry and vehicle",
+        HarmonyMatrix,
+        kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
+        optional=True, default=None,
+    )  # fmt: skip
+    perception: Perception = part(
+        "what vehicles see of each other",
+        Perception,
+        kinds={"exact": ExactPerception, "noisy": NoisyPerception},
+        default=ExactPerception(),
+    )
+    turn_time: float = real(
+        'how long a lane comes first in "rotating" and among equals in "waiting"', "s",
+        default=TURN_TIME, low=1, high=3600,
+    )  # fmt: skip
+    sensor_range: float = real(
+        "how far vehicles see the others' approach lanes and yellow zones; what \"waiting\" may "
+        "remember depends on it", "m",
+        default=SENSOR_RANGE, low=1, high=1000,
+    )  # fmt: skip
+    monitor: Monitor | None = part(
+        "a safety monitor in every vehicle", Monitor, kinds={"on": Monitor},
+        optional=True, default=None,
+    )  # fmt: skip
+    period: float | None = real(
+        "time between two looks, besides the wake-ups; none is what the perception needs", "s",
+        above=0, optional=True, default=None,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`dim`, and the rules in which it differs from the default: `dim-harmonious`."""
-        variants = {
-            self.gate: self.gate != "clear",
-            "lanes": self.order == "lanes",
-            "paper-commit": self.commit == "paper",
-            str(self.priorities): isinstance(self.priorities, str),
-            "priorities": isinstance(self.priorities, tuple),
-            self.perception.name: self.perception.name != "exact",
-            "monitored": self.monitor is not None,
-        }
-        return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
+        """Its spelling, such as `dim:gate=harmonious`."""
+        return spelled("dim", self)
 
     def start(self, site: Site) -> DimSession:
         """Begin a run.
@@ -167,10 +169,15 @@ class DimSession:
     Args:
         dim, site: whose run it is, and where.
         follows: whether the vehicle of an id follows DIM; others are seen, but not hosted.
+        truth: what vehicles would see of a view without an error, for the tally of errors.
     """
 
     def __init__(
-        self, dim: Dim, site: Site, follows: Callable[[int], bool] = lambda _: True
+        self,
+        dim: Dim,
+        site: Site,
+        follows: Callable[[int], bool] = lambda _: True,
+        truth: Callable[[View], View] = lambda view: view,
     ) -> None:
         instance("dim", dim, Dim)
         instance("site", site, Site)
@@ -191,27 +198,33 @@ class DimSession:
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
+        self._start = zones.yellow_start + ROUNDING
         self._ranks = _ranking(dim, site)
         self.see = dim.perception.start(site)
-        self._watch = (
-            dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
-        )
+        self._watch = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
+        self._truth = truth
+        errs = dim.perception.period is not None
+        self._tally = Tally(self.rules, self.reader, self._start) if errs else None
+
+    @property
+    def counts(self) -> Mapping[str, float]:
+        """What its wrong perception did so far (`dim.senses.tally`); empty where it is exact."""
+        return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let every vehicle from the yellow zone on perceive and decide; tell what changed."""
         commands: list[Command] = []
         agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
-        start = self.plan.marks[0] + ROUNDING
         look_again = waiting = False
         table, until = self.table(view)
         seen = percept = None
         sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
-            if ego.distance > start or not self._follows(vehicle):
+            if ego.distance > self._start or not self._follows(vehicle):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
@@ -233,6 +246,8 @@ class DimSession:
             going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
             commands += self._watch.look(view, sights, going)
             look_again |= self._watch.needed
+        if self._tally is not None:
+            self._tally.count(self._truth(view), sights, table, commands)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:
@@ -263,9 +278,3 @@ def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
             view.time, n, watch.look(view.time, view.vehicles), memory, dim.turn_time
         )
     return None
-
-
-def _own_ranks(priorities: object) -> tuple[int, ...]:
-    if not isinstance(priorities, (tuple, list)):
-        raise InputError(f"priorities must be lane ranks or 'inflow', got {show(priorities)}")
-    return lane_ranks(priorities, len(priorities))

@@ -28,15 +28,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
 from dim.perception import UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
-from minisim.errors import number
 from minisim.junction.occupancy import Area, area, passes, showing
+from minisim.parameters import declared, real
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
 #: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
@@ -63,35 +62,30 @@ ROOM = 0.25
 PATIENCE = 2.0
 
 
-@dataclass(frozen=True)
+@declared
 class Monitor:
-    """A last resort for every vehicle, beside what it decides.
+    """A last resort for every vehicle, beside what it decides."""
 
-    Attributes:
-        time_margin: least time between leaving a conflict area and another's entering it [s].
-        look_ahead: how far ahead motion is predicted [s].
-        tolerance: how far beside a path a vehicle may seem to be while it is on it [m].
-        deceleration: how hard it brakes at most [m/s²]; None is what the brakes can do.
-        patience: how long all who take part stand before the first of them goes alone [s].
-
-    Raises:
-        InputError: a number out of range.
-    """
-
-    time_margin: float = TIME_MARGIN
-    look_ahead: float = LOOK_AHEAD
-    tolerance: float = TOLERANCE
-    deceleration: float | None = None
-    patience: float = PATIENCE
-
-    def __post_init__(self) -> None:
-        number("time_margin [s]", self.time_margin, low=0, high=10)
-        number("look_ahead [s]", self.look_ahead, low=0.5, high=30)
-        number("tolerance [m]", self.tolerance, above=0, high=1)
-        number("patience [s]", self.patience, low=0.5, high=60)
-        if self.deceleration is not None:
-            # Less than 1 m/s² is no braking even on ice.
-            number("deceleration of the monitor [m/s²]", self.deceleration, low=1, high=1000)
+    time_margin: float = real(
+        "least time between leaving a conflict area and another's entering it", "s",
+        default=TIME_MARGIN, low=0, high=10,
+    )  # fmt: skip
+    look_ahead: float = real(
+        "how far ahead motion is predicted", "s", default=LOOK_AHEAD, low=0.5, high=30
+    )
+    tolerance: float = real(
+        "how far beside a path a vehicle may seem to be while it is on it", "m",
+        default=TOLERANCE, above=0, high=1,
+    )  # fmt: skip
+    # Less than 1 m/s² is no braking even on ice.
+    deceleration: float | None = real(
+        "how hard it brakes at most; none is what the brakes can do", "m/s²",
+        low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
+    )  # fmt: skip
+    patience: float = real(
+        "how long all that take part stand before the first of them goes alone", "s",
+        default=PATIENCE, low=0.5, high=60,
+    )  # fmt: skip
 
     def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
         """Begin a run.

@@ -8,12 +8,11 @@ into the few facts that Algorithm 1 needs, the same way for every vehicle.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
-from minisim.errors import choice, instance, integer, number
+from minisim.parameters import declared, part, real, whole, word
 
 #: When a vehicle before the junction is committed. "stoppable": it can no longer stop before the
 #: junction by comfortable braking. "paper": it is past half of the green zone.
@@ -34,10 +33,6 @@ class Perception(Protocol):
     """A recipe for the vehicles' senses: hashable, picklable, never changed by a run."""
 
     @property
-    def name(self) -> str:
-        """Short name; "exact" where everybody sees everything as it is."""
-
-    @property
     def period(self) -> float | None:
         """How often vehicles must look [s]; None where what they see changes at wake-ups only.
 
@@ -49,14 +44,9 @@ class Perception(Protocol):
         """Begin a run: random streams and memory, if there are any, belong to the result."""
 
 
-@dataclass(frozen=True)
+@declared
 class ExactPerception:
     """Everyone sees everything, at once and as it is: the paper's assumption."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return "exact"
 
     @property
     def period(self) -> None:
@@ -95,27 +85,17 @@ class Percept(NamedTuple):
     unknown: int = 0
 
 
-@dataclass(frozen=True)
+@declared
 class Reader:
-    """How a view is read, by public rules that every vehicle shares.
+    """How a view is read, by public rules that every vehicle shares."""
 
-    Attributes:
-        n: number of arms.
-        zones: the road markings.
-        deceleration: the vehicles' comfortable braking [m/s²].
-        commit: when a vehicle is committed, see `COMMITS`.
-    """
-
-    n: int
-    zones: Zones
-    deceleration: float
-    commit: str = "stoppable"
-
-    def __post_init__(self) -> None:
-        integer("number of arms", self.n, low=3, high=12)
-        instance("zones", self.zones, Zones)
-        number("deceleration [m/s²]", self.deceleration, above=0)
-        choice("commit rule", self.commit, COMMITS)
+    n: int = whole("number of arms", low=3, high=12, label="number of arms")
+    zones: Zones = part("the road markings", Zones)
+    deceleration: float = real("the vehicles' comfortable braking", "m/s²", above=0)
+    commit: str = word(
+        "when a vehicle is committed, see `COMMITS`", COMMITS, default="stoppable",
+        label="commit rule",
+    )  # fmt: skip
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.

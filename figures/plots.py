@@ -17,7 +17,7 @@ from matplotlib.ticker import FuncFormatter
 from figures import style
 from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
-from scenarios.studies.cells import saturated
+from scenarios.sweep.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,11 +16,11 @@ from minisim.errors import FileError
 from minisim.files import write_text
 from minisim.version import __version__
 from scenarios.studies import NAMES, study_named
-from scenarios.studies.cells import saturated, too_short
 from scenarios.studies.shared.archive import Archive, MissingRunsError
 from scenarios.studies.shared.points import Point
 from scenarios.studies.shared.reproduction import Made
 from scenarios.studies.shared.study import Results
+from scenarios.sweep.cells import saturated, too_short
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,9 +15,9 @@ from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import Experiment
 from scenarios.sweep.pool import workers
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {
     "dim": "DIM, paper's gate",
-    "dim-harmonious": "DIM, harmonious gate",
+    "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
 #: Averaged over seeds: column of a sweep -> heading.
@@ -75,10 +75,10 @@ class Tour:
             film_seconds=10.0,
         )  # fmt: skip
 
-    def experiments(self) -> list[Experiment]:
+    def experiments(self) -> list[Recipe]:
         """Every density under every controller with every seed."""
         return [
-            Experiment(
+            Recipe(
                 four_way(density, profile=PROFILE, horizon=self.horizon),
                 controller_named(name, PROFILE),
                 seed,
@@ -90,16 +90,10 @@ class Tour:
 
     def film(self) -> Run:
         """The run of the animation."""
-        from minisim.simulation import simulate
-
         end = self.film_start + self.film_seconds
-        return simulate(
-            four_way(self.densities[-1], profile=PROFILE, horizon=end),
-            controller_named(self.controllers[0], PROFILE),
-            seed=1,
-            record="all",
-            record_window=(self.film_start, end),
-        )
+        scenario = four_way(self.densities[-1], profile=PROFILE, horizon=end)
+        recipe = Recipe(scenario, controller_named(self.controllers[0], PROFILE), seed=1)
+        return recipe.run(record="all", record_window=(self.film_start, end))
 
 
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:

@@ -7,12 +7,16 @@ has one successor; all constants are its defaults.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from baselines.signals.heads import full_order, lane_order
-from baselines.signals.phases import PhaseSession, Verdict, check_greens, following
+from baselines.signals.phases import (
+    PhaseSession,
+    Verdict,
+    check_greens,
+    following,
+)
 from minisim.control import Site, View
-from minisim.errors import instance, number
+from minisim.parameters import declared, real, spelled
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -20,7 +24,7 @@ PLACE = 7.5
 ROUNDING = 1e-6
 
 
-@dataclass(frozen=True)
+@declared
 class Actuated:
     """A signal that prolongs a green while vehicles follow each other closely enough.
 
@@ -30,38 +34,34 @@ class Actuated:
     phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
     beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
 
-    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
-    its way.
-
-    Attributes:
-        max_gap: between two vehicles [s]; a longer one ends the green.
-        detector_gap: from the loop to the line at the speed limit [s]; the loop is nearer where
-            those between it and the line could not all leave within `min_green`.
-        passing_time: of a waiting vehicle over the line [s].
-        min_green: [s]; the authors' network (`minDur`).
-        max_green: [s]; the authors' network (`maxDur`).
-        amber: [s]; the authors' network.
-        order: the lanes in the order of their greens; None is a, b, c…
-        name: short name.
+    The time of a phase runs from the green that is really shown: a head waits until no vehicle
+    crosses its way.
     """
 
-    max_gap: float = 3.0
-    detector_gap: float = 2.0
-    passing_time: float = 1.9
-    min_green: float = 3.0
-    max_green: float = 50.0
-    amber: float = 2.0
-    order: tuple[int, ...] | None = None
-    name: str = "actuated"
+    max_gap: float = real(
+        "gap between two vehicles that ends the green", "s", low=0, high=3600, default=3.0
+    )
+    detector_gap: float = real(
+        "time from the loop to the line at the speed limit; the loop is nearer where the vehicles "
+        "between could not all leave within `min_green`", "s",
+        above=0, high=3600, default=2.0,
+    )  # fmt: skip
+    passing_time: float = real(
+        "time of a waiting vehicle over the line", "s", low=0.1, high=60, default=1.9
+    )
+    # The authors' network: `minDur`, `maxDur` and its amber.
+    min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
+    max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
+    amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
+    order: tuple[int, ...] | None = lane_order()
 
     def __post_init__(self) -> None:
-        number("max_gap [s]", self.max_gap, low=0, high=3600)
-        number("detector_gap [s]", self.detector_gap, above=0, high=3600)
-        number("passing_time [s]", self.passing_time, low=0.1, high=60)
         check_greens(self.min_green, self.max_green)
-        number("amber [s]", self.amber, low=0, high=60)
-        object.__setattr__(self, "order", lane_order(self.order))
-        instance("name", self.name, str)
+
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `actuated:max_gap=2`."""
+        return spelled("actuated", self)
 
     def detector(self, site: Site) -> float:
         """How far the loops are before the junction entry [m]."""

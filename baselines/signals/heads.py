@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from itertools import accumulate, count
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,8 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, integer, items, number, numbers
+from minisim.errors import InputError, instance, integer, items, numbers
+from minisim.parameters import checked, declared, real
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
@@ -48,30 +49,24 @@ class Colour(Enum):
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 
 
-@dataclass(frozen=True)
+def _lanes(title: str, value: Any) -> tuple[int, ...]:
+    """Check `Phase.lanes`."""
+    lanes = numbers(title, value)
+    if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
+        raise InputError(f"{title} must be indices of lanes, got {value!r}")
+    return tuple(int(lane) for lane in lanes)
+
+
+@declared
 class Phase:
-    """Lanes that are green together, for how long, and what follows.
+    """Lanes that are green together, for how long, and what follows."""
 
-    Attributes:
-        lanes: indices of the lanes.
-        green: [s].
-        amber: [s].
-        all_red: after the amber [s].
-    """
-
-    lanes: tuple[int, ...]
-    green: float
-    amber: float = 2.0
-    all_red: float = 0.0
-
-    def __post_init__(self) -> None:
-        lanes = numbers("lanes of a phase", self.lanes)
-        if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
-            raise InputError(f"lanes of a phase must be indices of lanes, got {self.lanes!r}")
-        object.__setattr__(self, "lanes", tuple(int(lane) for lane in lanes))
-        number("green [s]", self.green, low=0.5, high=3600)
-        number("amber [s]", self.amber, low=0, high=60)
-        number("all_red [s]", self.all_red, low=0, high=60)
+    lanes: tuple[int, ...] = checked(
+        "indices of the lanes", _lanes, "indices", label="lanes of a phase"
+    )
+    green: float = real("green", "s", low=0.5, high=3600)
+    amber: float = real("amber after the green", "s", low=0, high=60, default=2.0)
+    all_red: float = real("all-red after the amber", "s", low=0, high=60, default=0.0)
 
     @property
     def duration(self) -> float:
@@ -79,22 +74,24 @@ class Phase:
         return self.green + self.amber + self.all_red
 
 
-@dataclass(frozen=True)
+def _phases(title: str, value: Any) -> tuple[Phase, ...]:
+    """Check `Program.phases`."""
+    instance(title, value, (tuple, list))
+    for phase in value:
+        instance("phase", phase, Phase)
+    if not value:
+        raise InputError("a signal program needs at least one phase")
+    return tuple(value)
+
+
+@declared
 class Program:
     """Phases in a fixed order and time, over and over; the first turns green at time 0.
 
     A program remembers nothing: what it shows follows from the time alone.
     """
 
-    phases: tuple[Phase, ...]
-
-    def __post_init__(self) -> None:
-        instance("phases", self.phases, (tuple, list))
-        object.__setattr__(self, "phases", tuple(self.phases))
-        for phase in self.phases:
-            instance("phase", phase, Phase)
-        if not self.phases:
-            raise InputError("a signal program needs at least one phase")
+    phases: tuple[Phase, ...] = checked("the phases", _phases, "phases")
 
     @cached_property
     def cycle(self) -> float:
@@ -183,11 +180,16 @@ class Heads:
         )
 
 
-def lane_order(order: object) -> tuple[int, ...] | None:
-    """Return a signal's `order` of lanes, None being a, b, c…; raises `InputError`."""
-    if order is None:
-        return None
-    return tuple(integer("lane in order", lane, low=0) for lane in items("order", order, "lanes"))
+def lane_order() -> Any:
+    """The field of a signal that says in which order its lanes get their greens."""
+
+    def check(title: str, value: Any) -> tuple[int, ...]:
+        return tuple(integer("lane in order", one, low=0) for one in items(title, value, "lanes"))
+
+    return checked(
+        "lanes in the order of their greens; none is a, b, c…", check, "lanes",
+        optional=True, default=None,
+    )  # fmt: skip
 
 
 def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:

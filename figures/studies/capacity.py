@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
+from scenarios.controllers import RIVALS
 from scenarios.studies.capacity import STUDY, Capacity, capacities
-from scenarios.studies.fair import RIVALS
 from scenarios.studies.shared.archive import Archive, MissingRunsError
 
 #: Arms -> how a capacity is drawn.

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
-from scenarios.studies.fair import GATES, OTHERS, RIVALS, losses
+from scenarios.controllers import RIVALS
+from scenarios.studies.fair import GATES, OTHERS, losses
 from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.shared.crossing import Crossing, tried
 from scenarios.studies.shared.delay import MEASURES, with_total_delay

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
-from scenarios.studies.cells import saturated
 from scenarios.studies.fair import GATES
 from scenarios.studies.humans import DENSITIES, SHARES, STOP, delays
 from scenarios.studies.shared.archive import Archive, missing_note
 from scenarios.studies.shared.delay import TOTAL_DELAY, with_total_delay
+from scenarios.sweep.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd

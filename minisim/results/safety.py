@@ -25,6 +25,7 @@ import shapely
 from minisim.control import Site
 from minisim.errors import instance
 from minisim.junction.geometry import Bools, Floats, Intersection, Path
+from minisim.results.metrics import PETS
 from minisim.results.trajectories import (
     ACCELERATION,
     RIGHT_OF_WAY,
@@ -77,8 +78,8 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
 
     Returns:
         `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
-        `max_braking_mps2`, the number of encroachments `pets`, and how many of them were shorter
-        than 1, 1.5 and 2 s (`pets_below_1_s`, `pets_below_1_5_s`, `pets_below_2_s`).
+        `max_braking_mps2`, the number of encroachments `pets`, and how many of them were short
+        (`minisim.results.metrics.PETS`).
 
     Raises:
         InputError: a column is missing, or a movement that the site does not have.
@@ -94,10 +95,19 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
         "max_drac_mps2": _largest(follow["drac_mps2"]),
         "max_braking_mps2": _largest(np.maximum(braking, 0.0)),
         "pets": len(pets),
-        "pets_below_1_s": int((pets < 1.0).sum()),
-        "pets_below_1_5_s": int((pets < 1.5).sum()),
-        "pets_below_2_s": int((pets < 2.0).sum()),
+        **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
+
+
+def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """The part of a recording of everything that `record="junction"` keeps."""
+    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
+
+    paths = site.intersection.paths
+    last = np.array([path.exit + RECORD_PAST for path in paths])
+    s = frame[S].to_numpy()
+    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, site)])
+    return frame[near]
 
 
 def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:

@@ -22,7 +22,7 @@ from scenarios.paper import (
     reference_rows,
     replay,
 )
-from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
+from scenarios.scenario import AS_RUN, Profile, Scenario
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
 PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
@@ -135,9 +135,7 @@ def drawn_cases(
     """
     return [
         Case(
-            scenario_named(
-                name, density=density, split=_shares(split), profile=profile, horizon=horizon
-            ),
+            scenario_named(name, density=density, split=split, profile=profile, horizon=horizon),
             controller,
         )
         for name in names
@@ -190,7 +188,3 @@ def replayed_cases(
             f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only, with dim"
         )
     return cases
-
-
-def _shares(split: str) -> Sequence[float] | None:
-    return None if split == "balanced" else parse_split(split)

@@ -123,6 +123,10 @@ class _Excerpt:
         return self.scenario.density
 
     @property
+    def warmup(self) -> float:
+        return 0.0
+
+    @property
     def depart_speed(self) -> float | None:
         return self.scenario.depart_speed
 
@@ -150,7 +154,7 @@ def _outcome(case: Case, host: str, seed: int) -> Outcome:
         run = _simulate(case, case.scenario, host, seed)
     except MinisimError as error:
         return Outcome(error=str(error))
-    return Outcome(run.columns, len(run.collisions), run.host.get("sumo", ""))
+    return Outcome(run.counted, len(run.collisions), run.host.get("sumo", ""))
 
 
 def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from scenarios.paper import BASELINE_GRID, GRID, SERIES, Cell, controller_of, scenario
+from scenarios.recipe import Recipe
 from scenarios.studies.shared.study import Study
-from scenarios.sweep.experiment import Experiment
 
 
 class PublishedPoint(NamedTuple):
@@ -25,11 +25,11 @@ class PublishedPoint(NamedTuple):
     split: str
     density: float
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions are counted, for some published rules have them."""
         name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
         cell = Cell(self.split, int(self.density), self.arms, name)
-        return Experiment(
+        return Recipe(
             replace(scenario(*cell), horizon=horizon), controller_of(*cell), seed,
             label=self.series, on_collision="record",
         )  # fmt: skip

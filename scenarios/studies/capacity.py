@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import InputError
+from scenarios.controllers import RIVALS
 from scenarios.statistics import Interval, mean_interval
-from scenarios.studies.fair import RIVALS
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.points import ControllerPoint, Point, fair_grid
 from scenarios.studies.shared.study import Find, Results, Study
@@ -54,9 +54,7 @@ class CapacityStudy(Study):
                 (point, seed): point._replace(density=sum(bracket) // 2 * search.step)
                 for (point, seed), bracket in brackets.items()
             }
-            rows = find(
-                [probe.experiment(seed, search.horizon) for (_, seed), probe in probes.items()]
-            )
+            rows = find([probe.recipe(seed, search.horizon) for (_, seed), probe in probes.items()])
             asked += zip(probes.values(), rows, strict=True)
             for (key, (low, high)), row in zip([*brackets.items()], rows, strict=True):
                 middle = (low + high) // 2
@@ -71,7 +69,7 @@ class CapacityStudy(Study):
         return Results.of(self, effort, asked)
 
     def most_runs(self, effort: Effort) -> int:
-        """How many experiments `collect` asks for, at most."""
+        """How many runs `collect` asks for, at most."""
         return len(self.points) * effort.search.seeds * effort.search.rounds
 
     def extent(self, effort: Effort) -> str:

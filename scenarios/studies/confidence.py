@@ -17,7 +17,7 @@ STUDY = Study(
     "What does it cost to believe only readings that are sure?",
     # Lanes first: with the largest clique first, unknown intents block the junction.
     tuple(
-        IntentErrorPoint("dim-lanes", kind, CLASSIFIER, confidence=threshold)
+        IntentErrorPoint("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
         for kind, threshold in product(KINDS, THRESHOLDS)
     ),
     FEW,

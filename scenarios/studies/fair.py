@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import TYPE_CHECKING
 
+from scenarios.controllers import RIVALS
 from scenarios.studies.shared.crossing import (
     Crossing,
     crossing,
@@ -17,13 +18,8 @@ from scenarios.studies.shared.study import Study
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Everything that is compared on equal terms; the paper's four first.
-RIVALS = (
-    "dim", "dim-harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop", "reservation",
-    "longest-queue",
-)  # fmt: skip
 #: DIM with either gate, and what it may lose to.
-GATES = ("dim", "dim-harmonious")
+GATES = ("dim", "dim:gate=harmonious")
 OTHERS = tuple(name for name in RIVALS if name not in GATES)
 
 #: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].

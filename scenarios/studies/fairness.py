@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Rules of priority that need no communication.
-PRIORITIES = ("dim", "dim-rotating", "dim-waiting")
+PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 STUDY = Study(
     "fairness",

@@ -43,7 +43,7 @@ def delays(rows: pd.DataFrame, group: str) -> pd.Series[float]:
 
     parts = pd.DataFrame(index=rows.index)
     for metric in ("complete_time_loss_s", "complete_depart_delay_s"):
-        column = rows.get(f"{group}_{metric}", pd.Series(index=rows.index, dtype=float))
+        column = rows.get(f"kinds_{group}_{metric}", pd.Series(index=rows.index, dtype=float))
         alone = rows[metric].where((rows["humans"] == 0.0) & (group == "automated"))
         parts[metric] = column.astype(float).fillna(alone)
     return parts.sum(axis=1, skipna=False)

@@ -8,7 +8,7 @@ from scenarios.studies.shared.study import Study
 
 #: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
 #: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
-UNBALANCED = {"dim": "dim-inflow", "fixed-time": "fixed-time-equal"}
+UNBALANCED = {"dim": "dim:priorities=inflow", "fixed-time": "fixed-time:equal_greens=true"}
 
 
 def point_of(cell: Cell) -> ControllerPoint:

@@ -11,9 +11,10 @@ from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.points import Point
 from scenarios.studies.shared.study import Find, Results, Runs
+from scenarios.sweep.keys import key_of
 
 if TYPE_CHECKING:
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
 
@@ -22,12 +23,12 @@ class MissingRunsError(MinisimError):
 
 
 def find_in(store: Store | None) -> Find:
-    """Looks experiments up in a store: a failed or outdated run counts as none."""
+    """Looks runs up in a store: a failed or outdated run counts as none."""
 
-    def find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         if store is None:
-            return [None] * len(experiments)
-        keys = [experiment.key for experiment in experiments]
+            return [None] * len(recipes)
+        keys = [key_of(recipe) for recipe in recipes]
         rows = store.valid(keys)
         return [rows.get(key) for key in keys]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, items, numbers
 from scenarios.statistics import Interval, mean_interval
-from scenarios.studies.cells import pairs
+from scenarios.sweep.cells import pairs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from dim import NoisyPerception
 from dim.senses.noise import UNSIGNALLED
+from minisim.parameters import spelled
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.misreading import counted, with_perception
+from scenarios.recipe import Recipe
 from scenarios.statistics import poisson_interval
-from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +31,7 @@ MANNERS = {
 }
 #: The controllers whose vehicles misread: the rules alone, with a safety monitor, and with the
 #: highest-priority lane first.
-MISREADERS = ("dim", "dim-monitored", "dim-lanes")
+MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
 #: Vehicles that misread each other look around every 0.1 s, which costs 3 s of CPU an hour, and
 #: more with a monitor.
 FEW = dict.fromkeys(MISREADERS, 5)
@@ -70,14 +71,16 @@ class IntentErrorPoint(NamedTuple):
     @property
     def where(self) -> str:
         """What tells it from other points of its series, but for the demand."""
-        return f"{self.arms} arms, {self.perception.name}"
+        return f"{self.arms} arms, {spelled('noisy', self.perception)}"
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions and wrong decisions are counted."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, profile="fair", horizon=horizon)
-        controller = with_perception(controller_named(self.series, "fair"), self.perception)
-        return Experiment(scenario, counted(controller), seed, on_collision="record")
+        controller = controller_named(self.series, "fair")
+        if self.perception.period is not None:
+            controller = replace(controller, perception=self.perception)  # type: ignore[type-var]
+        return Recipe(scenario, controller, seed, on_collision="record")
 
 
 class Rate(NamedTuple):

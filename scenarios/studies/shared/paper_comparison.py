@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from minisim.errors import choice
 from scenarios.paper import SERIES, SPLITS, reference
 from scenarios.statistics import prediction_interval
-from scenarios.studies.cells import saturated
+from scenarios.sweep.cells import saturated
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,9 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
-from scenarios.mixing import with_humans
-from scenarios.scenario import parse_split
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
 
 
 class Point(Protocol):
@@ -33,7 +31,7 @@ class Point(Protocol):
     def where(self) -> str:
         """What tells it from other points of its series, but for the demand."""
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed."""
 
     def _asdict(self) -> dict[str, Any]:
@@ -62,14 +60,13 @@ class ControllerPoint(NamedTuple):
     density: float
     humans: float = 0.0
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Experiment:
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions are counted, for some published rules have them."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
-        shares = None if self.split == "balanced" else parse_split(self.split)
-        scenario = make(self.density, split=shares, profile=self.profile, horizon=horizon)
-        controller = with_humans(controller_named(self.controller, self.profile), self.humans)
+        scenario = make(self.density, split=self.split, profile=self.profile, horizon=horizon)
+        controller = controller_named(self.controller, self.profile)
         label = f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
-        return Experiment(scenario, controller, seed, label=label, on_collision="record")
+        return Recipe(scenario, controller, seed, self.humans, label=label, on_collision="record")
 
     @property
     def where(self) -> str:

@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from scenarios.recipe import Recipe
 from scenarios.studies import study_named
 from scenarios.studies.shared.archive import find_in
 from scenarios.studies.shared.effort import Effort
-from scenarios.sweep.experiment import Experiment, Row
+from scenarios.sweep.rows import Row
 from scenarios.sweep.runner import finished
 from scenarios.sweep.store import Store
 
@@ -60,16 +61,16 @@ def reproduce(name: str, effort: Effort, store: Store, jobs: int, report: Report
     rows: list[Row] = []
     began = time.monotonic()
 
-    def run(experiments: Sequence[Experiment]) -> list[Row]:
+    def run(recipes: Sequence[Recipe]) -> list[Row]:
         nonlocal known, hours
-        known += sum(row is not None for row in find_in(store)(experiments))
-        hours += sum(experiment.scenario.horizon for experiment in experiments) / 3600.0
+        known += sum(row is not None for row in find_in(store)(recipes))
+        hours += sum(recipe.scenario.horizon for recipe in recipes) / 3600.0
         made: dict[int, Row] = {}
-        for k, row in finished(experiments, jobs=jobs, store=store):
+        for k, row in finished(recipes, jobs=jobs, store=store):
             made[k] = row
             report(len(rows) + len(made), total)
-        rows.extend(made[k] for k in range(len(experiments)))
-        return [made[k] for k in range(len(experiments))]
+        rows.extend(made[k] for k in range(len(recipes)))
+        return [made[k] for k in range(len(recipes))]
 
     study.collect(effort, run)
     return Made(

@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from scenarios.recipe import Recipe
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.points import Point
-from scenarios.sweep.experiment import Experiment
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Gives for each experiment its row of a sweep, or None where it was never run.
-Find = Callable[[Sequence[Experiment]], Sequence[Mapping[str, Any] | None]]
+#: Gives for each recipe its row of a sweep, or None where it was never run.
+Find = Callable[[Sequence[Recipe]], Sequence[Mapping[str, Any] | None]]
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Study:
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, points: Iterable[Point] | None = None
-    ) -> list[tuple[Point, Experiment]]:
+    ) -> list[tuple[Point, Recipe]]:
         """The seeds 1 … `seeds` of all points or some, seed by seed within each point."""
         return [
-            (point, point.experiment(seed, horizon))
+            (point, point.recipe(seed, horizon))
             for point in (self.points if points is None else points)
             for seed in range(1, min(seeds, self.few.get(point.series, seeds)) + 1)
         ]
@@ -57,17 +57,17 @@ class Study:
 
         Args:
             effort: which points, seeds and horizon.
-            find: gives the rows, by running the experiments or from a store. A study that goes by
+            find: gives the rows, by running the recipes or from a store. A study that goes by
                 what it finds asks several times.
         """
         runs = self.runs(effort.seeds, effort.horizon, self.chosen(effort))
-        rows = find([experiment for _, experiment in runs])
+        rows = find([recipe for _, recipe in runs])
         return Results.of(
             self, effort, [(point, row) for (point, _), row in zip(runs, rows, strict=True)]
         )
 
     def most_runs(self, effort: Effort) -> int:
-        """How many experiments `collect` asks for, at most."""
+        """How many runs `collect` asks for, at most."""
         return len(self.runs(effort.seeds, effort.horizon, self.chosen(effort)))
 
     def extent(self, effort: Effort) -> str:

@@ -25,14 +25,15 @@ from figures.junction.tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
 from scenarios import studies
+from scenarios.controllers import RIVALS
 from scenarios.paper import SERIES, Cell, reference_value
+from scenarios.recipe import Recipe
 from scenarios.studies import NAMES, study_named
-from scenarios.studies.cells import saturated
-from scenarios.studies.fair import RIVALS
 from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import Made
-from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.cells import saturated
+from scenarios.sweep.keys import key_of
 from tests import ROOT
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
@@ -45,7 +46,7 @@ def archive() -> Archive:
     return Archive(synthetic_find, EFFORT)
 
 
-def partial_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+def partial_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
     """A store without adaptive signals."""
     return [None if e.label == "adaptive" else synthetic_row(e) for e in experiments]
 
@@ -121,10 +122,10 @@ def test_nothing_to_draw_says_how_to_make_it() -> None:
 @pytest.mark.parametrize("study", ["text", "as-run"])
 @pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
 def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
-    runs = {experiment.key for _, experiment in study_named(study).runs(EFFORT.seeds)}
+    runs = {key_of(recipe) for _, recipe in study_named(study).runs(EFFORT.seeds)}
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
-        return [synthetic_row(e) if e.key in runs else None for e in asked]
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if key_of(e) in runs else None for e in asked]
 
     drawing = GALLERY[name].build(Archive(find, EFFORT))
     if isinstance(drawing, Table):
@@ -150,7 +151,7 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
 def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         lost = ("all-way-stop", 2)
         return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
 
@@ -177,7 +178,7 @@ def test_losses_end_where_the_runs_do() -> None:
         assert bars
         assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
 
-    def alone(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def alone(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [synthetic_row(e) if e.label == "dim" else None for e in asked]
 
     with pytest.raises(MissingRunsError, match="DIM and another controller"):
@@ -231,7 +232,11 @@ def test_growing_queues_get_an_arrow(archive: Archive) -> None:
 
 
 def test_series_are_told_apart_without_colour() -> None:
-    together = [RIVALS, ("dim", "dim-rotating", "dim-waiting"), ("dim-3", "dim-4", "dim-5")]
+    together = [
+        RIVALS,
+        ("dim", "dim:priorities=rotating", "dim:priorities=waiting"),
+        ("dim-3", "dim-4", "dim-5"),
+    ]
     for group in together:
         looks = [style.look(name) for name in group]
         assert len({look.marker for look in looks}) == len(looks)
@@ -368,7 +373,7 @@ def test_a_report_on_one_study_has_nothing_of_others(
 
 
 def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
 
     report.write_report(

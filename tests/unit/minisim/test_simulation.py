@@ -30,9 +30,10 @@ from minisim.control import (
     Wake,
 )
 from minisim.errors import CollisionError, ControllerError, InputError
-from minisim.results.trips import METRICS, TRIP_COLUMNS
+from minisim.results.metrics import MEANS
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.simulation import Simulation
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.builders import Fixed, digest, replayed
@@ -158,7 +159,7 @@ LAWS = {
     "idm": VehicleType(),
     "iidm": VehicleType(model="iidm"),
     "krauss": VehicleType(model="krauss"),
-    "cc": EngineVehicle(),
+    "cc": CruiseVehicle(),
 }
 
 
@@ -368,7 +369,7 @@ def test_metrics_come_in_two_forms() -> None:
     assert complete["travel_time_s"] == pytest.approx((arrived + 100.0) / 2, abs=0.11)
     assert complete["waiting_time_s"] > 20.0
     assert complete["depart_delay_s"] == pytest.approx(0.05 / 3, abs=0.05)
-    assert set(METRICS) <= set(complete)
+    assert set(MEANS) <= set(complete)
 
 
 def test_trip_table_has_the_documented_columns_in_demand_order() -> None:
@@ -376,6 +377,7 @@ def test_trip_table_has_the_documented_columns_in_demand_order() -> None:
     assert tuple(run.trips.columns) == TRIP_COLUMNS
     assert run.trips["demand_time_s"].is_monotonic_increasing
     assert set(run.trips["lane"]) <= set("abcd")
+    assert run.trips["vehicle"].tolist() == list(range(len(run.trips)))
     ended = run.trips.dropna()
     assert (ended["arrival_s"] - ended["depart_s"]).to_numpy() == pytest.approx(
         ended["travel_time_s"].to_numpy()

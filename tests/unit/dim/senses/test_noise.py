@@ -131,7 +131,7 @@ def test_names_tell_what_errs() -> None:
         "symmetric-0.15-unsignalled-own-flicker-sure-0.7-range-25.0-occlusion-late-0.3-"
         "position-0.5-speed-0.5"
     )
-    assert Dim(perception=NoisyPerception(0.15)).name == "dim-missed-0.15"
+    assert Dim(perception=NoisyPerception(0.15)).name == "dim:perception=noisy(intent_error=0.15)"
 
 
 def test_it_is_a_value() -> None:

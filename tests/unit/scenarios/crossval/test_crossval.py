@@ -24,8 +24,9 @@ from figures import save
 from figures.crossval import DODGE, crossval_figures
 from minisim.errors import InputError, SumoError
 from minisim.junction.geometry import Floats
+from minisim.results.metrics import MEANS
 from minisim.results.run import Run
-from minisim.results.trips import METRICS, Trips
+from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.cli import main
@@ -112,7 +113,7 @@ def test_ks_distance_needs_numbers(bad: object) -> None:
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
     rows = {(row.lane, row.metric): row for row in compare([pair()], 2)}
-    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b") for metric in METRICS}
+    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b") for metric in MEANS}
     everyone = rows["all", "waiting_time_s"]
     assert everyone.trips == (4, 3)
     assert everyone.minisim.mean == pytest.approx(1.5)
@@ -134,7 +135,7 @@ def test_differences_are_paired_by_seed() -> None:
         ours = trips(waiting.tolist(), [50.0] * 4, ended)
         theirs = trips((waiting + 0.1 * (seed + 1)).tolist(), [50.0] * 4, ended)
         pairs.append(Pair(seed, ours, theirs))
-    row = compare(pairs, 2)[METRICS.index("waiting_time_s")]
+    row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
 
@@ -335,7 +336,7 @@ def test_replays_are_judged_by_the_papers_means() -> None:
 def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
     case = Case(four_way(150, profile="fair"), "dim")
     frame = table([result(case, pair(1), pair(2))])
-    assert len(frame) == 5 * len(METRICS)
+    assert len(frame) == 5 * len(MEANS)
     assert frame["error"].isna().all()
     row = frame[(frame["lane"] == "all") & (frame["metric"] == "waiting_time_s")].iloc[0]
     assert (row["seeds"], row["trips_minisim"], row["trips_sumo"]) == (2, 8, 6)
@@ -402,7 +403,7 @@ def test_runs_of_sumo_are_kept_and_used_again(
     files[0].write_bytes(b"PK half of a file")
     assert agreement_of(case) == 1.0
     assert len(ran) == 3, "what is not whole is run again"
-    agreement_of(Case(case.scenario, "dim-harmonious"))
+    agreement_of(Case(case.scenario, "dim:gate=harmonious"))
     assert len(ran) == 5, "another controller is another run"
 
 

@@ -12,11 +12,12 @@ import pytest
 from baselines import FixedTime
 from minisim.errors import InputError
 from scenarios import four_way
+from scenarios.recipe import Recipe
 from scenarios.studies.capacity import STUDY, Capacity, CapacityStudy, capacities, grows
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.points import fair
 from scenarios.studies.shared.study import Find
-from scenarios.sweep.experiment import Experiment, run_experiment
+from scenarios.sweep.rows import outcome_of
 from tests.builders import capacity_of, synthetic_find
 
 
@@ -55,7 +56,7 @@ def test_capacity_says_no_more_than_the_search_knows() -> None:
 
 @pytest.mark.parametrize(("growth", "text"), [(1.0, "< 200"), (0.0, "> 600")])
 def test_capacity_beyond_the_search(growth: float, text: str) -> None:
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         row = {"queue_growth": growth * 100.0, "trips": 100, "error": None}
         return [{**row, "seed": experiment.seed} for experiment in asked]
 
@@ -66,7 +67,7 @@ def test_capacity_beyond_the_search(growth: float, text: str) -> None:
 def test_capacity_of_runs_that_fail_is_missing() -> None:
     asked: list[int] = []
 
-    def broken(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def broken(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         asked.append(len(experiments))
         return [None] * len(experiments)
 
@@ -96,16 +97,13 @@ def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
     """
     signal = FixedTime(greens=(8.0,) * 4)
 
-    def find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [
-            run_experiment(Experiment(e.scenario, signal, e.seed, label="signal")).row
-            for e in experiments
+            outcome_of(Recipe(e.scenario, signal, e.seed, label="signal")).row for e in experiments
         ]
 
     (capacity,) = searched(of_dim(), Search(step=20.0, steps=32, seeds=3), find)
-    flood = run_experiment(
-        Experiment(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)
-    ).row
+    flood = outcome_of(Recipe(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)).row
     served = (flood["trips"] - flood["unfinished"]) / 4.0
     # The first 80 s pass before a vehicle has left; growth of 2 % still counts as served.
     expected = 1.02 * served / (1.0 - 80.0 / 3600.0)

@@ -38,7 +38,7 @@ def test_gini_refuses(wrong: Any) -> None:
 
 
 def test_worst_lane_of_rows() -> None:
-    experiment = fair("dim", 4, 200.0).experiment(1)
+    experiment = fair("dim", 4, 200.0).recipe(1)
     rows = lane_waits(pd.DataFrame([synthetic_row(experiment)]), 4)
     row = rows.iloc[0]
     assert row["worst_lane_s"] == row["lanes_d_complete_waiting_time_s"]

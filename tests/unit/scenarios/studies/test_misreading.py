@@ -7,32 +7,14 @@ import math
 
 import pytest
 
-from dim import Dim, ExactPerception, NoisyPerception
-from dim.senses.tally import Tallied
+from dim import Dim, NoisyPerception
 from minisim import simulate
 from minisim.errors import CollisionError, InputError
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.controllers import controller_named
-from scenarios.misreading import counted, with_perception
 from scenarios.statistics import poisson_interval
 
 WRONG = NoisyPerception(0.15)
-
-
-def test_only_vehicles_of_dim_misread() -> None:
-    assert with_perception(Dim(gate="harmonious"), WRONG) == Dim("size", gate="harmonious",
-                                                                perception=WRONG)  # fmt: skip
-    fixed = controller_named("fixed-time")
-    assert with_perception(fixed, ExactPerception()) is fixed
-    with pytest.raises(InputError, match="can misread each other, not those of 'fixed-time'"):
-        with_perception(fixed, WRONG)
-
-
-def test_what_errs_is_counted() -> None:
-    assert counted(Dim(perception=WRONG)) == Tallied(Dim(perception=WRONG))
-    assert counted(Dim()) == Dim()
-    assert counted(controller_named("adaptive")).name == "adaptive"
 
 
 # --- rates -----------------------------------------------------------------------------------
@@ -83,32 +65,10 @@ RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", 
 
 
 def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
-    assert main([*RUN, "--intent-error", "0.25", "--error-kind", "symmetric"]) == 0
-    text = capsys.readouterr().out
-    assert "dim-symmetric-0.25" in text
-    assert "false grants" in text
-    assert main([*RUN, "--json", "-c", "dim-unsignalled"]) == 0
+    assert main([*RUN, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)"]) == 0
+    assert "false grants" in capsys.readouterr().out
+    assert main([*RUN, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["crossings"] >= found["trips"] - found["unfinished"]
     assert main(RUN) == 0
     assert "false grants" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--intent-error", "1.5"), "intent_error must be at least 0 and at most 1, got 1.5"),
-        (("--intent-error", "nan"), "intent_error must be"),
-        (("--error-kind", "mised"), "did you mean 'missed'"),
-        (("--error-kind", "symmetric"), "--error-kind symmetric needs --intent-error P above 0"),
-        (("-c", "dim-occlusion", "--intent-error", "0.1"), "has a perception of its own"),
-        (("--intent-error", "0.1", "-c", "fixed-time"), "not those of 'fixed-time'"),
-    ],
-)
-def test_bad_values_exit_2(capsys: Captured, options: tuple[str, ...], message: str) -> None:
-    assert main([*RUN, *options]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("minisim: ")
-    assert message in captured.err
-    assert captured.err.count("\n") == 1

@@ -13,13 +13,14 @@ import pytest
 from dim import Dim, Mixed
 from minisim.errors import InputError
 from scenarios import studies
+from scenarios.controllers import RIVALS
+from scenarios.recipe import Recipe
 from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.studies.capacity import CapacityStudy
-from scenarios.studies.fair import RIVALS
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.paper_comparison import published
 from scenarios.studies.shared.points import ControllerPoint, fair
-from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.keys import key_of
 from tests.builders import synthetic_find, synthetic_row
 
 
@@ -41,15 +42,15 @@ def test_the_paper_s_grid_is_700_hours(name: str) -> None:
     wanted = {tuple(row) for row in published_cells.itertuples(index=False)}
     assert {(c.series, c.arms, c.split, c.density) for c in points} == wanted
     runs = study_named(name).runs(10)
-    assert len({experiment.key for _, experiment in runs}) == len(runs)
+    assert len({key_of(recipe) for _, recipe in runs}) == len(runs)
     assert len(runs) == 700 - 7 * sum(c.series in study_named(name).few for c in points)
 
 
 def test_priorities_by_inflow_where_the_text_has_them() -> None:
     """The highest is that "with the maximum incoming traffic": a and c, then b and d."""
-    wanted = ControllerPoint("paper", "dim", "dim-inflow", 4, "4:1:4:1", 200.0)
+    wanted = ControllerPoint("paper", "dim", "dim:priorities=inflow", 4, "4:1:4:1", 200.0)
     assert wanted in study_named("text").points
-    experiment = wanted.experiment(1)
+    experiment = wanted.recipe(1)
     assert isinstance(experiment.controller, Dim)
     assert experiment.controller.ranks(experiment.scenario.site()) == (0, 2, 1, 3)
 
@@ -57,15 +58,15 @@ def test_priorities_by_inflow_where_the_text_has_them() -> None:
 def test_the_as_run_study_runs_what_ran() -> None:
     """Discrepancies 10 to 14: balanced V2I-C, 5 s of green, north and east loaded."""
     cases = {(c.series, c.split, c.density, c.arms): c for c in study_named("as-run").points}
-    v2ic = cases["v2ic", "4:3:2:1", 200.0, 4].experiment(1)
+    v2ic = cases["v2ic", "4:3:2:1", 200.0, 4].recipe(1)
     assert set(v2ic.scenario.rates) == {200.0}
-    signal = cases["fixed-time", "4:3:2:1", 300.0, 4].experiment(1)
+    signal = cases["fixed-time", "4:3:2:1", 300.0, 4].recipe(1)
     assert signal.controller.greens == 5.0  # type: ignore[attr-defined]
-    loaded = cases["adaptive", "4:1:4:1", 250.0, 4].experiment(1)
+    loaded = cases["adaptive", "4:1:4:1", 250.0, 4].recipe(1)
     assert loaded.scenario.rates == pytest.approx((400.0, 400.0, 100.0, 100.0))
-    dim = cases["dim", "4:1:4:1", 250.0, 4].experiment(1)
+    dim = cases["dim", "4:1:4:1", 250.0, 4].recipe(1)
     assert dim.scenario.rates == pytest.approx((400.0, 100.0, 400.0, 100.0))
-    assert {c.experiment(1).scenario.profile.name for c in cases.values()} == {
+    assert {c.recipe(1).scenario.profile.name for c in cases.values()} == {
         "as_run", "as_run_signals",
     }  # fmt: skip
 
@@ -74,10 +75,10 @@ def test_all_controllers_of_a_study_share_their_arrivals() -> None:
     study = study_named("fair")
     same = [c for c in study.points if c.density == 200.0]
     assert [c.series for c in same] == list(RIVALS)
-    runs = [c.experiment(3, 120.0) for c in same]
+    runs = [c.recipe(3, 120.0) for c in same]
     for one, other in pairwise(runs):
         assert (one.scenario, one.seed) == (other.scenario, other.seed)
-        assert one.key != other.key
+        assert key_of(one) != key_of(other)
 
 
 def test_the_humans_study_tells_its_shares_apart() -> None:
@@ -85,7 +86,7 @@ def test_the_humans_study_tells_its_shares_apart() -> None:
     assert len(study.points) == len(set(study.points)) == 2 * (2 * 7 + 1)
     runs = study.runs(2)
     assert len({(e.name, e.scenario.density, e.seed) for _, e in runs}) == len(runs)
-    shares = {c.humans: c.experiment(1).controller for c in study.points if c.series == "dim"}
+    shares = {c.humans: c.recipe(1).driven for c in study.points if c.series == "dim"}
     assert shares[0.0] == Dim()
     assert shares[0.4] == Mixed(Dim(), 0.4)
     assert fair("dim", 4, 150.0, 0.4).where == "40% humans, 4 arms, balanced"
@@ -100,15 +101,15 @@ def test_results_say_what_is_missing() -> None:
     study = study_named("gate")
     effort = Effort(seeds=2, horizon=120.0)
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         rows: list[Mapping[str, Any] | None] = [dict(row) for row in map(synthetic_row, asked)]
         for k, experiment in enumerate(asked):
-            if experiment.label == "dim-harmonious":
+            if experiment.label == "dim:gate=harmonious":
                 rows[k] = None if experiment.seed == 1 else {**rows[k], "error": "broken"}  # type: ignore[dict-item]
         return rows
 
     results = study.collect(effort, find)
-    assert {point.series for point in results.missing} == {"dim-harmonious"}
+    assert {point.series for point in results.missing} == {"dim:gate=harmonious"}
     assert len(results.missing) == len(study.points) // 2 == len(results.failed)
     assert len(results.good) == len(study.points)
     nothing = study.collect(effort, lambda asked: [None] * len(asked))

@@ -12,7 +12,8 @@ from scenarios.statistics import poisson_interval
 from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.intent_errors import CROSSINGS, MANNERS, IntentErrorPoint, rate_of
-from scenarios.sweep.experiment import run_experiment
+from scenarios.sweep.keys import key_of
+from scenarios.sweep.rows import outcome_of
 
 
 def test_a_rate_is_that_of_all_runs_together() -> None:
@@ -42,10 +43,10 @@ def test_the_study_goes_over_rates_kinds_and_manners() -> None:
         (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
     }
     assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
-    exact = [c.experiment(1).controller for c in cases if c.perception.period is None]
+    exact = [c.recipe(1).controller for c in cases if c.perception.period is None]
     assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
     assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
-    keys = {c.experiment(1).key for c in cases}
+    keys = {key_of(c.recipe(1)) for c in cases}
     assert len(keys) == len(cases)
 
 
@@ -59,11 +60,11 @@ def test_all_cases_meet_the_same_arrivals_and_count(name: str) -> None:
 
 
 def test_a_row_holds_what_was_counted() -> None:
-    row, _ = run_experiment(IntentErrorPoint("dim", "symmetric", 0.25).experiment(1, 300.0))
-    assert row["controller"] == "dim-symmetric-0.25"
+    row, _ = outcome_of(IntentErrorPoint("dim", "symmetric", 0.25).recipe(1, 300.0))
+    assert row["controller"] == "dim:perception=noisy(intent_error=0.25,kind=symmetric)"
     assert row["crossings"] > 50
     assert row["false_grants"] > 0
     assert row["disagreement_s"] > 0.0
     assert row["deadlock_s"] == 0.0
-    plain, _ = run_experiment(IntentErrorPoint("dim").experiment(1, 60.0))
+    plain, _ = outcome_of(IntentErrorPoint("dim").recipe(1, 60.0))
     assert "crossings" not in plain

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from minisim.errors import InputError
+from scenarios.recipe import Recipe
 from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.paper_comparison import (
@@ -20,7 +21,6 @@ from scenarios.studies.shared.paper_comparison import (
     published,
     score,
 )
-from scenarios.sweep.experiment import Experiment
 from tests.builders import free_flow, synthetic_find, synthetic_row
 
 
@@ -57,7 +57,7 @@ def test_comparison_by_hand() -> None:
 
 
 def test_equal_values_make_no_interval() -> None:
-    def still(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def still(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{**synthetic_row(e), "waiting_time_s": 0.0} for e in asked]
 
     table = compare(study_named("as-run").collect(Effort(seeds=2), still).good)

@@ -6,12 +6,14 @@ A cell is all that was run alike but for the seed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.junction.geometry import ARM_NAMES
-from minisim.results.trips import METRICS
-from scenarios.statistics import FILLING, growing, mean_interval, prediction_interval
+from minisim.results.metrics import AVERAGED, Metric
+from minisim.results.summary import GROUPS
+from scenarios.statistics import FILLING, mean_interval, prediction_interval
+from scenarios.sweep.rows import grows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,11 +28,18 @@ CELL: Final = (
     "turns",
     "density",
     "horizon_s",
+    "warmup_s",
     "controller",
 )
 
-#: Both forms of every mean: over the trips that ended, and over all (`minisim.results.trips`).
-AVERAGED: Final = (*METRICS, *(f"complete_{metric}" for metric in METRICS))
+#: Summed over the runs of a cell.
+SUMS: Final = ("trips", "unfinished", "collisions")
+
+#: Other columns of runs that are no metric of a cell.
+OTHERS: Final = ("seed", "queue_growth", "growing", "arrivals", "cpu_s", "version", "error")
+
+#: What columns of groups of trips begin with.
+GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
@@ -38,8 +47,9 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
-        (sums); each of `AVERAGED` with the half widths of its 95 % confidence interval (`…_ci95`)
-        and of the 95 % prediction interval of one more run (`…_pi95`), NaN where unknown;
+        (sums); each of the columns `averaged` with the half widths of its 95 % confidence interval
+        (`…_ci95`) and of the 95 % prediction interval of one more run (`…_pi95`), NaN where
+        unknown;
         `growing`, whether its queues kept growing, asked of all its runs together; `too_short`,
         whether the runs are too short to tell; `cpu_s`, mean processor time of a run.
     """
@@ -56,8 +66,27 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.DataFrame:
-    """Mean of `metric` under one controller less that under another, run by run.
+def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
+    """Columns that are averaged: both forms of the usual means, and what was asked for besides."""
+    known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
+    more = [
+        column
+        for column in rows.columns
+        if column not in known and not column.startswith(GROUPED) and _is_numeric(rows[column])
+    ]
+    return (*AVERAGED, *more)
+
+
+def _is_numeric(column: pd.Series[Any]) -> bool:
+    """Whether it holds a number, and nothing but numbers where it holds something."""
+    there = column.dropna()
+    return len(there) > 0 and all(isinstance(value, Real) for value in there)
+
+
+def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
+    """Mean of `metric`, a column or a `Metric`, under one controller less that under another.
+
+    Runs are compared one by one.
 
     Returns:
         One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` and
@@ -68,7 +97,8 @@ def differences(rows: pd.DataFrame, metric: str, first: str, second: str) -> pd.
     """
     import pandas as pd
 
-    choice("metric", metric, AVERAGED)
+    metric = metric.name if isinstance(metric, Metric) else metric
+    choice("metric", metric, averaged(rows))
     for name in (first, second):
         choice("controller of these rows", name, sorted(set(rows["controller"])))
     by = [column for column in CELL if column != "controller"]
@@ -113,10 +143,8 @@ def pairs(
 
 
 def _averaged(good: pd.DataFrame) -> dict[str, object]:
-    cell: dict[str, object] = {
-        name: int(good[name].sum()) for name in ("trips", "unfinished", "collisions")
-    }
-    for metric in AVERAGED:
+    cell: dict[str, object] = {name: int(good[name].sum()) for name in SUMS}
+    for metric in averaged(good):
         values = good[metric].dropna().astype(float).tolist()
         if values:
             interval = mean_interval(values)
@@ -136,10 +164,7 @@ def saturated(good: pd.DataFrame) -> bool:
     if too_short(good):
         return False
     arms = int(good["arms"].iloc[0])
-    return any(
-        growing(float(good[f"{of}queue_growth"].sum()), int(good[f"{of}trips"].sum()))
-        for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
-    )
+    return grows(good.filter(regex="(queue_growth|trips)$").sum(), arms)
 
 
 def too_short(good: pd.DataFrame) -> bool:
@@ -148,7 +173,7 @@ def too_short(good: pd.DataFrame) -> bool:
     The travel time on a free road is taken as travel time less time loss: of the trips that ended,
     and where none did, of what was driven.
     """
-    horizon = float(good["horizon_s"].iloc[0])
+    horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (
         (good[f"{form}travel_time_s"].astype(float) - good[f"{form}time_loss_s"].astype(float))
         for form in ("", "complete_")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,18 +14,23 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
+from minisim.results.metrics import AVERAGED, Metric, queue_growth
+from minisim.results.run import Run
+from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.controllers import controller_named
+from scenarios.recipe import Recipe
 from scenarios.statistics import (
     GROWTH_SCORE,
     growing,
     mean_interval,
     prediction_interval,
-    queue_growth,
 )
-from scenarios.studies.cells import AVERAGED, CELL, cells, differences, pairs, saturated
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import RESULTS, Experiment, canonical, run_experiment
+from scenarios.sweep.cells import CELL, cells, differences, pairs, saturated
+from scenarios.sweep.keys import RESULTS, canonical, key_of
+from scenarios.sweep.rows import outcome_of
+from scenarios.sweep.store import Store
 from tests.builders import free_flow
 
 Floats = npt.NDArray[np.float64]
@@ -126,23 +132,20 @@ def present(times: Floats, end: float) -> float:
     ("scenario", "controller", "expected"),
     [
         (five_way(350), "dim", True),  # the paper's own: lane e keeps queueing
-        (five_way(350, profile="fair"), "dim-harmonious", False),
+        (five_way(350, profile="fair"), "dim:gate=harmonious", False),
         (four_way(150), "dim", False),
         (four_way(350), "fixed-time", False),  # x = 0.96, with swings of 25 vehicles a cycle
         (four_way(500), "fixed-time", True),
     ],
 )
 def test_real_runs(scenario: Scenario, controller: str, expected: bool) -> None:
-    rows = [
-        run_experiment(Experiment(scenario, controller_named(controller), seed)).row
-        for seed in (1, 2)
-    ]
+    rows = [outcome_of(Recipe(scenario, controller_named(controller), seed)).row for seed in (1, 2)]
     (cell,) = cells(pd.DataFrame(rows)).to_dict("records")
     assert cell["growing"] is expected
 
 
 def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
-    row = run_experiment(Experiment(four_way(350, horizon=100), Dim(), 1)).row
+    row = outcome_of(Recipe(four_way(350, horizon=100), Dim(), 1)).row
     (cell,) = cells(pd.DataFrame([row])).to_dict("records")
     assert row["queue_growth"] > 0.0
     assert cell["too_short"]
@@ -155,9 +158,9 @@ def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
 @pytest.fixture(scope="module")
 def rows() -> pd.DataFrame:
     todo = [
-        Experiment(four_way(density, horizon=300), controller_named(name), seed)
+        Recipe(four_way(density, horizon=300), controller_named(name), seed)
         for density in (150, 300)
-        for name in ("dim", "dim-harmonious", "unregulated")
+        for name in ("dim", "dim:gate=harmonious", "unregulated")
         for seed in (1, 2, 3)
     ]
     return sweep(todo, jobs=1)
@@ -166,7 +169,7 @@ def rows() -> pd.DataFrame:
 def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     found = cells(rows)
     assert list(zip(found["density"], found["controller"], strict=True))[:2] == [
-        (150, "dim"), (150, "dim-harmonious"),
+        (150, "dim"), (150, "dim:gate=harmonious"),
     ]  # fmt: skip
     first = found.iloc[0]
     group = rows[:3]
@@ -189,13 +192,13 @@ def test_a_cell_of_failures_has_no_means(rows: pd.DataFrame) -> None:
 
 
 def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
-    found = differences(rows, "complete_waiting_time_s", "dim", "dim-harmonious")
+    found = differences(rows, "complete_waiting_time_s", "dim", "dim:gate=harmonious")
     assert found["density"].tolist() == [150, 300]
     assert found["pairs"].tolist() == [3, 3]
     values = rows[rows["density"] == 300].set_index(["controller", "seed"])[
         "complete_waiting_time_s"
     ]
-    expected = (values["dim"] - values["dim-harmonious"]).mean()
+    expected = (values["dim"] - values["dim:gate=harmonious"]).mean()
     assert found["difference"][1] == pytest.approx(expected)
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
 
@@ -214,18 +217,90 @@ def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
     with pytest.raises(InputError, match="did not meet the same arrivals"):
-        differences(other, "waiting_time_s", "dim", "dim-harmonious")
+        differences(other, "waiting_time_s", "dim", "dim:gate=harmonious")
     with pytest.raises(InputError, match="unknown controller of these rows 'dmi'"):
         differences(rows, "waiting_time_s", "dmi", "dim")
     with pytest.raises(InputError, match="unknown metric 'wait'"):
-        differences(rows, "wait", "dim", "dim-harmonious")
+        differences(rows, "wait", "dim", "dim:gate=harmonious")
+
+
+def crossings_of(run: Run) -> int:
+    """A caller's own metric: how often a vehicle passed the junction's entry."""
+    return int(np.isfinite(run.columns.depart).sum())
+
+
+def slowness(run: Run) -> Floats:
+    """Another one: seconds a trip has lost over those that it drove."""
+    return np.where(
+        run.columns.travel_time > 0.0, run.columns.time_loss / run.columns.travel_time, np.nan
+    )
+
+
+OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="trip"))
+
+
+def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
+    todo = [
+        Recipe(four_way(200, horizon=120), controller_named(name), seed)
+        for name in ("dim", "fixed-time")
+        for seed in (1, 2)
+    ]
+    with Store(tmp_path / "runs.db") as store:
+        first = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
+        again = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
+        assert len(store) == 4, "the same runs have the same keys"
+        sweep(todo, jobs=1, store=store)
+        assert len(store) == 8, "runs that measure less are others"
+    pd.testing.assert_frame_equal(first, again)
+    run = simulate(todo[0].scenario, todo[0].controller, 1)
+    summary = run.summary(["waiting_time_s", *OWN])
+    for name in ("departures", "slowness", "slowness_p95", "waiting_time_s_max"):
+        assert first[name][0] == summary[name]
+    assert first["lanes_a_slowness"][0] == summary["lanes"]["a"]["slowness"]
+    assert first["complete_slowness"][0] == summary["complete"]["slowness"]
+    averages = cells(first)
+    for name in ("departures", "slowness", "complete_slowness", "slowness_p95"):
+        assert averages[name][0] == pytest.approx(first[name][:2].mean())
+        assert averages[f"{name}_ci95"].notna().all()
+    (gap,) = differences(first, OWN[1], "dim", "fixed-time").to_dict("records")
+    expected = first["slowness"][:2].mean() - first["slowness"][2:].mean()
+    assert gap["difference"] == pytest.approx(expected)
+
+
+def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
+    def one(run: Run) -> float:
+        return 1.0
+
+    def key(of: Callable[[Run], float]) -> str:
+        return key_of(Recipe(four_way(), Dim(), metrics=(Metric("mine", of),)))
+
+    def power(k: float) -> Callable[[Run], float]:
+        return lambda run: k
+
+    assert key(one) == key(one)
+    assert key(power(1.0)) == key(power(1.0)) != key(power(2.0)), "what it encloses counts"
+    first, second = (
+        lambda run: 1.0,
+        lambda run: 2.0,
+    )
+    assert key(first) != key(second)
+    told = power(1.0)
+    told.version = 2  # type: ignore[attr-defined]
+    assert key(told) != key(power(1.0))
+
+
+def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
+    wrong = Metric("mine", lambda run: "many")
+    todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
+    (error,) = sweep(todo, jobs=1, metrics=[wrong])["error"]
+    assert error == "metric 'mine' must give one finite number or None, got 'many'"
 
 
 # --- experiments -----------------------------------------------------------------------------
 
 
 def test_equal_numbers_are_one_experiment() -> None:
-    assert Experiment(four_way(350), Dim()).key == Experiment(four_way(350.0), Dim()).key
+    assert key_of(Recipe(four_way(350), Dim())) == key_of(Recipe(four_way(350.0), Dim()))
     assert canonical(2**60 + 1) != canonical(2**60)
     assert canonical({"b": 1, "a": (2, None)}) == canonical({"a": [2.0, None], "b": 1.0})
     assert canonical(frozenset({2, 1})) == canonical(frozenset({1, 2}))
@@ -244,7 +319,7 @@ def test_what_has_no_canonical_form(odd: object) -> None:
         (four_way(300, horizon=900), "dim", (273, 30, 2.33, 95.61, 8.65)),
         (
             three_way(350, horizon=900, profile="fair"),
-            "dim-harmonious",
+            "dim:gate=harmonious",
             (253, 15, 0.99, 77.94, 7.12),
         ),
         (
@@ -260,16 +335,16 @@ def test_whoever_changes_results_raises_their_version(
 ) -> None:
     """Stores keep rows by version: one that gives other rows needs another `RESULTS`.
 
-    The numbers are what these runs gave under `RESULTS` = 2, no more; put in what they give now.
+    The numbers are what these runs gave under `RESULTS` = 3, no more; put in what they give now.
     """
     recipe = controller_named(controller, scenario.profile)
-    row = run_experiment(Experiment(scenario, recipe, 1, on_collision="record")).row
+    row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
     columns = (
         "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
     )  # fmt: skip
     found = [row[column] for column in columns]
-    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.experiment.RESULTS"
-    assert RESULTS == 2
+    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
+    assert RESULTS == 3
 
 
 # --- growing queues -------------------------------------------------------------------------
