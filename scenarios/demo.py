@@ -13,6 +13,7 @@ from rich.table import Table
 from minisim.errors import InputError, MinisimError
 from minisim.files import markdown_table, write_table, write_text
 from minisim.parameters import declared, real, reals, whole
+from minisim.results.metrics import heading
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
@@ -34,10 +35,8 @@ CONTROLLERS = {
 }
 #: Averaged over seeds: column of a sweep -> heading.
 METRICS = {
-    "waiting_time_s": "waiting [s]",
-    "travel_time_s": "travel [s]",
-    "depart_delay_s": "departure delay [s]",
-    "unfinished": "unfinished",
+    name: heading(name)
+    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 }
 PROFILE = "fair"
 
@@ -143,8 +142,8 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The result for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, heading in enumerate(_headings()):
-        table.add_column(heading, justify="left" if k == 1 else "right")
+    for k, title in enumerate(_headings()):
+        table.add_column(title, justify="left" if k == 1 else "right")
     rows = _cells(points)
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         table.add_row(*row, end_section=following is not None and following[0] != row[0])

@@ -95,8 +95,8 @@ class Recipe:
         from minisim.simulation import simulate
 
         host = host or simulate
-        if options.get("record") is None:
-            options["record"] = recording(self.metrics)
+        if options.get("record") is None and (record := recording(self.metrics)):
+            options["record"] = record
         return host(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

@@ -220,7 +220,9 @@ def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
     found = read(
         tmp_path, 'scenario = "three-way"\ncontroller = {name = "fixed-time", greens = [1, 2]}\n'
     )
-    with pytest.raises(InputError, match=r"fixed-time:greens=\(1,2\) cannot serve three-way at 350 .*2 values"):
+    with pytest.raises(
+        InputError, match=r"fixed-time:greens=\(1,2\) cannot serve three-way at 350 .*2 values"
+    ):
         check_can_run(found)
     store = tmp_path / "s.db"
     assert main(["sweep", str(tmp_path / "e.toml"), "--out", str(store)]) == 2
