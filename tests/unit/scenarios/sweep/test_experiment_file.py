@@ -187,7 +187,8 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]', r"both be called dim.*label"),
+    ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
+     r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
 ]  # fmt: skip
 
@@ -221,7 +222,7 @@ def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
         tmp_path, 'scenario = "three-way"\ncontroller = {name = "fixed-time", greens = [1, 2]}\n'
     )
     with pytest.raises(
-        InputError, match=r"fixed-time:greens=\(1,2\) cannot serve three-way at 350 .*2 values"
+        InputError, match=r"greens=\(1,2\) cannot serve three-way at 350 .*2 values"
     ):
         check_can_run(found)
     store = tmp_path / "s.db"
