@@ -234,6 +234,14 @@ def synthetic_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | No
     return [synthetic_row(experiment) for experiment in experiments]
 
 
+def free_flow(seconds: float) -> dict[str, float | None]:
+    """Columns of a run of an hour with this travel time on a free road."""
+    return {
+        "horizon_s": 3600.0, "warmup_s": 0.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
+        "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
+    }  # fmt: skip
+
+
 def share(part: float) -> settings:
     """Decorator: only this share of the profile's examples, for costly properties."""
     return settings(max_examples=max(1, round(part * settings().max_examples)))

@@ -13,6 +13,7 @@ import typer
 from minisim.errors import InputError, choice, integer, number
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar, show
+from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.termination import Terminated
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
 #: The study that is the paper's grid as its text prescribes it.
 PAPER = {"paper": "text"}
+#: Studies that are lists of experiments.
+STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
 
 
 @app.command(
@@ -66,8 +69,7 @@ def sweep(
             metavar="FILE.toml|paper|STUDY", show_default=False,
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            "study of minisim reproduce: as-run, fair, gate, fairness, humans, perception or "
-            "confidence.",
+            f"study of minisim reproduce: {', '.join(STUDIES)}.",
         ),
     ],
     out: Annotated[
@@ -138,12 +140,11 @@ def sweep(
 
 def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
     """A study's, or those of a file; a word that is neither is taken for a study's name."""
-    from scenarios.studies.study import STUDIES
     from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = (*PAPER, *STUDIES)
     if what in studies or not (Path(what).suffix or Path(what).exists()):
-        study = STUDIES[PAPER.get(name := choice("study", what, studies), name)]
+        study = study_named(PAPER.get(name := choice("study", what, studies), name))
         runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
         found = [experiment for _, experiment in runs]
     else:

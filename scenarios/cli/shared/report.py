@@ -16,7 +16,7 @@ from scenarios.statistics import FILLING
 if TYPE_CHECKING:
     import pandas as pd
 
-    from figures.gallery import Item
+    from figures.studies.shared.section import Item
     from scenarios.recipe import Recipe
 
 #: Closest calls that every run of the command line shows.

@@ -5,22 +5,14 @@ from __future__ import annotations
 import json
 import math
 
-import pandas as pd
 import pytest
 
-from dim import Dim, Monitor, NoisyPerception
-from dim.senses.intent import RATES
-from dim.senses.noise import UNSIGNALLED
+from dim import Dim, NoisyPerception
 from minisim import simulate
 from minisim.errors import CollisionError, InputError
 from scenarios import four_way
 from scenarios.cli import main
 from scenarios.statistics import poisson_interval
-from scenarios.studies.misreading import CROSSINGS, MANNERS, Misreading, rate_of
-from scenarios.studies.results import Effort
-from scenarios.studies.study import STUDIES
-from scenarios.sweep.keys import key_of
-from scenarios.sweep.rows import outcome_of
 
 WRONG = NoisyPerception(0.15)
 
@@ -51,63 +43,6 @@ def test_poisson_interval_by_its_definition() -> None:
         poisson_interval(-1)
     with pytest.raises(InputError, match="confidence must be"):
         poisson_interval(1, 1.0)
-
-
-def test_a_rate_is_that_of_all_runs_together() -> None:
-    rows = pd.DataFrame(
-        {"collisions": [3, 2], "crossings": [900.0, 1100.0], "trips": [9, 9], "unfinished": [0, 0]}
-    )
-    rate = rate_of(rows, "collisions")
-    assert rate is not None
-    low, high = poisson_interval(5)
-    assert rate == pytest.approx((25.0, 5.0 * low, 5.0 * high, 5, 2000))
-    assert rate.rate == 5 * CROSSINGS / 2000
-
-
-def test_runs_without_tally_have_their_trips() -> None:
-    rows = pd.DataFrame({"collisions": [0], "trips": [1010], "unfinished": [10]})
-    collisions, grants = rate_of(rows, "collisions"), rate_of(rows, "false_grants")
-    assert collisions == grants
-    assert collisions is not None
-    assert (collisions.crossings, collisions.rate) == (1000, 0.0)
-    assert rate_of(rows.assign(trips=10), "collisions") is None
-
-
-# --- studies ---------------------------------------------------------------------------------
-
-
-def test_the_study_goes_over_rates_kinds_and_manners() -> None:
-    cases = [c for c in STUDIES["perception"].cases if isinstance(c, Misreading)]
-    assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
-    found = {
-        (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
-    }
-    assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
-    exact = [c.experiment(1).controller for c in cases if c.perception.period is None]
-    assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
-    assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
-    keys = {key_of(c.experiment(1)) for c in cases}
-    assert len(keys) == len(cases)
-
-
-@pytest.mark.parametrize("name", ["perception", "confidence"])
-def test_all_cases_meet_the_same_arrivals_and_count(name: str) -> None:
-    runs = [e for _, e in STUDIES[name].runs(10)]
-    assert len(runs) == 5 * len(STUDIES[name].cases)
-    assert len({(e.scenario, e.seed) for e in runs}) == 5
-    assert {e.on_collision for e in runs} == {"record"}
-    assert Effort.quick().cases(STUDIES[name]) == STUDIES[name].cases
-
-
-def test_a_row_holds_what_was_counted() -> None:
-    row, _ = outcome_of(Misreading("dim", "symmetric", 0.25).experiment(1, 300.0))
-    assert row["controller"] == "dim:perception=noisy(intent_error=0.25,kind=symmetric)"
-    assert row["crossings"] > 50
-    assert row["false_grants"] > 0
-    assert row["disagreement_s"] > 0.0
-    assert row["deadlock_s"] == 0.0
-    plain, _ = outcome_of(Misreading("dim").experiment(1, 60.0))
-    assert "crossings" not in plain
 
 
 def test_the_collision_that_docs_explain() -> None:

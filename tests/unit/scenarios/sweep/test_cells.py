@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,15 +21,17 @@ from scenarios import Scenario, five_way, four_way, three_way
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.statistics import (
+    GROWTH_SCORE,
     growing,
     mean_interval,
     prediction_interval,
 )
 from scenarios.sweep import sweep
-from scenarios.sweep.cells import CELL, cells, differences, pairs
+from scenarios.sweep.cells import CELL, cells, differences, pairs, saturated
 from scenarios.sweep.keys import RESULTS, canonical, key_of
 from scenarios.sweep.rows import outcome_of
 from scenarios.sweep.store import Store
+from tests.builders import free_flow
 
 Floats = npt.NDArray[np.float64]
 
@@ -342,3 +345,35 @@ def test_whoever_changes_results_raises_their_version(
     found = [row[column] for column in columns]
     assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
     assert RESULTS == 3
+
+
+# --- growing queues -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("run", "expected"),
+    [
+        ({}, True),
+        ({"horizon_s": 240.0}, True),
+        ({"horizon_s": 239.0}, False),  # four times 60 s
+        ({"horizon_s": 150.0, "travel_time_s": None}, True),  # 30 s of what was driven
+        ({"horizon_s": 119.0, "travel_time_s": None}, False),
+    ],
+)
+def test_roads_that_fill_are_no_growing_queue(run: Mapping[str, Any], expected: bool) -> None:
+    quiet = {f"lanes_{k}_{key}": 0 for k in "abc" for key in ("trips", "queue_growth")}
+    row = {"arms": 3, "trips": 100, "queue_growth": 100.0, **quiet, **free_flow(60.0), **run}
+    assert saturated(pd.DataFrame([row])) is expected
+
+
+def test_saturated_sums_over_runs_and_lanes() -> None:
+    """`GROWTH_SCORE` standard deviations √(5/12 · trips); two runs have √2 times that."""
+    limit = GROWTH_SCORE * math.sqrt(5.0 / 12.0 * 120)
+    quiet = {
+        f"lanes_{k}_{key}": v for k in "abc" for key, v in (("trips", 40), ("queue_growth", 0))
+    }
+    one = {"arms": 3, "trips": 120, "queue_growth": 0.9 * limit, **quiet, **free_flow(60.0)}
+    assert not saturated(pd.DataFrame([one]))
+    assert saturated(pd.DataFrame([one, one]))
+    lane = {**one, "queue_growth": 0.0, "lanes_c_queue_growth": 0.9 * limit}
+    assert saturated(pd.DataFrame([lane])), "1/√3 of the junction's limit is a lane's"

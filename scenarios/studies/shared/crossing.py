@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, items, numbers
@@ -15,15 +14,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-#: What "worse" may mean: name -> column of `with_total_delay`. The complete forms, which count what
-#: vehicles still on the road have waited and lost; others flatter whoever serves few.
-METRICS: Mapping[str, str] = MappingProxyType({
-    "waiting time": "complete_waiting_time_s",
-    "time loss": "complete_time_loss_s",
-    "time loss and departure delay": "total_delay_s",
-})  # fmt: skip
-
-
 class Crossing(NamedTuple):
     """The demand from which on one does worse.
 
@@ -32,7 +22,7 @@ class Crossing(NamedTuple):
             it is positive at the lowest demand tried, +inf where it never is.
         low, high: interval of it, open (±inf) where the demands tried do not bound it.
         until: where the mean difference falls back to 0 or less, +inf where it does not: beyond
-            the capacity of both, nobody wins.
+            the capacity of both, neither wins.
         tried: lowest and highest demand of both; nothing is known beyond.
     """
 
@@ -102,23 +92,12 @@ def crossing(differences: Mapping[float, Sequence[float]], confidence: float = 0
     )
 
 
-def tried(found: Iterable[Crossing]) -> tuple[float, float]:
+def tried(crossings: Iterable[Crossing]) -> tuple[float, float]:
     """Lowest and highest demand of any; raises `InputError` where there is none."""
-    ends = [crossing.tried for crossing in found]
+    ends = [crossing.tried for crossing in crossings]
     if not ends:
         raise InputError("no crossing is known")
     return min(low for low, _ in ends), max(high for _, high in ends)
-
-
-def with_total_delay(rows: pd.DataFrame) -> pd.DataFrame:
-    """Add `total_delay_s`: mean time loss on the road plus mean departure delay, both complete.
-
-    SUMO's total delay, but with the vehicles that have not arrived, and those not even departed.
-    """
-    delay = rows["complete_time_loss_s"].astype(float) + rows["complete_depart_delay_s"].astype(
-        float
-    )
-    return rows.assign(total_delay_s=delay)
 
 
 def paired_differences(
@@ -127,15 +106,15 @@ def paired_differences(
     """Differences of `metric`, ours minus theirs, at each density, one a common seed.
 
     Args:
-        rows: of a study (`scenarios.studies.results`), with the metric.
+        rows: of a study, with the metric.
         ours, theirs: series.
         metric: a column.
 
     Raises:
         InputError: two runs of one seed with other arrivals.
     """
-    found = pairs(rows, metric, "series", (ours, theirs), ["density"])
-    return {float(density): values for (density,), values in found.items() if len(values) > 1}
+    by_density = pairs(rows, metric, "series", (ours, theirs), ["density"])
+    return {float(density): values for (density,), values in by_density.items() if len(values) > 1}
 
 
 def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:

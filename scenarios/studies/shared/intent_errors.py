@@ -1,15 +1,13 @@
-"""What is run to see how wrong perception ends, and the rates of rare events in it."""
+"""Points at which vehicles misread each other's intent, and the rates of rare events in them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from dim import NoisyPerception
-from dim.senses.intent import KINDS, RATES
-from dim.senses.noise import CLASSIFIER, UNSIGNALLED
+from dim.senses.noise import UNSIGNALLED
 from minisim.parameters import spelled
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS, regular
@@ -24,22 +22,23 @@ CROSSINGS = 10_000
 #: The demand of these studies [veh/h/lane]: well below saturation, so that what is lost is lost to
 #: perception.
 DENSITY = 250.0
-#: Who errs alike and for how long, and what that is called: (shared, persistent) -> words.
+#: Whether all err alike, and whether errors last: (shared, persistent) -> words.
 MANNERS = {
     (True, True): "all alike, lasting",
     (True, False): "all alike, each frame anew",
     (False, True): "each for itself, lasting",
     (False, False): "each for itself, each frame anew",
 }
-#: Whose vehicles misread: the rules alone, with a safety monitor, and with the highest-priority
-#: lane first.
+#: The controllers whose vehicles misread: the rules alone, with a safety monitor, and with the
+#: highest-priority lane first.
 MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
-#: Thresholds of confidence; 0 takes every reading as it is.
-THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
+#: Vehicles that misread each other look around every 0.1 s, which costs 3 s of CPU an hour, and
+#: more with a monitor.
+FEW = dict.fromkeys(MISREADERS, 5)
 
 
-class Misreading(NamedTuple):
-    """One point of a figure: everything of a run but its seed and horizon.
+class IntentErrorPoint(NamedTuple):
+    """DIM with vehicles that misread each other in one way.
 
     Attributes:
         series: the controller by its command-line name.
@@ -71,10 +70,10 @@ class Misreading(NamedTuple):
 
     @property
     def where(self) -> str:
-        """What tells it from other cases of its series, but for the demand."""
+        """What tells it from other points of its series, but for the demand."""
         return f"{self.arms} arms, {spelled('noisy', self.perception)}"
 
-    def experiment(self, seed: int, horizon: float = 3600.0) -> Recipe:
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed; collisions and wrong decisions are counted."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, profile="fair", horizon=horizon)
@@ -82,32 +81,6 @@ class Misreading(NamedTuple):
         if self.perception.period is not None:
             controller = replace(controller, perception=self.perception)  # type: ignore[type-var]
         return Recipe(scenario, controller, seed, on_collision="record")
-
-    def __str__(self) -> str:
-        return f"{self.series}, {self.where}, {self.density:g} veh/h/lane"
-
-
-#: Over the probability of an error, and who errs how; and turns without a signal.
-ERRORS = (
-    *(Misreading(series) for series in MISREADERS),
-    *(
-        Misreading(series, kind, rate, shared, persistent)
-        for series in MISREADERS[:2]
-        for kind, (shared, persistent), rate in product(KINDS, MANNERS, RATES[1:])
-    ),
-    *(
-        Misreading("dim:order=lanes", kind, CLASSIFIER, shared, persistent)
-        for kind, (shared, persistent) in product(KINDS, MANNERS)
-    ),
-    *(Misreading(series, unsignalled=True) for series in MISREADERS),
-)
-
-#: Over the threshold of confidence. Lanes first: with the largest clique first, unknown intents
-#: block the junction.
-THRESHOLD_CASES = tuple(
-    Misreading("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
-    for kind, threshold in product(KINDS, THRESHOLDS)
-)
 
 
 class Rate(NamedTuple):
@@ -127,7 +100,7 @@ class Rate(NamedTuple):
 
 
 def rate_of(rows: pd.DataFrame, events: str) -> Rate | None:
-    """The rate of a column's events over all runs of a case; None without a crossing.
+    """The rate of a column's events over all runs of a point; None without a crossing.
 
     Runs with exact perception have no tally: their crossings are the trips that ended, and their
     decisions are right.

@@ -9,7 +9,6 @@ from functools import lru_cache
 from importlib import resources
 from statistics import stdev
 from string import ascii_lowercase
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
@@ -37,7 +36,7 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
     """Every published value beside ours.
 
     Args:
-        rows: of a study of the paper's grid (`scenarios.studies.results.collect`).
+        rows: of a study of the paper's grid (`Results.good`).
 
     Returns:
         One row a published value, columns `COMPARED`: `low` and `high` are the bounds of the 95 %
@@ -50,13 +49,13 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
 
     keys = ["series", "arms", "split", "density"]
     cells = {key: cell for key, cell in rows[rows["error"].isna()].groupby(keys)}  # noqa: C416
-    found = []
+    compared = []
     for row in sorted(published().to_dict("records"), key=_order):
         key = (row["series"], row["arms"], row["split"], float(row["density"]))
         ours = cells.get(key)
         row.update(**_ours(ours, column_of(row["metric"], row["lane"]), row["paper"]))
-        found.append(row)
-    return pd.DataFrame(found)[list(COMPARED)]
+        compared.append(row)
+    return pd.DataFrame(compared)[list(COMPARED)]
 
 
 def _order(row: Mapping[Any, Any]) -> tuple[object, ...]:
@@ -139,29 +138,6 @@ class Discrepancy(NamedTuple):
         )
 
 
-#: Series -> why its published rules collide.
-COLLIDING: Mapping[str, str] = MappingProxyType({
-    "dim": "the published five-arm table has pairs in harmony, such as c3 and e4, whose ways pass "
-           "1.48 m apart, less than a vehicle is wide; and by the published rule a decision may "
-           "still take the right of way from a vehicle that can no longer stop",
-    "v2ic": "the published conflict matrix is that of right-hand traffic (cause 14)",
-})  # fmt: skip
-
-
-#: Discrepancy -> the run or file here that shows it. The others are known from the authors' code
-#: and files, and no run here isolates them.
-SHOWN: Mapping[int, str] = MappingProxyType({
-    2: "as-run beside text, which changes vehicle, speeds and zones all at once",
-    9: "the last arrivals of the published trips, last_arrival_s in scenarios/data/reference.csv",
-    10: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
-    11: "as-run, which has these greens",
-    12: "as-run, which has the actuated signal",
-    13: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
-    14: "as-run, which has that matrix: see its collisions",
-    15: "as-run, which has these speeds",
-})  # fmt: skip
-
-
 @lru_cache
 def discrepancies() -> tuple[Discrepancy, ...]:
     """All known causes, from the data file beside the reference numbers."""
@@ -174,12 +150,12 @@ def discrepancies() -> tuple[Discrepancy, ...]:
 @lru_cache
 def labels() -> Mapping[str, str]:
     """Cause -> its number, with a letter where several have the same: 3, 9a, 9b."""
-    found: dict[int, dict[str, None]] = {}
+    by_number: dict[int, dict[str, None]] = {}
     for known in sorted(discrepancies()):
-        found.setdefault(known.number, {})[known.cause] = None
+        by_number.setdefault(known.number, {})[known.cause] = None
     return {
         cause: f"{number}{ascii_lowercase[k] if len(causes) > 1 else ''}"
-        for number, causes in found.items()
+        for number, causes in by_number.items()
         for k, cause in enumerate(causes)
     }
 

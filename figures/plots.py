@@ -1,11 +1,12 @@
-"""Means over demand with intervals, and the paper's values beside them."""
+"""Plots of means with intervals, their axes and legends, and the small print below."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from figures import style
+from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
@@ -29,12 +31,57 @@ DENSITY_LABEL = "demand [veh/h/lane]"
 FOOTNOTE_SIZE = 7.5
 
 
-def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
-    """One line a series: mean over seeds, 95 % interval, an arrow where the queue still grows.
+#: A line with few points, see `draw_line`.
+BOLD: Mapping[str, Any] = MappingProxyType(
+    {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
+)
+
+
+class Estimate(NamedTuple):
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def mean_estimate(values: pd.Series[Any]) -> Estimate:
+    """Mean and Student-t interval; a single value is its own interval."""
+    mean, half, size = mean_interval(values.astype(float).tolist())
+    half = half if size > 1 else 0.0
+    return Estimate(mean, mean - half, mean + half)
+
+
+def draw_line(
+    axes: Axes, x: Sequence[float], estimates: Sequence[Estimate], look: style.Look,
+    growing: Iterable[bool] = (), **changes: Any,
+) -> None:  # fmt: skip
+    """A line with intervals, and arrows where the queue still grew.
 
     Args:
         axes: to draw on.
-        rows: of a study (`scenarios.studies.results.Results.good`).
+        x, estimates: of its points.
+        look: of the line.
+        growing: of each point, where known.
+        changes: of the keywords of `Axes.errorbar`.
+    """
+    bars = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
+    drawn: dict[str, Any] = {
+        "color": look.colour, "marker": look.marker, "linestyle": look.dashes, "linewidth": 1.7,
+        "markersize": 5.0, "capsize": 2.6, "elinewidth": 1.1, "zorder": 3, "label": look.label,
+    }  # fmt: skip
+    axes.errorbar(x, [e.value for e in estimates], yerr=bars, **(drawn | changes))
+    for place, estimate, grown in zip(x, estimates, growing, strict=False):
+        if grown:
+            growth_arrow(axes, place, estimate.high, look.colour)
+
+
+def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
+    """One line a series over demand: mean over seeds, interval, arrows where queues still grow.
+
+    Args:
+        axes: to draw on.
+        rows: of a study (`Results.good`).
         metric: a column.
         series: in the order of the legend; one without rows is left out.
     """
@@ -45,26 +92,16 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
         )  # fmt: skip
         return
     for place, name in enumerate(series):
-        found = rows[(rows["series"] == name) & rows[metric].notna()]
-        if found.empty:
+        known = rows[(rows["series"] == name) & rows[metric].notna()]
+        if known.empty:
             continue
-        look = style.look(name)
-        points = [
-            (float(str(density)), mean_interval(cell[metric].astype(float).tolist()),
-             saturated(cell))
-            for density, cell in found.groupby("density")
-        ]  # fmt: skip
+        cells = list(known.groupby("density"))
         shift = offset(rows, place, len(series))
-        x = [density + shift for density, _, _ in points]
-        y = [interval.mean for _, interval, _ in points]
-        half = [interval.half_width if interval.size > 1 else 0.0 for _, interval, _ in points]
-        axes.errorbar(
-            x, y, yerr=half, color=look.colour, marker=look.marker, linestyle=look.dashes,
-            linewidth=1.7, markersize=5.0, capsize=2.6, elinewidth=1.1, zorder=3, label=look.label,
+        draw_line(
+            axes, [float(str(density)) + shift for density, _ in cells],
+            [mean_estimate(cell[metric]) for _, cell in cells], style.look(name),
+            [saturated(cell) for _, cell in cells],
         )  # fmt: skip
-        for a, b, bar, (_, _, grown) in zip(x, y, half, points, strict=True):
-            if grown:
-                growth_arrow(axes, a, b + bar, look.colour)
 
 
 def growth_arrow(axes: Axes, x: float, y: float, colour: str) -> None:
@@ -119,6 +156,17 @@ def density_axis(axes: Axes, densities: Iterable[float]) -> None:
     axes.set_xlim(shown[0] - margin, shown[-1] + margin)
 
 
+def paper_densities(axes: Axes) -> None:
+    """The paper's demands as ticks, with a margin around them."""
+    axes.set_xticks(DENSITIES)
+    axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
+
+
+def ylabel(axes: Axes, text: str) -> None:
+    """Write beside the vertical axis."""
+    axes.set_ylabel(text, fontsize=9.5, color=style.INK)
+
+
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
     """A logarithmic time axis from `low` to `high` [s] with plain numbers.
 
@@ -146,17 +194,40 @@ def scale_words(linear: float | None) -> str:
     return "logarithmic" if linear is None else f"log., linear below {linear:g}"
 
 
+def panels(
+    width: float, height: float, count: int, *, rows: int = 1, sharey: bool = True, **edges: float
+) -> tuple[Figure, list[Axes]]:
+    """A figure of inches with panels in rows; `edges` as of `Figure.subplots_adjust`."""
+    figure = style.new_figure(width, height)
+    drawn = figure.subplots(rows, count // rows, sharey=sharey, squeeze=False)
+    figure.subplots_adjust(**edges)
+    return figure, list(drawn.flat)
+
+
+def heading(figure: Figure, text: str) -> None:
+    """The title of a figure, above its legends."""
+    figure.text(0.012, 0.965, text, fontsize=13, fontweight="bold", color=style.INK, va="center")
+
+
+def looks_legend(
+    figure: Figure, looks: Iterable[style.Look], left: float, top: float, ncols: int | None = None,
+    *, lines: bool = True, **changes: Any,
+) -> None:  # fmt: skip
+    """A legend of lines and markers, or of markers only; `changes` as in `legend`."""
+    shown = list(looks)
+    handles = [
+        Line2D([], [], color=k.colour, marker=k.marker, linewidth=1.7, markersize=5.5,
+               linestyle=k.dashes if lines else "none")
+        for k in shown
+    ]  # fmt: skip
+    legend(figure, handles, [k.label for k in shown], left, top, ncols, **changes)
+
+
 def series_legend(
     figure: Figure, series: Iterable[str], left: float, top: float, ncols: int | None = None
 ) -> None:
     """A legend of lines and markers by series."""
-    looks = [style.look(name) for name in series]
-    handles = [
-        Line2D([], [], color=k.colour, marker=k.marker, linestyle=k.dashes, linewidth=1.7,
-               markersize=5.5)
-        for k in looks
-    ]  # fmt: skip
-    _legend(figure, handles, [k.label for k in looks], left, top, ncols=ncols)
+    looks_legend(figure, map(style.look, series), left, top, ncols)
 
 
 def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> None:
@@ -169,7 +240,7 @@ def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> Non
         labels += ["the paper's value", "not the run that its label says"]
     handles.append(_mark(r"$\uparrow$", 8.0))
     labels.append("queue still growing at the end")
-    _legend(figure, handles, labels, left, top, fontsize=8.5)
+    legend(figure, handles, labels, left, top, fontsize=8.5)
 
 
 def _mark(marker: str, size: float, **look: Any) -> Line2D:
@@ -178,22 +249,18 @@ def _mark(marker: str, size: float, **look: Any) -> Line2D:
     )
 
 
-def _legend(
-    figure: Figure,
-    handles: Sequence[Any],
-    labels: Sequence[str],
-    left: float,
-    top: float,
-    *,
-    fontsize: float = 9.5,
-    ncols: int | None = None,
-) -> None:
-    figure.legend(
-        handles, labels, loc="upper left", bbox_to_anchor=(left, top), frameon=False,
-        fontsize=fontsize, handlelength=2.4, labelcolor=style.INK, borderaxespad=0.0,
-        handletextpad=0.6, handler_map={tuple: HandlerTuple(ndivide=1)}, columnspacing=1.7,
-        ncols=len(labels) if ncols is None else ncols,
-    )  # fmt: skip
+def legend(
+    figure: Figure, handles: Sequence[Any], labels: Sequence[str], left: float, top: float,
+    ncols: int | None = None, **changes: Any,
+) -> None:  # fmt: skip
+    """A legend in the quiet style; `changes` are of the keywords of `Figure.legend`."""
+    drawn: dict[str, Any] = {
+        "loc": "upper left", "bbox_to_anchor": (left, top), "frameon": False, "fontsize": 9.5,
+        "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
+        "handler_map": {tuple: HandlerTuple(ndivide=1)}, "columnspacing": 1.7,
+        "ncols": len(labels) if ncols is None else ncols,
+    }  # fmt: skip
+    figure.legend(handles, labels, **(drawn | changes))
 
 
 def footnote(figure: Figure, text: str) -> None:

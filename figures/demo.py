@@ -17,15 +17,11 @@ PANELS = {
     "waiting_time_s": "Waiting time",
     "travel_time_s": "Travel time",
 }
-#: Line, marker and colour by position: told apart without colour too.
+#: Colour, marker and line by position: told apart without colour too.
 LOOKS = (
-    (style.BLUE, "o", "-"),
-    (style.GREEN, "s", "--"),
-    (style.VERMILLION, "^", "-."),
-    (style.PURPLE, "D", ":"),
-    (style.ORANGE, "v", "-"),
-    (style.SKY, "P", "--"),
-)
+    (style.BLUE, "o", "-"), (style.GREEN, "s", "--"), (style.VERMILLION, "^", "-."),
+    (style.PURPLE, "D", ":"), (style.ORANGE, "v", "-"), (style.SKY, "P", "--"),
+)  # fmt: skip
 
 #: Lines are drawn so far apart that their interval bars do not cover each other [veh/h/lane].
 DODGE = 2.5
