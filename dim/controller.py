@@ -1,24 +1,27 @@
 """DIM as a controller: one agent per vehicle, hosted.
 
-The host calls at wake-ups only, while the vehicles of the paper look around all the time. A few
-wake-ups suffice, because between them no agent would change its mind:
+The vehicles of the paper look around all the time. The host calls at a few wake-ups only, and
+these suffice, because between them no agent would change its mind:
 
-- Somebody new takes part when a front bumper passes the start of the yellow zone (wake-up), or
-  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps
-  everyone where he is; the gate "harmonious" asks for a wake-up at the entry.
-- Somebody who takes part begins to cross only when it holds the right of way, since whoever
-  waits can stop. The gate "clear" then freezes what was decided. Under "harmonious" the choice
-  among the rest stays the same: what is left of the best clique is the best clique among the
-  movements in harmony with the one that went, for two cliques compare by the smallest lane rank
-  that only one of them has, and a lane that both have does not count.
-- Somebody stops crossing when its rear bumper leaves the junction (wake-up).
+- A new vehicle takes part when its front bumper passes the start of the yellow zone (a wake-up), or
+  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps every
+  vehicle where it is; the gate "harmonious" asks for a wake-up at the entry.
+- A participant begins to cross only when it holds the right of way, since a waiting vehicle can
+  stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
+  stays the same. What is left of the best clique is the best clique among the movements in harmony
+  with the one that went: two cliques compare by the smallest lane rank that only one of them has,
+  and a lane that both have does not count.
+- A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
-Four exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
-past half of the green zone, where it is granted it: another mark. On a host whose brakes differ, a
-vehicle that loses its right of way may look committed until it stands: then the session looks again
-every step. Where lane priorities change with time (`dim.priorities`), it looks again when they do.
-And where perception errs, vehicles do not see the same, so nothing of the above holds: they look
-around with a period (`Perception.period`).
+There are four exceptions:
+
+- Under `commit="paper"` a vehicle without right of way may roll past half of the green zone, where
+  it is granted the right of way. That is another mark.
+- On a host whose brakes differ, a vehicle that loses its right of way may look committed until it
+  stands. The session then looks again every step.
+- Where lane priorities change with time (`dim.priorities`), it looks again when they do.
+- Where perception errs, vehicles do not see the same, and none of the above holds. They look around
+  with a period (`Perception.period`).
 """
 
 from __future__ import annotations
@@ -161,14 +164,15 @@ class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
     Attributes:
-        rules: those that all agents hold.
+        rules: the rules that all agents hold.
         reader: how they read what they see.
         see: what each of them sees.
         plan: what the host has to provide.
 
     Args:
-        dim, site: whose run it is, and where.
-        follows: whether the vehicle of an id follows DIM; others are seen, but not hosted.
+        dim: the recipe.
+        site: where it runs.
+        follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
         truth: what vehicles would see of a view without an error, for the tally of errors.
     """
 
@@ -215,9 +219,9 @@ class DimSession:
         return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Let every vehicle from the yellow zone on perceive and decide; tell what changed."""
+        """Let every vehicle from the yellow zone on perceive and decide; report what changed."""
         commands: list[Command] = []
-        agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
+        agents: dict[int, Agent] = {}  # those that left the view are forgotten
         look_again = waiting = False
         table, until = self.table(view)
         seen = percept = None
@@ -229,7 +233,7 @@ class DimSession:
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
             sight = sights[vehicle] = self.see(view, ego)
-            if sight is not seen or percept is None:  # all who see the same read the same
+            if sight is not seen or percept is None:  # vehicles that see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
             goes = agent.decide(percept, table)
@@ -255,7 +259,7 @@ class DimSession:
         return commands
 
     def table(self, view: View) -> tuple[DecisionTable, float]:
-        """The table of the ranks in force now, and until when they are [s]; same view, same."""
+        """The table of the ranks now in force, and until when they hold [s]."""
         if self._ranks is None:
             return self.rules.table, math.inf
         ranks, until = self._ranks(view)
@@ -264,9 +268,9 @@ class DimSession:
 
 
 def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
-    """How the ranks of this run follow from what is seen, or None where they never change.
+    """How the ranks of this run follow from a view, or None where they never change.
 
-    All who take part know the same ranks, so a session works them out once for everybody.
+    All participants know the same ranks, so a session works them out once for all.
     """
     n = site.intersection.n
     if dim.priorities == "rotating":

@@ -36,8 +36,8 @@ class Perception(Protocol):
     def period(self) -> float | None:
         """How often vehicles must look [s]; None where what they see changes at wake-ups only.
 
-        DIM's few wake-ups suffice as long as all see the same (`dim.controller`). Once what one
-        sees may change by itself, vehicles have to look again and again.
+        DIM's few wake-ups suffice as long as all vehicles see the same (`dim.controller`). Where
+        what one sees may change by itself, vehicles have to look again and again.
         """
 
     def start(self, site: Site) -> See:
@@ -46,14 +46,14 @@ class Perception(Protocol):
 
 @declared
 class ExactPerception:
-    """Everyone sees everything, at once and as it is: the paper's assumption."""
+    """Every vehicle sees everything, at once and as it is: the paper's assumption."""
 
     @property
     def period(self) -> None:
-        """The wake-ups suffice."""
+        """None: the wake-ups suffice."""
 
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
-        """The view itself, which a session therefore reads once for all vehicles."""
+        """The view itself, which a session reads once for all vehicles."""
         return see_all
 
 
@@ -68,7 +68,7 @@ class Percept(NamedTuple):
     Attributes:
         participants: ids of the vehicles that take part, by lane: the front vehicle of each lane,
             if its front bumper is between the start of the yellow zone and the junction and
-            it is not committed. While it is, nobody of its lane takes part.
+            it is not committed. While it is committed, no vehicle of its lane takes part.
         crossing: ids of the vehicles that are crossing: committed, or any part of the body in
             the junction.
         case: the participants' movements as an integer, see `DecisionTable`.
@@ -108,7 +108,7 @@ class Reader:
         return not can_stop(vehicle, self.deceleration)
 
     def read(self, view: View) -> Percept:
-        """Who takes part and who is crossing, in a view ordered by lane and front to back."""
+        """Participants and crossing vehicles of a view, ordered by lane and front to back."""
         n, start = self.n, self.zones.yellow_start + ROUNDING
         participants, crossing = [], []
         case = occupied = unknown = 0

@@ -301,7 +301,7 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Unregulated:
-    """Every vehicle goes, whatever the others do: what happens without any rule.
+    """All vehicles go at once: what happens without any rule.
 
     For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """

@@ -298,13 +298,14 @@ def spelled(name: str, recipe: object) -> str:
 def _arguments(recipe: Any) -> str:
     values = ((it, getattr(recipe, it.name)) for it in parameters(recipe.__class__))
     return ",".join(
-        f"{it.name}={_spelled_value(value, it.parameter.kinds)}"
+        f"{it.name}={spelled_value(value, it.parameter.kinds)}"
         for it, value in values
         if it.default is MISSING or value != it.default
     )
 
 
-def _spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
+def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
+    """One value of a spelling; `kinds` are the words for nested recipes, as of `part`."""
     if value is None or isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -315,7 +316,7 @@ def _spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
         short = f"{value:g}"
         return short if float(short) == value else repr(float(value))
     if isinstance(value, tuple | list):
-        inner = ",".join(_spelled_value(one, kinds) for one in value)
+        inner = ",".join(spelled_value(one, kinds) for one in value)
         return f"({inner},)" if len(value) == 1 else f"({inner})"
     for known, maker in kinds.items():
         if type(value) is maker:

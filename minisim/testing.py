@@ -145,7 +145,7 @@ def check_controller(
 
     A controller is a recipe: it compares, hashes, prints and pickles as a value does, and runs
     leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
-    same trips, also from a pickled copy and whatever was run in between. No vehicles collide, and
+    same trips, also from a pickled copy and after any other runs. No vehicles collide, and
     all are served after the demand has ended.
 
     Args:
@@ -154,7 +154,7 @@ def check_controller(
         density: mean inflow a lane [veh/h].
         horizon: how long the demand lasts [s].
         collision_free: whether collisions break the contract.
-        host: who moves the vehicles: "minisim", "sumo" (extra `sumo`), or a function that is
+        host: what moves the vehicles: "minisim", "sumo" (extra `sumo`), or a function that is
             called as `minisim.simulate` is.
 
     Raises:
@@ -229,7 +229,7 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
 
 
 class _Watched:
-    """A controller whose sessions' answers are checked on the way to the host."""
+    """A controller, with a check of its sessions' answers on the way to the host."""
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
@@ -268,7 +268,7 @@ class _WatchedSession:
 
 
 class _Disturbed:
-    """A controller in the middle of whose run another seed is run."""
+    """A controller, with a run of another seed in the middle of each of its runs."""
 
     def __init__(self, controller: Controller, scenario: SmallScenario, run: Simulate) -> None:
         self._controller, self._scenario, self._run = controller, scenario, run

@@ -85,11 +85,6 @@ class Entry(NamedTuple):
     safe: bool = True
     as_run: str = ""
 
-    @property
-    def meaning(self) -> str:
-        """In one line."""
-        return (self.make.__doc__ or "").partition("\n")[0]
-
     def spellings(self) -> dict[str, Variant]:
         """The variants by name."""
         return {

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
 from rich.table import Table
 
-from minisim.errors import InputError, MinisimError, integer, number, numbers
+from minisim.errors import InputError, MinisimError
 from minisim.files import markdown_table, write_table, write_text
+from minisim.parameters import declared, real, reals, whole
+from minisim.results.metrics import heading
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
@@ -33,39 +35,28 @@ CONTROLLERS = {
 }
 #: Averaged over seeds: column of a sweep -> heading.
 METRICS = {
-    "waiting_time_s": "waiting [s]",
-    "travel_time_s": "travel [s]",
-    "depart_delay_s": "departure delay [s]",
-    "unfinished": "unfinished",
+    name: heading(name)
+    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 }
 PROFILE = "fair"
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class Tour:
-    """What the tour simulates.
+    """What the tour simulates."""
 
-    Attributes:
-        densities: [veh/h/lane].
-        seeds: runs a point.
-        horizon: of each run [s].
-        film_start, film_seconds: of the animation, at the highest density [s].
-    """
-
-    densities: tuple[float, ...] = (150.0, 200.0, 250.0, 300.0, 350.0)
-    seeds: int = 5
-    horizon: float = 3600.0
-    film_start: float = 600.0
-    film_seconds: float = 60.0
+    densities: tuple[float, ...] = reals(
+        "mean inflows a lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
+    )
+    seeds: int = whole("runs a point", low=2, default=5)
+    horizon: float = real("of each run", "s", above=0, default=3600.0)
+    film_start: float = real("of the animation, at the highest density", "s", low=0, default=600.0)
+    film_seconds: float = real("length of the animation", "s", above=0, default=60.0)
     controllers: tuple[str, ...] = field(default=tuple(CONTROLLERS))
 
     def __post_init__(self) -> None:
-        integer("seeds", self.seeds, low=2)
-        if not numbers("densities", self.densities):
+        if not self.densities:
             raise InputError("a tour needs at least one density [veh/h/lane]")
-        number("horizon [s]", self.horizon, above=0)
-        number("film_start [s]", self.film_start, low=0)
-        number("film_seconds [s]", self.film_seconds, above=0)
 
     @classmethod
     def quick(cls, seeds: int = 2) -> Tour:
@@ -151,8 +142,8 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The result for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, heading in enumerate(_headings()):
-        table.add_column(heading, justify="left" if k == 1 else "right")
+    for k, title in enumerate(_headings()):
+        table.add_column(title, justify="left" if k == 1 else "right")
     rows = _cells(points)
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         table.add_row(*row, end_section=following is not None and following[0] != row[0])

@@ -1,7 +1,9 @@
 """One recipe of a run, from which every entrance starts: Python, the command line, files, studies.
 
-run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
-run.summary()
+    run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
+    run.summary()
+
+Two entrances that describe the same recipe get the same numbers.
 """
 
 from __future__ import annotations
@@ -93,8 +95,8 @@ class Recipe:
         from minisim.simulation import simulate
 
         host = host or simulate
-        if options.get("record") is None:
-            options["record"] = recording(self.metrics)
+        if options.get("record") is None and (record := recording(self.metrics)):
+            options["record"] = record
         return host(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

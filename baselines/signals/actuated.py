@@ -83,7 +83,7 @@ class Actuated:
 
 
 class GapRule:
-    """When the last vehicle left a lane's loop, and whether that was too long ago.
+    """When the last vehicle left each lane's loop, and whether that was too long ago.
 
     Attributes:
         detector: how far the loops are before the junction entry [m].
@@ -99,7 +99,7 @@ class GapRule:
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Note who has left a loop since the last view; each mark is passed within one step."""
+        """Note vehicles that left a loop since the last view; each passes a mark within a step."""
         free = self.detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
@@ -108,7 +108,7 @@ class GapRule:
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal, gap = self._signal, self._gap(view, lane)
         if elapsed >= signal.max_green or gap >= signal.max_gap:
             return Verdict(following(self.order, lane), 0.0)
@@ -117,7 +117,7 @@ class GapRule:
         return Verdict(lane, min(end, signal.max_green) - elapsed)
 
     def _gap(self, view: View, lane: int) -> float:
-        """Time since the lane's loop has been free [s]."""
+        """For how long the lane's loop has been free [s]."""
         if any(
             v.lane == lane and v.distance <= self.detector and v.id not in self._passed
             for v in view.vehicles

@@ -17,7 +17,7 @@ from baselines.signals.phases import (
 from minisim.control import Observed, Site, View
 from minisim.parameters import declared, real, spelled, switch
 
-#: An idle signal looks again after so long [s]; fixed in SUMO's code.
+#: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
 
 
@@ -88,13 +88,13 @@ class DelayRule:
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
-        """Note when and where somebody comes onto a detector."""
+        """Note when and where a vehicle comes onto a detector."""
         for v in view.vehicles:
             if v.id not in self._entered and 0.0 < v.distance <= self._signal.detector_range:
                 self._entered[v.id] = view.time, v.distance
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal = self._signal
         present = on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
@@ -121,8 +121,8 @@ class DelayRule:
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector [s].
 
-    That is the time since then, less what the way since then takes at the limit; so nobody has to
-    look in between.
+    That is the time since then, less what the way since then takes at the limit. So no look is
+    needed in between.
 
     Args:
         entered: when it came [s].

@@ -1,8 +1,8 @@
-"""What signal controllers share: phases, programmes and signal heads that cannot let collide.
+"""What signal controllers share: phases, programmes, and signal heads that prevent collisions.
 
-A head turns green only when nobody who crosses the junction conflicts with its lane, so safety
-does not hang on the length of an amber. At the end of a green, those who can no longer stop
-comfortably keep their right of way; everybody else stops.
+A head turns green only when no vehicle on the junction conflicts with its lane, so safety does not
+depend on the length of an amber. At the end of a green, vehicles that can no longer stop
+comfortably keep their right of way; all others stop.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from minisim.parameters import checked, declared, real
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
-#: Room for the last steps before a vehicle is seen [m].
+#: Room for the last steps before a vehicle comes into view [m].
 SIGHT_MARGIN = 5.0
 
 
@@ -129,7 +129,7 @@ class Heads:
     """The signal heads of a run, and the vehicles that they have let go.
 
     Attributes:
-        colours: what each lane's head shows now. A head that is wanted green while somebody
+        colours: what each lane's head shows now. A head that should be green while a vehicle
             still crosses its lane's way stays red (or amber) until that vehicle is clear.
     """
 
@@ -144,7 +144,7 @@ class Heads:
         self.colours = [Colour.RED] * n
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
-        """Turn the heads to `wanted` as far as that is safe now, and say how.
+        """Turn the heads to `wanted` as far as that is safe now; the commands for it.
 
         Lanes are closed before others are opened, in one answer.
         """
@@ -167,7 +167,7 @@ class Heads:
         return [Close(lane), *(Go(v.id) for v in going)]
 
     def _may_open(self, lane: int, view: View) -> bool:
-        """Nobody crosses the lane's way, and no head is green for somebody who might."""
+        """Whether no vehicle crosses the lane's way, and no head is green for one that might."""
         if any(
             colour is Colour.GREEN and self._exclusive[lane][other]
             for other, colour in enumerate(self.colours)
@@ -204,8 +204,8 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
 def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
     """The vehicles of one lane, before the junction, to be let go when it is closed.
 
-    Those that comfortable braking no longer stops, and everybody before them, for a follower
-    cannot go before its leader does.
+    These are the ones that comfortable braking no longer stops, and all before them, for a
+    follower cannot go before its leader does.
 
     Args:
         lane: the lane's vehicles, front to back.
@@ -217,7 +217,7 @@ def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
 
 
 def stopping_sight(site: Site) -> float:
-    """How far a view must reach so that everybody beyond it can still stop [m]."""
+    """How far a view must reach so that every vehicle beyond it can still stop [m]."""
     fastest = site.speed_limit * (FASTEST_DRIVER if site.vehicle.speed_deviation else 1.0)
     needed = stopping_distance(fastest, site.vehicle.deceleration)
     return needed + COMMIT_MARGIN + SIGHT_MARGIN

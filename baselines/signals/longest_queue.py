@@ -1,8 +1,8 @@
 """The longest-queue-first signal: max-pressure on one junction.
 
 Max-pressure (Varaiya, Transp. Res. C 36 (2013): 177–195) gives green to the phase with the largest
-sum, over its movements, of what waits before the junction less what stands behind it. On one
-junction whose exits flow freely nothing stands behind it: the longest queue goes first.
+sum, over its movements, of what waits before the junction less what stands behind it. On a single
+junction whose exits flow freely nothing stands behind it, so the longest queue goes first.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from minisim.parameters import declared, real, spelled
 
 @declared
 class LongestQueue:
-    """A signal that looks every few seconds which approach has the most vehicles.
+    """A signal that turns to the approach with the most vehicles, every few seconds.
 
     One phase an approach: while one lane carries all turns, every two approaches of a junction
-    have movements that conflict, so that no two can be green together. Among equal queues the one
-    goes first whose last green is the longest ago, then in the order a, b, c…; an empty junction
-    keeps its green. A lane may wait for long while others always have more.
+    have movements that conflict, so no two can be green together. Among equal queues the one whose
+    last green is the longest ago goes first, then in the order a, b, c…; an empty junction keeps
+    its green. A lane may wait for long while others always have more.
     """
 
     # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
@@ -54,7 +54,7 @@ class LongestQueue:
 
 
 class QueueRule:
-    """Whose queue is the longest."""
+    """Which queue is the longest."""
 
     def __init__(self, signal: LongestQueue, site: Site) -> None:
         self._signal = signal

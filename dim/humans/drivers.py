@@ -1,12 +1,12 @@
-"""Human drivers: who drives, what they signal, and which gaps they accept.
+"""Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
 The numbers are those of the Highway Capacity Manual (HCM, 7th edition), chapter 20, for two-way
-stop control, base values of a two-lane major street: drivers who stopped at a stop sign of the
-minor street, that is streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
+stop control, base values of a two-lane major street. They are for drivers that stopped at a stop
+sign of the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
 right-hand traffic. An unsignalised junction of equal roads is another case, the all-way stop (HCM
-chapter 21): there everybody stops, and nobody accepts a gap in a stream that does not. So drivers
-here do both: among themselves they go in the order of stopping, and from vehicles that need not
-stop they accept gaps.
+chapter 21): there all drivers stop, and none accepts a gap in a stream that does not stop. So
+drivers here do both. Among themselves they go in the order of stopping, and they accept gaps
+between vehicles that need not stop.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from minisim.streams import stream
 STRAIGHT = 30.0
 
 #: What others believe of a human's way. "motion": only what its place and heading show. "signals":
-#: also an indicator that blinks. "silence": also that who shows none goes straight on, which is
-#: false for the turns that no indicator announces.
+#: also an indicator that blinks. "silence": also that a vehicle without one goes straight on, which
+#: is false for the turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
 #: Bounds of a uniform draw whose normal quantile is taken.
@@ -47,13 +47,13 @@ class Turn(IntEnum):
 def turns(intersection: Intersection) -> tuple[Turn, ...]:
     """The kind of every movement, in the order of `Intersection.movements`."""
     near = 1.0 if intersection.side == "left" else -1.0
-    found = []
+    kinds = []
     for path in intersection.paths:
         (ax, ay), (bx, by) = path.heading_in.tolist(), path.heading_out.tolist()
         left = math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
         straight = abs(left) < STRAIGHT
-        found.append(Turn.THROUGH if straight else Turn.NEAR if left * near > 0 else Turn.FAR)
-    return tuple(found)
+        kinds.append(Turn.THROUGH if straight else Turn.NEAR if left * near > 0 else Turn.FAR)
+    return tuple(kinds)
 
 
 def _several(count: int, each: str, high: float) -> Check:
@@ -122,8 +122,8 @@ class Driver(NamedTuple):
     """One vehicle's driver.
 
     Attributes:
-        human: or it follows DIM.
-        careless: from 0 to 1: it leaves out the indicator of turns that more drivers than this do.
+        human: whether a human drives; otherwise the vehicle follows DIM.
+        careless: 0 … 1; it leaves out the indicator of a turn where a larger share of drivers does.
         gap: factor on the critical gaps.
     """
 
@@ -135,7 +135,7 @@ class Driver(NamedTuple):
 class Drivers:
     """The drivers of one run, drawn by vehicle id: the same whatever controller asks, and when.
 
-    Who is human at some share is so at every larger one.
+    A vehicle with a human driver at some share has one at every larger share.
     """
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
@@ -157,13 +157,13 @@ class Drivers:
         return Driver(human < self._share, careless, factor)
 
     def human(self, count: int) -> Bools:
-        """Which of the first `count` vehicles are human, shape (count,)."""
+        """Which of the first `count` vehicles have a human driver, shape (count,)."""
         integer("number of vehicles", count, low=0)
         return np.array([self[vehicle].human for vehicle in range(count)], dtype=bool)
 
 
 class Readings:
-    """What indicators and motion leave possible of a vehicle's way, for all who see it.
+    """What indicators and motion leave possible of a vehicle's way, for all that see it.
 
     Motion is position: once two ways of a lane are `CLEARANCE` apart, a vehicle's place tells on
     which of them it is.

@@ -2,8 +2,8 @@
 
     simulate(scenario, Dim(perception=NoisyPerception(intent_error=0.15)))
 
-An ego always sees itself exactly, and who drives behind whom in a lane. Vehicles that it does not
-see are missing in its view; a view holds no vehicle that is not there, or was not.
+An ego always sees itself exactly, and the order of the vehicles in a lane. Vehicles that it does
+not see are missing in its view. A view holds no vehicle that is not there, or was not there.
 """
 
 from __future__ import annotations
@@ -142,11 +142,11 @@ class _Senses:
         vehicles: Iterable[Observed] = with_ego(seen.vehicles, ego) if recipe.delay else seen[1]
         if recipe.occlusion or recipe.sensor_range is not None:
             vehicles = self._visible(seen, vehicles, ego)
-        who = ego.id
-        found = tuple(ego if v.id == who else self._sense(v, who, moment) for v in vehicles)
+        own = ego.id
+        sensed = tuple(ego if v.id == own else self._sense(v, own, moment) for v in vehicles)
         if recipe.delay or recipe.position_noise:
-            found = in_order(found, ego)
-        return View(view.time, found)
+            sensed = in_order(sensed, ego)
+        return View(view.time, sensed)
 
     def _late(self, view: View) -> View:
         """The newest view that is old enough; without one, an empty junction."""
@@ -203,7 +203,7 @@ class _Senses:
 
 
 def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """An older view's vehicles with the ego as it is now: new, it is the last of its lane."""
+    """An older view's vehicles with the ego as it is now; a new ego is the last of its lane."""
     if any(v.id == ego.id for v in vehicles):
         return vehicles
     behind = next((k for k, v in enumerate(vehicles) if v.lane > ego.lane), len(vehicles))
@@ -213,8 +213,8 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
     """Front to back again, where noise had vehicles of one lane overtake each other.
 
-    Who drives behind whom is seen right, so nobody is put before a vehicle that he follows. The
-    ego, which knows where it is, keeps its place.
+    The order in a lane is seen right, so no vehicle is put before one that it follows. The ego
+    knows where it is and keeps its place.
 
     Args:
         vehicles: by lane, each lane in its true order, and the ego among them.

@@ -8,7 +8,7 @@ A vehicle obeys the hardest braking that any of its leaders asks for
 (`MSVehicle::planMoveInternal`, with the model's radar). The leaders are:
 
 - the vehicle ahead on the stretch of road that it is on (approach, way through the junction, exit);
-- the last vehicle on every later stretch, wherever that one came from and however far away it is;
+- the last vehicle on every later stretch, from any lane and at any distance;
 - a vehicle inside the junction on a way that begins or ends with its own
   (`minisim.junction.meetings`) and that was there before it, as long as there is room to the place
   where the ways meet;
@@ -112,7 +112,7 @@ def build_cruise(site: Site, count: int) -> Cruise | None:
 
 @njit
 def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise) -> bool:
-    """Choose every vehicle's acceleration from the present state; whether two overlap."""
+    """Choose every vehicle's acceleration from the present state; returns whether two overlap."""
     overlap = False
     ends = road.ends
     inside = np.empty(INSIDE, np.int64)
@@ -191,7 +191,7 @@ def look(vehicles: Records, lanes: Records, road: Road, cruise: Cruise, tick: in
 
 @njit
 def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, inside: Ints) -> int:
-    """Fill `inside` with the rows of all vehicles with some part in the junction; their number."""
+    """Fill `inside` with the rows of vehicles at least partly in the junction; their number."""
     count = 0
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
@@ -281,7 +281,7 @@ def meet(
 
 @njit_inline
 def before(vehicles: Records, cruise: Cruise, i: int, j: int) -> bool:
-    """Whether j entered the junction before i; of two at once the faster, then the later row."""
+    """Whether j entered the junction before i; if both at once, the faster, then the later row."""
     mine, other = cruise.memory[i]["entered"], cruise.memory[j]["entered"]
     if mine != other:
         return bool(other < mine)
@@ -292,7 +292,7 @@ def before(vehicles: Records, cruise: Cruise, i: int, j: int) -> bool:
 
 @njit_inline
 def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
-    """Acceleration that the ACC asks for behind a leader [m/s²]; none beyond the radar."""
+    """Acceleration that the ACC asks for behind a leader [m/s²]; infinite beyond the radar."""
     if gap > cruise.radar:
         return math.inf
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
@@ -300,9 +300,9 @@ def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
 
 @njit_inline
 def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
-    """Acceleration of this step: the engine's answer to `u`, no further than standstill.
+    """Acceleration of this step: the engine's answer to `u`, which never goes below standstill.
 
-    A desired speed of 0 makes SUMO ask, from the next step on, for standstill within one step.
+    From the step after a desired speed of 0 on, SUMO asks for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
     a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -law.b_max)

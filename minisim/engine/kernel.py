@@ -50,8 +50,8 @@ def advance(
 
     Args:
         motion: of a law with leaders of its own; None under a plain car-following law.
-        trace: recording, filled from line `traced` on.
-        bodies: scratch, (k, 5): how many vehicles can be in and near the junction at once.
+        trace: the recording, filled from line `traced` on.
+        bodies: scratch, (k, 5), for the k vehicles that can be in and near the junction at once.
         observed: filled with what a view shows at the end, see `observe`.
 
     Returns:
@@ -79,7 +79,7 @@ def step(
     bodies: Floats,
     tick: int,
 ) -> int:
-    """One step, from `tick` to the next; the reasons to return."""
+    """Make one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
     if insert(vehicles, lanes, road, law, tick):
         reasons |= MARK
@@ -99,10 +99,10 @@ def step(
 
 @njit
 def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
-    """Insert on each lane the next vehicle that is due, if the gap allows; FIFO, none dropped.
+    """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 
-    No faster than the vehicle ahead allows, nor comfortable braking the lower limits ahead and,
-    while the lane is closed, the hold line.
+    Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
+    lower limits ahead and, while the lane is closed, stop at the hold line.
 
     Returns whether a vehicle was inserted past a wake-up mark.
     """
@@ -146,10 +146,10 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
 
 @njit
 def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
-    """Choose every vehicle's acceleration from the present state; whether two overlap.
+    """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
-    Helpers get rows and numbers, never arrays: counting references to those would take longer
-    than the arithmetic.
+    Helpers get rows and numbers, never arrays: counting references to arrays would take longer than
+    the arithmetic.
     """
     overlap = False
     branch, ends = road.branch, road.ends
@@ -164,8 +164,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             s, v, p = me["s"], me["v"], me["path"]
             released = is_open or me["go"] != 0
 
-            # The vehicle ahead in the lane, until its rear has left the shared path. When that one
-            # has turned off, one further ahead may still be on it.
+            # The vehicle ahead in the lane, until its rear has left the shared path. If it has
+            # turned off, one further ahead may still be on the path.
             z = 0.0
             j = i - 1
             while j >= first:
@@ -179,8 +179,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                     break
                 j -= 1
 
-            # From the junction on, the last vehicle before it bound for the same exit lane. Both
-            # are measured from there, so one that is still on another arc counts as if on this.
+            # From the junction on, the last vehicle before it that is bound for the same exit lane.
+            # Both positions are measured from that lane, so a vehicle that is still on another arc
+            # counts as if it were on this one.
             j = -1
             if s >= law.entry:
                 j = me["ahead"]
@@ -202,14 +203,14 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 k += 1
             if not released and s < law.entry:
                 acc = min(acc, hold(v, s, law))
-            brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # standing it stays
+            brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # it does not start
             me["a"] = max(min(acc, brake), -law.b_max)
     return overlap
 
 
 @njit
 def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
-    """Move every vehicle by one step, book waiting and loss, and collect the reasons to return."""
+    """Move every vehicle by one step, add up waiting and loss, and collect reasons to return."""
     reasons = 0
     done = True
     ends, marks = road.ends, road.marks
@@ -279,7 +280,7 @@ def record(
     traced: int,
     tick: int,
 ) -> int:
-    """Write one line for every vehicle in the recorded stretch; returns the lines written."""
+    """Write one line for every vehicle in the recorded stretch; returns the lines so far."""
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):

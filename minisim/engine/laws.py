@@ -30,10 +30,10 @@ IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """How much a vehicle ahead counts for the law of this run: 0 not at all, infinite stops.
+    """How much a vehicle ahead counts for the law of this run: from 0, not at all, to infinity.
 
-    The desired over the actual gap of the IDM, the inverse of Krauß's safe speed. Of several
-    vehicles ahead the one that counts most decides.
+    It is the ratio of the desired to the actual gap under the IDM, and the inverse of Krauß's safe
+    speed. Of several vehicles ahead, the one that counts most decides.
     """
     if law.model == KRAUSS:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
@@ -45,8 +45,8 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def follow(v: float, v0: float, z: float, law: Law) -> float:
     """Acceleration of the car-following law.
 
-    A desired speed of 0 is the IDM's limit from above: comfortable braking, and the leader's share
-    on it.
+    For a desired speed of 0 the IDM is taken to its limit from above: comfortable braking, and the
+    leader's share on top of it.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
@@ -98,8 +98,8 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
 def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
-    The hold line is the end of the road: comfortable braking when it must, not earlier. Where
-    that no longer reaches the line, stop before the junction, braking as hard as that needs.
+    The hold line is like the end of the road: the vehicle brakes comfortably, and no earlier than
+    it must. If that no longer suffices, it stops before the junction, as hard as this needs.
     """
     to_line = law.hold - s
     if law.semi_implicit:
@@ -118,7 +118,7 @@ def hold(v: float, s: float, law: Law) -> float:
 
 @njit
 def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float) -> float:
-    """`hold` for `semi_implicit`, apart from it to keep the inner loop of the others short."""
+    """`hold` for `semi_implicit`; a function of its own to keep the inner loop short."""
     needed = braking_distance(v, b, dt)
     distance = to_line - STOP_MARGIN
     if needed <= distance:

@@ -24,8 +24,8 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
-#: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
-#: is allowed, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
+#: A held vehicle aims at this distance before its hold line [m]. It may stop up to 0.3 m before the
+#: line, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
 STOP_MARGIN = 0.25
 
 #: Values of the field `status`.

@@ -15,7 +15,7 @@ TOUCH_MARGIN = 0.02
 def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
-    Rectangles a little larger than the bodies, tested exactly by separating axes, so it never
+    It tests rectangles a little larger than the bodies, exactly, by separating axes. So it never
     misses what pymunk would find.
     """
     ends, shape, headings = road.ends, road.shape, road.headings

@@ -1,4 +1,4 @@
-"""`Run`, the result of a run, whoever hosted it."""
+"""`Run`, the result of a run on any host."""
 
 from __future__ import annotations
 
@@ -123,7 +123,10 @@ class Run:
     @cached_property
     def counted(self) -> Trips:
         """The trips that count; every mean and number of trips is of them."""
-        return self.columns.taken(self.counted_rows)._replace(start=float(self.scenario.warmup))
+        rows, start = self.counted_rows, float(self.scenario.warmup)
+        if start == 0.0 and rows == slice(0, len(self.columns.lane)):
+            return self.columns
+        return self.columns.taken(rows)._replace(start=start)
 
     @cached_property
     def safety(self) -> Mapping[str, float | int | None]:

@@ -10,7 +10,7 @@ site. They look at bodies on their paths:
   PET = time the second enters − time the first has left; 0 or less means both were inside.
 * crossing — two vehicles with right of way on conflicting movements, at constant speed: where
   the second would enter the conflict area before the first has left it, TTC = d/v of the second.
-  A vehicle without right of way is about to stop, so it is on nobody's course.
+  A vehicle without right of way is about to stop, so it crosses no other's course.
 """
 
 from __future__ import annotations
@@ -284,17 +284,17 @@ def _encroachments(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
     by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
     times, firsts, seconds, pets = [], [], [], []
     for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
-        who = np.concatenate([by_movement[p], by_movement[q]])
+        passing = np.concatenate([by_movement[p], by_movement[q]])
         other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
-        start, end = enter[who, other], leave[who, other]
+        start, end = enter[passing, other], leave[passing, other]
         order = np.argsort(start, kind="stable")
         order = order[np.isfinite(start[order])]
         first, second = order[:-1], order[1:]
         changes = other[first] != other[second]
         first, second = first[changes], second[changes]
         times.append(start[second])
-        firsts.append(vehicle[who[first]])
-        seconds.append(vehicle[who[second]])
+        firsts.append(vehicle[passing[first]])
+        seconds.append(vehicle[passing[second]])
         pets.append(start[second] - end[first])
     time = _join(times, np.float64)
     order = np.argsort(time, kind="stable")
@@ -359,11 +359,11 @@ def _crossings(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
     }
 
 
-def _times(rows: Rows, who: Ints, place: Floats) -> Floats:
+def _times(rows: Rows, row: Ints, place: Floats) -> Floats:
     """Time until the fronts pass `place` at their present speeds [s]; 0 where they have."""
-    distance = place - rows.s[who]
+    distance = place - rows.s[row]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(distance <= 0.0, 0.0, distance / rows.v[who])
+        return np.where(distance <= 0.0, 0.0, distance / rows.v[row])
 
 
 def _join(parts: list[npt.NDArray[Any]], dtype: type = np.int64) -> npt.NDArray[Any]:

@@ -1,7 +1,7 @@
 """SUMO's `CC`, the model of `minisim.vehicle.CruiseVehicle`: its vehicle type, and its steering.
 
-It obeys no limit and no marking: it is told the advised speed, and a hold line only while that asks
-for more braking than the model itself.
+Such a vehicle obeys no limit and no marking. It gets the advised speed, and a command for a hold
+line only while that asks for more braking than the model itself.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
 
 
 class Cruiser:
-    """SUMO's `CC` as a cruise control with ACC: it is told its desired speed."""
+    """Steers SUMO's `CC` as a cruise control with ACC, by its desired speed."""
 
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
         law = job.law
@@ -70,18 +70,18 @@ class Cruiser:
             self.advise(car)
 
     def depart(self, car: Car) -> None:
-        """Tell the desired speed again: advice may have come before the vehicle."""
+        """Set the desired speed again: advice may have come before the vehicle."""
         self.advise(car)
 
     def advise(self, car: Car) -> None:
-        """Tell SUMO the desired speed."""
+        """Set the desired speed in SUMO."""
         speed = self._desired(car)
         if speed != car.desired:
             self._set(car, "ccds", speed)
             car.desired = speed
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
-        """Brake for hold lines, and where told to, if the model itself brakes less."""
+        """Brake for hold lines and on command, if the model itself brakes less."""
         law = self._law
         for lane in lanes:
             ahead = None

@@ -122,7 +122,7 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
     # Nor those that would have come later.
     missing = np.isnan(values).any(axis=1) & (arrivals.time < end - job.law.dt)
     if missing.any():
-        raise SumoError(f"SUMO's trips do not tell of vehicle {int(missing.argmax())}")
+        raise SumoError(f"SUMO's trips lack vehicle {int(missing.argmax())}")
     depart, arrival, waiting = values.T
     # SUMO still inserts at the very end. A vehicle that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)

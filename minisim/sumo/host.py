@@ -116,7 +116,7 @@ def simulate(
     Raises:
         MissingExtraError: SUMO is not installed.
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
-        SumoError: SUMO refused or died; the message tells why as far as it is known.
+        SumoError: SUMO refused or died; the message says why, as far as that is known.
         CollisionError: two bodies touched, unless collisions are only recorded.
         ControllerError: the controller broke its contract.
     """

@@ -27,7 +27,7 @@ from minisim.sumo.messages import Job
 #: with it. The one that it would follow into its exit it then follows by minisim's law.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
-#: SUMO knows no desired speed of zero [m/s]; a vehicle told to stop is commanded to.
+#: SUMO knows no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
 LEAST_SPEED = 0.01
 
 
@@ -35,10 +35,10 @@ class Car:
     """A vehicle; `minisim.engine.state.VEHICLE` explains the values.
 
     Attributes:
-        brake: how hard it was told to brake at least [m/s²]; 0 where it was not.
+        brake: how hard it has to brake at least [m/s²]; 0 without such a command.
         present: whether it is on the road.
-        seen: tick at which it was looked at last.
-        lost_ticks: as there; between two looks that are more than a step apart it is the time
+        seen: tick of the last look at it.
+        lost_ticks: as there. Between two looks that are more than a step apart it is the time
             beyond what the distance takes at the limit.
     """
 
@@ -60,7 +60,7 @@ class Car:
         self.section = self.mark = self.seen = 0
         self.go = self.cleared = self.present = False
         self.advice = math.inf
-        self.desired = math.inf  # as SUMO was told last
+        self.desired = math.inf  # the last value that SUMO has got
         self.commanded = self.ignoring = False
 
 
@@ -112,7 +112,7 @@ class Speeds:
 
 
 class Follower:
-    """SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
+    """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
         self.near = -math.inf

@@ -12,7 +12,6 @@ from minisim.errors import FileError
 from minisim.files import replacing
 from minisim.results.trips import Trips
 from scenarios.crossval.cases import Case
-from scenarios.recipe import Recipe
 from scenarios.sweep.keys import description_of, digest_of, results_version
 
 #: Folder of the kept runs, inside that of the report.
@@ -37,8 +36,7 @@ class Outcome(NamedTuple):
 
 def kept_file(folder: Path, case: Case, seed: int, version: str) -> Path:
     """Where SUMO's run of a case is kept; another scenario, controller or version, another file."""
-    recipe = Recipe(case.scenario, case.decider(), seed, on_collision="record")
-    key = digest_of("\n".join([description_of(recipe), results_version(), version]))
+    key = digest_of("\n".join([description_of(case.recipe(seed)), results_version(), version]))
     return folder / KEPT / f"{key[:24]}.npz"
 
 

@@ -36,7 +36,7 @@ CELL: Final = (
 SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are no metric of a cell.
-OTHERS: Final = ("seed", "queue_growth", "growing", "arrivals", "cpu_s", "version", "error")
+OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
 
 #: What columns of groups of trips begin with.
 GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
@@ -55,15 +55,15 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     """
     import pandas as pd
 
-    found = []
+    made = []
     for names, group in rows.groupby(list(CELL), sort=False):
         good = group[group["error"].isna()]
         cell: dict[str, object] = dict(zip(CELL, names, strict=True))
         cell |= {"runs": len(good), "failed": len(group) - len(good)}
         if len(good):
             cell |= _averaged(good)
-        found.append(cell)
-    return pd.DataFrame(found)
+        made.append(cell)
+    return pd.DataFrame(made)
 
 
 def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
@@ -102,16 +102,16 @@ def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: st
     for name in (first, second):
         choice("controller of these rows", name, sorted(set(rows["controller"])))
     by = [column for column in CELL if column != "controller"]
-    found = []
+    gaps = []
     for names, values in pairs(rows, metric, "controller", (first, second), by).items():
         interval = mean_interval(values)
-        found.append({
+        gaps.append({
             **dict(zip(by, names, strict=True)),
             "pairs": interval.size,
             "difference": interval.mean,
             "difference_ci95": interval.half_width,
         })  # fmt: skip
-    return pd.DataFrame(found)
+    return pd.DataFrame(gaps)
 
 
 def pairs(

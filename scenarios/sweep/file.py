@@ -24,7 +24,7 @@ import os
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -46,7 +46,7 @@ from minisim.results.metrics import named_metrics
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
 from scenarios.recipe import Recipe
-from scenarios.scenario import Scenario, profile_named
+from scenarios.scenario import Profile, Scenario, profile_named
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import identity_of
 
@@ -177,7 +177,7 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         scenario = _scenario(chosen, single, folder)
         for given, share in product(controllers, shares):
             with _at("controller"):
-                controller, label = _controller(given, scenario.profile.name)
+                controller, label = _controller(given, scenario.profile)
             for seed in seeds:
                 yield Recipe(
                     scenario, controller, seed, share, label, single["on_collision"], metrics
@@ -217,36 +217,12 @@ def _recorded(file: object, folder: Path, scenario: Scenario) -> Arrivals | None
     return read_arrivals(folder / _text("arrivals", file), scenario.intersection.n)
 
 
-def _controller(given: object, profile: str) -> tuple[Controller, str]:
+def _controller(given: object, profile: Profile) -> tuple[Controller, str]:
     """The controller that an entry describes, and its label."""
-    parameters = _table(given)
-    name, label = parameters.pop("name"), parameters.pop("label", "")
+    table = _table(given)
+    label = table.pop("label", "")
     instance("label", label, str)
-    recipe = controller_named(name, profile)
-    return _replaced(recipe, parameters, str(name)), label
-
-
-def _replaced(recipe: Any, parameters: Mapping[str, Any], name: str) -> Any:
-    """The recipe with other parameters; a table replaces some of a nested recipe's."""
-    if not parameters:
-        return recipe
-    known = [f.name for f in fields(recipe) if f.init] if is_dataclass(recipe) else []
-    _check_keys(f"parameter of {name}", parameters, known)
-    values = {}
-    for key, value in parameters.items():
-        now = getattr(recipe, key)
-        if isinstance(value, dict) and is_dataclass(now):
-            values[key] = _replaced(now, value, f"{name}.{key}")
-        else:
-            values[key] = _frozen(value)
-    try:
-        return replace(recipe, **values)
-    except TypeError as error:
-        raise InputError(f"{name} does not take {show(dict(parameters))}: {error}") from error
-
-
-def _frozen(value: Any) -> Any:
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+    return controller_named(table, profile), label
 
 
 def _table(given: object) -> dict[str, Any]:

@@ -138,7 +138,7 @@ def finished(
 def _warm(experiments: Iterable[Recipe], pool: Executor) -> None:
     """Compile once for all processes: one of them compiles to disk before the others start.
 
-    Without it, every process of a fresh installation would compile for itself, at the same time.
+    Otherwise every process of a fresh installation would compile for itself, all at the same time.
     What is compiled depends on the vehicle. A run that fails here will tell why when its turn
     comes.
     """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,9 +25,10 @@ from scenarios.sweep.keys import description_of, key_of
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
 
-def example(number: int = 0) -> str:
-    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
-    return str(blocks[number])
+def example(chapter: str = "Add a controller") -> str:
+    """The first block of Python in a chapter."""
+    text = GUIDE.read_text(encoding="utf-8").split(f"## {chapter}\n")[1]
+    return text.split("```python\n")[1].split("```")[0]
 
 
 def loaded(text: str, folder: Path) -> ModuleType:
@@ -116,7 +116,7 @@ def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
 
 def test_its_metric_is_measured() -> None:
     made: dict[str, Any] = {}
-    exec(example(1), made)
+    exec(example("Add a metric"), made)
     run = minisim.simulate(four_way(300, horizon=120.0), Dim(), 1)
     complete = run.summary(metrics=[made["delay"]])["complete"]
     expected = float((run.columns.time_loss + run.columns.depart_delay).mean())

@@ -122,17 +122,17 @@ CASES = {
     "FixedTime": Case(
         FixedTime,
         {"greens": (5.0, 6.0), "amber": 2.0, "saturation_flow": 1500.0, "lost_time": 2.0,
-         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0, "name": "x"},
+         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0},
     ),
     "Adaptive": Case(
         Adaptive,
         {"detector_range": 100.0, "min_time_loss": 1.0, "min_green": 3.0, "max_green": 50.0,
-         "extend_max_green": True, "amber": 2.0, "name": "x"},
+         "extend_max_green": True, "amber": 2.0},
     ),
     "LongestQueue": Case(
-        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0, "name": "x"}
+        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0}
     ),
-    "AllWayStop": Case(AllWayStop, {"reaction": 1.0, "name": "x"}),
+    "AllWayStop": Case(AllWayStop, {"reaction": 1.0}),
     "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
     "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
     "webster": Case(
@@ -143,7 +143,7 @@ CASES = {
     "webster_delay": Case(
         webster_delay, {"rate": 100.0, "green": 10.0, "cycle": 60.0, "saturation_flow": 1500.0}
     ),
-    "controller_named": Case(controller_named, {"name": "dim", "profile": "fair"}),
+    "controller_named": Case(controller_named, {"spec": "dim", "profile": "fair"}),
     "Recipe": Case(Recipe, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
     "simulate": Case(
         simulate,

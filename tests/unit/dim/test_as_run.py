@@ -331,8 +331,7 @@ def test_names_and_orders() -> None:
     assert isinstance(controller_named("dim", "as_run"), AsRunDim)
     assert controller_named("dim", "as_run") == AsRunDim(order="lanes")
     assert controller_named("dim", "fair") == Dim()
-    assert controller_named("dim-as-run:order=size").name == "dim-as-run:order=size"
-    assert controller_named("dim-as-run:exit_speed=14").name == "dim-as-run:exit_speed=14"
+    assert controller_named("dim-as-run:order=size") == AsRunDim(order="size")
 
 
 def test_the_exit_speed_can_be_that_of_the_signals() -> None:

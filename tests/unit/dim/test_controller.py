@@ -268,7 +268,7 @@ def test_wake_up_marks(gate: str, commit: str, marks: tuple[float, ...]) -> None
         (Dim(order="lanes"), "dim:order=lanes"),
         (Dim(commit="paper"), "dim:commit=paper"),
         (Dim(priorities="inflow"), "dim:priorities=inflow"),
-        (Dim(priorities=(1, 0, 2)), "dim-priorities"),
+        (Dim(priorities=(1, 0, 2)), "dim:priorities=(1,0,2)"),
         (
             Dim("lanes", "paper", "harmonious", "inflow"),
             "dim:order=lanes,commit=paper,gate=harmonious,priorities=inflow",

@@ -142,7 +142,7 @@ def test_what_the_host_has_to_provide() -> None:
     assert hasty.sight == alone.sight
     noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
     assert Mixed(noisy).start(SITE).plan.period == 0.2
-    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15)-humans-0.2"
+    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15,frame=0.2)-humans-0.2"
 
 
 def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:

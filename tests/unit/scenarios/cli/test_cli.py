@@ -25,7 +25,7 @@ from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
 from scenarios.cli.shared.proof import harmony_table
 from scenarios.cli.shared.terminal import show
-from scenarios.controllers import CONTROLLERS, controller_named
+from scenarios.controllers import controller_named
 from scenarios.demo import Tour
 from tests import ROOT
 
@@ -549,14 +549,6 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     decision = shell("minisim decide four-way a1 b2", PYTHONIOENCODING="ascii")
     assert (decision.returncode, decision.stderr) == (0, "")
     assert "a1-b2" in decision.stdout
-
-
-# --- controllers -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-def test_controllers_are_called_what_they_say(name: str) -> None:
-    assert controller_named(name, "fair").name == name
 
 
 # --- verify and protocol ---------------------------------------------------------------------

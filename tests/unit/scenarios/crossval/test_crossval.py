@@ -232,7 +232,7 @@ def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> No
     """What ran, not what the label says; the numbers are those of the label."""
     (v2ic,) = replayed_cases([], ["v2ic"], [350], ["4:3:2:1"], None, 3600.0)
     assert v2ic.name == "four-way 4:3:2:1 350 v2ic"
-    assert v2ic.decider() == V2ICAsRun(approach_speed=14.0)
+    assert v2ic.recipe().controller == V2ICAsRun(approach_speed=14.0)
     assert v2ic.reference("travel_time_s", "all") == reference_value(
         Cell("4:3:2:1", 350, 4, "v2ic"), "travel_time_s"
     )
@@ -241,22 +241,22 @@ def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> No
         [], ["fixed-time"], [200], ["balanced", "4:3:2:1"], None, 3600.0
     )
     assert balanced.scenario.profile == AS_RUN_SIGNALS
-    assert balanced.decider() == FixedTime(greens=GREENS[200], order=PHASES)
+    assert balanced.recipe().controller == FixedTime(greens=GREENS[200], order=PHASES)
     assert unbalanced.scenario.profile == AS_RUN
-    assert unbalanced.decider() == FixedTime(greens=5.0, order=PHASES)
+    assert unbalanced.recipe().controller == FixedTime(greens=5.0, order=PHASES)
     assert balanced.reference_tolerance("travel_time_s") == Tolerance(0.0, 2.0)
 
 
 def test_dims_arms_have_the_names_of_their_run() -> None:
     (case,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
-    assert case.decider() == AsRunDim(names="acbd")
+    assert case.recipe().controller == AsRunDim(names="acbd")
     assert case.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
 
 
 def test_published_arrivals_with_another_vehicle() -> None:
     """The controller goes with the vehicle, and the paper's numbers are not asked for."""
     dim, signal = replayed_cases([], ["dim", "fixed-time"], [200], ["4:1:4:1"], "fair", 3600.0)
-    assert (dim.decider(), signal.decider()) == (Dim(), FixedTime())
+    assert (dim.recipe().controller, signal.recipe().controller) == (Dim(), FixedTime())
     assert dim.reference("waiting_time_s", "all") is None
     recorded = dim.scenario.arrivals(0)
     assert np.array_equal(recorded.time, published_arrivals("4:1:4:1", 200, 4).time)

@@ -155,11 +155,11 @@ WRONG = [
     ('scenario = {name = "four-way", label = 3}', r"label must be a str"),
     ("scenario = 4", r"scenario: must be a name"),
     ('controller = "dmi"', r"controller: unknown controller 'dmi'.*'dim'"),
-    ('controller = {name = "dim", ordr = "size"}', r"parameter of dim 'ordr'.*'order'"),
-    ('controller = {name = "dim", zones = {rd = 3}}', r"parameter of dim.zones 'rd'.*'red'"),
+    ('controller = {name = "dim", ordr = "size"}', r"dim parameter 'ordr'.*'order'"),
+    ('controller = {name = "dim", zones = {rd = 3}}', r"zones=zones parameter 'rd'.*'red'"),
     ('controller = {name = "dim", order = "sise"}', r"unknown order 'sise'.*'size'"),
     ('controller = {name = "dim", zones = 3}', r"zones must be a Zones"),
-    ('controller = {name = "unregulated", x = 3}', r"parameter of unregulated 'x'"),
+    ('controller = {name = "unregulated", x = 3}', r"unregulated has no parameters, got x"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"profile must be a text"),
     ('split = "4-3"', r"split is balanced or written like"),
@@ -187,7 +187,8 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('controller = ["dim", {name = "dim", zones = {red = 3}}]', r"both be called dim.*label"),
+    ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
+     r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
 ]  # fmt: skip
 
@@ -220,9 +221,11 @@ def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
     found = read(
         tmp_path, 'scenario = "three-way"\ncontroller = {name = "fixed-time", greens = [1, 2]}\n'
     )
-    with pytest.raises(InputError, match=r"fixed-time cannot serve three-way at 350 .*2 values"):
+    with pytest.raises(
+        InputError, match=r"greens=\(1,2\) cannot serve three-way at 350 .*2 values"
+    ):
         check_can_run(found)
     store = tmp_path / "s.db"
     assert main(["sweep", str(tmp_path / "e.toml"), "--out", str(store)]) == 2
-    assert "fixed-time cannot serve three-way" in capsys.readouterr().err
+    assert "fixed-time:greens=(1,2) cannot serve three-way" in capsys.readouterr().err
     assert not store.exists()
