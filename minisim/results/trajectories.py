@@ -14,7 +14,7 @@ from minisim.errors import InputError, instance
 from minisim.files import replacing, write_table
 from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.junction.paths import Floats
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd

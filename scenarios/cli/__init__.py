@@ -22,7 +22,7 @@ from scenarios.termination import Terminated, terminable
 __all__ = ["COMMANDS", "app", "main"]
 
 #: The help lists these first, then the others by name.
-_FIRST = ("demo", "run", "animate", "sweep", "figures", "reproduce", "crossval")
+_FIRST = ("demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "crossval")
 
 #: The names of the modules beside this one, in the order of the help.
 COMMANDS = tuple(sorted(

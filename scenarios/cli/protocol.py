@@ -36,7 +36,7 @@ MAX_ARMS = 4
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
     "minisim protocol four-way --commit paper --counterexample two.csv\n\n"
-    "minisim animate four-way -c dim-paper-commit --arrivals two.csv --start 40 --seconds 15 "
+    "minisim animate four-way -c dim:commit=paper --arrivals two.csv --start 40 --seconds 15 "
     "-o two.gif"
 )
 def protocol(

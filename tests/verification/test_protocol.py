@@ -314,7 +314,7 @@ def test_a_session_that_disobeys_is_found(wrong: str, monkeypatch: pytest.Monkey
 def test_only_the_lanes_own_priorities_are_checked() -> None:
     with pytest.raises(InputError, match="own priorities only"):
         Checked(Dim(priorities="rotating"))
-    assert Checked(Dim(gate="harmonious")).name == "dim-harmonious"
+    assert Checked(Dim(gate="harmonious")).name == "dim:gate=harmonious"
 
 
 def test_rolling_is_known_to_the_papers_rule_only() -> None:
