@@ -136,9 +136,9 @@ def _made_table(made: Sequence[Made]) -> Table:
         for part in made
     ]
     names = [(part.name, study_named(part.name).question) for part in made]
-    totals = tuple(map(sum, zip(*counts, strict=True)))
+    totals = tuple(map(sum, zip((0,) * len(digits), *counts, strict=True)))
     rows = [
-        (*words, *(f"{value:.{places}f}" for value, places in zip(values, digits, strict=False)))
+        (*words, *(f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)))
         for words, values in zip([*names, ("all", "")], [*counts, totals], strict=True)
     ]
     return Table(

@@ -88,9 +88,9 @@ def perception_table(archive: Archive) -> Table:
     for (series, rate, silent, kind, shared, persistent), cell in chosen.groupby(keys, sort=False):
         error = "exact" if rate == 0.0 else outcomes.KIND_LOOKS[str(kind)].label
         manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
-        listed.append(
-            (str(series), "turns without signal" if silent else error, manner, *_outcomes(cell))
-        )
+        label = style.look(str(series)).label
+        error = "turns without signal" if silent else error
+        listed.append((label, error, manner, *_outcomes(cell)))
     return Table(
         f"What misread intents do, {CLASSIFIER:.0%} of them misread, on four arms, {DENSITY:g} "
         "veh/h/lane",
