@@ -164,7 +164,7 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('controller = ["dim", {name = "dim", order = "lanes", label = "dim"}]', r"both be called dim.*label"),
+    ('controller = ["dim", {name = "dim", period = 1, label = "dim"}]', r"called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
 ]  # fmt: skip
 
@@ -201,5 +201,5 @@ def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
         check_can_run(found)
     store = tmp_path / "s.db"
     assert main(["sweep", str(tmp_path / "e.toml"), "--out", str(store)]) == 2
-    assert "fixed-time.* cannot serve three-way" in capsys.readouterr().err
+    assert "fixed-time:greens=(1,2) cannot serve three-way" in capsys.readouterr().err
     assert not store.exists()
