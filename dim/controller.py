@@ -27,7 +27,7 @@ There are four exceptions:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Literal
 
 from dim.agent import GATES, Agent, Rules
@@ -45,6 +45,7 @@ from dim.priorities import (
     rotating,
 )
 from dim.senses.noise import NoisyPerception
+from dim.senses.tally import Tally
 from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, show
@@ -172,10 +173,15 @@ class DimSession:
         dim: the recipe.
         site: where it runs.
         follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
+        truth: what vehicles would see of a view without an error, for the tally of errors.
     """
 
     def __init__(
-        self, dim: Dim, site: Site, follows: Callable[[int], bool] = lambda _: True
+        self,
+        dim: Dim,
+        site: Site,
+        follows: Callable[[int], bool] = lambda _: True,
+        truth: Callable[[View], View] = lambda view: view,
     ) -> None:
         instance("dim", dim, Dim)
         instance("site", site, Site)
@@ -196,27 +202,33 @@ class DimSession:
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
+        self._start = zones.yellow_start + ROUNDING
         self._ranks = _ranking(dim, site)
         self.see = dim.perception.start(site)
-        self._watch = (
-            dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
-        )
+        self._watch = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
+        self._truth = truth
+        errs = dim.perception.period is not None
+        self._tally = Tally(self.rules, self.reader, self._start) if errs else None
+
+    @property
+    def counts(self) -> Mapping[str, float]:
+        """What its wrong perception did so far (`dim.senses.tally`); empty where it is exact."""
+        return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let every vehicle from the yellow zone on perceive and decide; report what changed."""
         commands: list[Command] = []
         agents: dict[int, Agent] = {}  # those that left the view are forgotten
-        start = self.plan.marks[0] + ROUNDING
         look_again = waiting = False
         table, until = self.table(view)
         seen = percept = None
         sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
-            if ego.distance > start or not self._follows(vehicle):
+            if ego.distance > self._start or not self._follows(vehicle):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
@@ -238,6 +250,8 @@ class DimSession:
             going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
             commands += self._watch.look(view, sights, going)
             look_again |= self._watch.needed
+        if self._tally is not None:
+            self._tally.count(self._truth(view), sights, table, commands)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
 from rich.table import Table
 
-from minisim.errors import InputError, MinisimError, integer, number, numbers
+from minisim.errors import InputError, MinisimError
 from minisim.files import markdown_table, write_table, write_text
+from minisim.parameters import declared, real, reals, whole
+from minisim.results.metrics import heading
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import Experiment
 from scenarios.sweep.pool import workers
 
 if TYPE_CHECKING:
@@ -33,39 +35,28 @@ CONTROLLERS = {
 }
 #: Averaged over seeds: column of a sweep -> heading.
 METRICS = {
-    "waiting_time_s": "waiting [s]",
-    "travel_time_s": "travel [s]",
-    "depart_delay_s": "departure delay [s]",
-    "unfinished": "unfinished",
+    name: heading(name)
+    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 }
 PROFILE = "fair"
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class Tour:
-    """What the tour simulates.
+    """What the tour simulates."""
 
-    Attributes:
-        densities: [veh/h/lane].
-        seeds: runs a point.
-        horizon: of each run [s].
-        film_start, film_seconds: of the animation, at the highest density [s].
-    """
-
-    densities: tuple[float, ...] = (150.0, 200.0, 250.0, 300.0, 350.0)
-    seeds: int = 5
-    horizon: float = 3600.0
-    film_start: float = 600.0
-    film_seconds: float = 60.0
+    densities: tuple[float, ...] = reals(
+        "mean inflows a lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
+    )
+    seeds: int = whole("runs a point", low=2, default=5)
+    horizon: float = real("of each run", "s", above=0, default=3600.0)
+    film_start: float = real("of the animation, at the highest density", "s", low=0, default=600.0)
+    film_seconds: float = real("length of the animation", "s", above=0, default=60.0)
     controllers: tuple[str, ...] = field(default=tuple(CONTROLLERS))
 
     def __post_init__(self) -> None:
-        integer("seeds", self.seeds, low=2)
-        if not numbers("densities", self.densities):
+        if not self.densities:
             raise InputError("a tour needs at least one density [veh/h/lane]")
-        number("horizon [s]", self.horizon, above=0)
-        number("film_start [s]", self.film_start, low=0)
-        number("film_seconds [s]", self.film_seconds, above=0)
 
     @classmethod
     def quick(cls, seeds: int = 2) -> Tour:
@@ -75,10 +66,10 @@ class Tour:
             film_seconds=10.0,
         )  # fmt: skip
 
-    def experiments(self) -> list[Experiment]:
+    def experiments(self) -> list[Recipe]:
         """Every density under every controller with every seed."""
         return [
-            Experiment(
+            Recipe(
                 four_way(density, profile=PROFILE, horizon=self.horizon),
                 controller_named(name, PROFILE),
                 seed,
@@ -90,16 +81,10 @@ class Tour:
 
     def film(self) -> Run:
         """The run of the animation."""
-        from minisim.simulation import simulate
-
         end = self.film_start + self.film_seconds
-        return simulate(
-            four_way(self.densities[-1], profile=PROFILE, horizon=end),
-            controller_named(self.controllers[0], PROFILE),
-            seed=1,
-            record="all",
-            record_window=(self.film_start, end),
-        )
+        scenario = four_way(self.densities[-1], profile=PROFILE, horizon=end)
+        recipe = Recipe(scenario, controller_named(self.controllers[0], PROFILE), seed=1)
+        return recipe.run(record="all", record_window=(self.film_start, end))
 
 
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
@@ -157,8 +142,8 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The result for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, heading in enumerate(_headings()):
-        table.add_column(heading, justify="left" if k == 1 else "right")
+    for k, title in enumerate(_headings()):
+        table.add_column(title, justify="left" if k == 1 else "right")
     rows = _cells(points)
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         table.add_row(*row, end_section=following is not None and following[0] != row[0])

@@ -19,7 +19,7 @@ from minisim.errors import InputError, choice, integer
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.published import PUBLISHED_ARMS, RENAMED, RENAMED_ARMS, published_arrivals
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario, parse_split
+from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,7 +142,7 @@ def scenario(
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     return MAKERS[cell.arms](
-        cell.density, split=_shares(ran.shares or split), profile=profile or _profile(cell, ran)
+        cell.density, split=ran.shares or split, profile=profile or _profile(cell, ran)
     )
 
 
@@ -168,7 +168,7 @@ def replay(
     ran = _ran(cell, as_labelled=False)
     return MAKERS[cell.arms](
         cell.density,
-        split=_shares(ran.shares or split),
+        split=ran.shares or split,
         profile=profile or _profile(cell, ran),
         recorded=published_arrivals(*cell),
     )
@@ -200,10 +200,6 @@ def _ran(cell: Cell, as_labelled: bool) -> Ran:
 
 def _profile(cell: Cell, ran: Ran) -> Profile:
     return ran.profile or LABELS[cell.controller][1]
-
-
-def _shares(split: str) -> tuple[float, ...] | None:
-    return None if split == "balanced" else tuple(parse_split(split))
 
 
 @lru_cache

@@ -108,7 +108,8 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
 def _value(name: str, parameter: Parameter, value: Any) -> Any:
     """What a written value means for a declared parameter; its check comes later."""
     if isinstance(value, Mapping):
-        value = call_of(value)
+        only = {"name": next(iter(parameter.kinds))} if len(parameter.kinds) == 1 else {}
+        value = call_of({**only, **value})
     text = value.lower() if isinstance(value, str) else None
     if parameter.words == SWITCH and text is not None:
         return {**_CONSTANTS, **_ON_OFF}.get(text, value)

@@ -92,28 +92,6 @@ def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float
     return low, float(gammainccinv(count + 1, tail))
 
 
-def queue_growth(
-    demand_time: npt.NDArray[np.float64], leave: npt.NDArray[np.float64], end: float
-) -> float:
-    """How many more vehicles were there in the last quarter of a run than in the second.
-
-    *There* is from demand to arrival, so that queues before the road count too; the numbers are
-    means over the quarter, each trip adding the part of it that it was there. No trajectories are
-    needed, and the swing of a signal's cycle averages out.
-
-    Args:
-        demand_time, leave: of the trips [s], shape (k,); `leave` is infinite where not reached.
-        end: of the run [s].
-    """
-
-    def present(quarter: int) -> float:
-        start, stop = end * quarter / 4.0, end * (quarter + 1) / 4.0
-        there = np.minimum(leave, stop) - np.maximum(demand_time, start)
-        return float(np.clip(there, 0.0, None).sum()) / (stop - start)
-
-    return present(3) - present(1)
-
-
 def growing(growth: float, trips: int) -> bool:
     """Whether queues kept growing, which makes a mean delay an artefact of the horizon.
 

@@ -13,7 +13,7 @@ from minisim.control import Site
 from minisim.errors import InputError, instance
 from minisim.files import replacing, write_table
 from minisim.junction.geometry import ARM_NAMES, Floats, Movement
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -170,13 +170,10 @@ def _cases(wanted: Wanted) -> list[Case]:
 
 def _check(cases: list[Case]) -> None:
     """Raise `InputError` for a cell that cannot run, before any does."""
-    from scenarios.sweep.experiment import Experiment
     from scenarios.sweep.file import check_can_run
 
     with bar("checking"):
-        check_can_run(
-            Experiment(case.scenario, case.decider(), label=case.controller) for case in cases
-        )
+        check_can_run(case.recipe() for case in cases)
 
 
 def _seeds(wanted: Wanted) -> range:

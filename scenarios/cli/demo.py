@@ -49,8 +49,8 @@ def demo(
         film = tour.film()  # first, for it compiles the kernel once for all processes
     with bar("simulating") as progress:
         points = run_tour(tour, processes, progress)
+    from figures.demo import performance_figure
     from figures.film.animate import write_animation
-    from figures.performance import performance_figure
     from figures.style import save
 
     write_tables(points, tour, folder)

@@ -39,8 +39,8 @@ def verify(
     with bar("trying all cases") as progress:
         analysis = analyse(matrix, order, progress=progress)
     if plot is not None:
+        from figures.junction.all_cases import verification_figure
         from figures.style import save
-        from figures.verification import verification_figure
 
         save(verification_figure(analysis, what.intersection), plot)
     facts = {

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from minisim.errors import InputError, MissingExtraError, instance
-from scenarios.sweep.experiment import results_version
+from scenarios.sweep.keys import results_version
 
 #: Of a scheduler; the protocols are Dask's.
 ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,9})", re.ASCII)

@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from minisim.errors import FileError, instance, show
-from scenarios.sweep.experiment import Experiment, Outcome, Row, key_of, results_version
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import description_of, digest_of, results_version
+from scenarios.sweep.rows import Outcome, Row
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,20 +89,20 @@ class Store:
             self._database.close()
             raise
 
-    def put(self, experiment: Experiment, outcome: Outcome) -> None:
-        """Store an outcome, in place of an earlier one of the same experiment.
+    def put(self, recipe: Recipe, outcome: Outcome) -> None:
+        """Store an outcome, in place of an earlier one of the same recipe.
 
         Raises:
             FileError: the disk is full, another process holds the store, …; stored rows stay.
-            InputError: an experiment that cannot be described (`canonical`).
+            InputError: a recipe that cannot be described (`canonical`).
         """
-        description = experiment.description
+        description = description_of(recipe)
         row = outcome.row
         with self._guarded("write"):
             self._database.execute(
                 "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?)",
                 (
-                    key_of(description),
+                    digest_of(description),
                     row["version"],
                     row["error"],
                     description,

@@ -19,9 +19,10 @@ from dim import Dim
 from minisim.errors import ExecutorError, InputError
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.sweep import Experiment, sweep
+from scenarios.recipe import Recipe
+from scenarios.sweep import sweep
 from scenarios.sweep.cluster import cluster
-from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
 
@@ -79,8 +80,8 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def experiments(count: int, horizon: float = 120.0) -> list[Experiment]:
-    return [Experiment(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
+def experiments(count: int, horizon: float = 120.0) -> list[Recipe]:
+    return [Recipe(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
 
 
 def repeatable(rows: pd.DataFrame) -> pd.DataFrame:

@@ -26,8 +26,8 @@ from minisim.junction.geometry import Intersection
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
-from scenarios.scenario import FAIR, Profile, Scenario, parse_split, profile_named
-from scenarios.sweep import Experiment
+from scenarios.recipe import Recipe
+from scenarios.scenario import FAIR, Profile, Scenario, profile_named
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)
 FOUR = Intersection(BEARINGS, arm_length=60.0)
@@ -92,7 +92,6 @@ CASES = {
         {"bearings": BEARINGS, "name": "x", **GEOMETRY, **TRAFFIC, **RUN},
     ),
     "profile_named": Case(profile_named, {"name": "fair"}),
-    "parse_split": Case(parse_split, {"text": "4:3:2:1"}),
     "HarmonyMatrix": Case(HarmonyMatrix, {"n": 3, "values": np.zeros((6, 6), dtype=int)}),
     "HarmonyMatrix.paper": Case(HarmonyMatrix.paper, {"n": 4}),
     "HarmonyMatrix.from_geometry": Case(
@@ -145,7 +144,7 @@ CASES = {
         webster_delay, {"rate": 100.0, "green": 10.0, "cycle": 60.0, "saturation_flow": 1500.0}
     ),
     "controller_named": Case(controller_named, {"spec": "dim", "profile": "fair"}),
-    "Experiment": Case(Experiment, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
+    "Recipe": Case(Recipe, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
     "simulate": Case(
         simulate,
         {"scenario": SHORT, "controller": Unregulated(), "seed": 1, "record": None,

@@ -23,7 +23,6 @@ from hypothesis import given
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim, Mixed, NoisyPerception
-from dim.senses.tally import Tallied
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -227,8 +226,8 @@ def test_what_a_session_counts_is_in_the_summary() -> None:
     """The same misread vehicles in both hosts: readings belong to vehicles, not to calls."""
     scenario = small_scenario(4, density=350.0, demand_time=150.0)
     senses = NoisyPerception(0.5, "symmetric")
-    tallied = Tallied(Dim(perception=senses))
-    ours, theirs = (run(scenario, tallied, 1, on_collision="record")
+    dim = Dim(perception=senses)
+    ours, theirs = (run(scenario, dim, 1, on_collision="record")
                     for run in (minisim.simulate, simulate))  # fmt: skip
     assert theirs.counts == {key: theirs.summary()[key] for key in ours.counts}
     assert theirs.counts["crossings"] == pytest.approx(ours.counts["crossings"], abs=2)
@@ -422,7 +421,7 @@ def test_what_netconvert_says_is_passed_on_and_its_files_kept(
         simulate(single(), Unregulated(), keep_files=tmp_path / "other")
     assert caught.value.__notes__ == [f"SUMO's files up to there are in {tmp_path / 'other'}"]
     kept = {file.name for file in (tmp_path / "new" / "folder").iterdir()}
-    assert kept == {"minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"}
+    assert kept == {f"minisim.{what}.xml" for what in ("rou", "nod", "edg", "con")}
 
 
 def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -545,7 +544,7 @@ def test_wrong_arguments_are_told(options: dict[str, Any], message: str) -> None
 def test_sumo_has_no_improved_idm() -> None:
     profile = replace(FAIR, vehicle=VehicleType(model="iidm"))
     scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
-    with pytest.raises(InputError, match=r"IDM does not drive .* 'iidm'; choose Krauss"):
+    with pytest.raises(InputError, match=r"SUMO has no model of the law 'iidm'; choose Krauss"):
         simulate(scenario, Unregulated())
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 

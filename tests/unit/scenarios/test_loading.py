@@ -16,7 +16,9 @@ from minisim.errors import InputError
 from minisim.testing import check_controller
 from scenarios import four_way
 from scenarios.controllers import controller_named
-from scenarios.sweep import Experiment, sweep
+from scenarios.recipe import Recipe
+from scenarios.sweep import sweep
+from scenarios.sweep.keys import key_of
 from tests import ROOT
 
 MINE = '''
@@ -113,11 +115,11 @@ def test_a_package_of_the_working_directory(folder: Path) -> None:
 
 def test_a_changed_file_is_imported_again(folder: Path) -> None:
     """Within one second, of one length: as quickly as an editor and a notebook go."""
-    before = Experiment(four_way(), controller_named("own_mine:Mine"), 1).key
+    before = key_of(Recipe(four_way(), controller_named("own_mine:Mine"), 1))
     (folder / "own_mine.py").write_text(MINE.replace("10.0", "12.0"), encoding="utf-8")
     after = controller_named("own_mine:Mine")
     assert after.name == "mine-12"
-    assert Experiment(four_way(), after, 1).key != before
+    assert key_of(Recipe(four_way(), after, 1)) != before
 
 
 @pytest.mark.usefixtures("folder")
@@ -135,8 +137,7 @@ def test_other_processes_find_it() -> None:
 @pytest.mark.usefixtures("folder")
 def test_a_sweep_over_two_processes_runs_it() -> None:
     experiments = [
-        Experiment(four_way(horizon=30), controller_named(f"own_mine:Mine(k={k})"), 1)
-        for k in (5, 10)
+        Recipe(four_way(horizon=30), controller_named(f"own_mine:Mine(k={k})"), 1) for k in (5, 10)
     ]
     rows = sweep(experiments, jobs=2)
     assert [row["error"] for _, row in rows.iterrows()] == [None, None]

@@ -19,6 +19,7 @@ from baselines import FixedTime
 from minisim.errors import FileError, InputError, MissingExtraError
 from minisim.results import trajectories as recording
 from minisim.results.run import Run
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.results.trajectories import (
     TRAJECTORY_COLUMNS,
     movement_index,
@@ -26,7 +27,6 @@ from minisim.results.trajectories import (
     write_trajectories,
     write_trips,
 )
-from minisim.results.trips import TRIP_COLUMNS
 from minisim.testing import small_scenario
 
 
