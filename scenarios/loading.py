@@ -21,7 +21,7 @@ from typing import Any
 
 from minisim.errors import InputError, choice
 
-#: File -> its text when it was imported last.
+#: File -> its text when it was last imported here.
 _texts: dict[Path, bytes] = {}
 
 
@@ -56,7 +56,7 @@ def _file_of(module: str) -> tuple[Path, str] | None:
         path = Path(module)
         if not path.is_file():
             raise InputError(f"cannot read {module}: no such file")
-        return path.resolve().parent, path.stem
+        return path.absolute().parent, path.stem
     return (Path.cwd(), module) if _source(Path.cwd(), module).is_file() else None
 
 
@@ -64,7 +64,7 @@ def _imported(module: str) -> ModuleType:
     try:
         return importlib.import_module(module)
     except (Exception, SystemExit) as error:
-        if isinstance(error, ModuleNotFoundError) and module.startswith(error.name or "?"):
+        if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
             raise InputError(
                 f"no module {module!r}: there is no {module.replace('.', '/')}.py in the working "
                 "directory, and none of that name is installed"
@@ -81,7 +81,7 @@ def _from_file(folder: Path, name: str) -> ModuleType:
         raise InputError(f"cannot read {file}: {error.strerror}") from None
     known = sys.modules.get(name)
     _check_own(known, file)
-    if known is not None and _texts.setdefault(file, text) == text:
+    if known is not None and _texts.get(file, text) == text:
         return known
     with _found_in(folder):
         try:
@@ -105,9 +105,10 @@ def _source(folder: Path, name: str) -> Path:
 
 def _check_own(module: ModuleType | None, file: Path) -> None:
     """Raise `InputError` where a module is not the one of the file."""
-    if module is not None and Path(module.__file__ or "").resolve() != file:
+    origin = getattr(module, "__file__", None) or ""
+    if module is not None and Path(origin).resolve() != file.resolve():
         raise InputError(
-            f"{file.name} has the name of another module, {module.__name__}; rename the file"
+            f"{file} has the name of another module, {module.__name__}; rename the file"
         )
 
 

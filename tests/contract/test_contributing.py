@@ -91,7 +91,7 @@ def test_a_version_of_ones_own_tells_rules_apart(module: ModuleType) -> None:
         return made
 
     assert key(named(version=1)) == key(named(version=1)) != key(named(version=2))
-    with pytest.raises(InputError, match="a text or an integer `version`"):
+    with pytest.raises(InputError, match="give it a text or an integer `version`"):
         key(named())
 
 

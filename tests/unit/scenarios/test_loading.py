@@ -165,6 +165,7 @@ def test_a_sweep_over_two_processes_runs_it() -> None:
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
         ("own_empty:Mine", "own_empty has no class 'Mine', and no other either"),
         ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
+        ("time:Mine", "time.py has the name of another module, time; rename the file"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_sentence(folder: Path, spec: str, message: str) -> None:
@@ -175,6 +176,7 @@ def test_what_is_wrong_is_one_sentence(folder: Path, spec: str, message: str) ->
         "own_lacks": "import own_gone\n",
         "own_empty": "",
         "json": MINE,
+        "time": MINE,
     }
     for name, text in files.items():
         (folder / f"{name}.py").write_text(text, encoding="utf-8")

@@ -207,7 +207,7 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
         pass
 
     odd = Odd()
-    object.__setattr__(odd, "period", lambda: 1)
+    object.__setattr__(odd, "period", object())
     with Store(tmp_path / "s.db") as store, pytest.raises(InputError, match="cannot be stored"):
         sweep([replace(experiment(), controller=odd)], jobs=1, store=store)
 
