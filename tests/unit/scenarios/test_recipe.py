@@ -31,7 +31,7 @@ def test_a_host_gets_all_of_it() -> None:
 
     Recipe(SHORT, Dim(), 1, humans=0.5, on_collision="teleport").run(host, model="IDM")
     assert given["what"] == (SHORT, Mixed(Dim(), 0.5), 1)
-    assert given["options"] == {"on_collision": "teleport", "model": "IDM", "record": None}
+    assert given["options"] == {"on_collision": "teleport", "model": "IDM"}
 
 
 def test_humans_drive_among_vehicles_of_dim() -> None:
