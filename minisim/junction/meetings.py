@@ -1,8 +1,8 @@
 """Where two ways through a junction meet, as SUMO sees it.
 
-SUMO's vehicles follow not only who is ahead of them, but also who is about to join their way inside
-the junction, or has just left it. This is the table of those places: for every two movements, how
-far before the end of its own way each of them is when it meets the other.
+SUMO's vehicles follow not only the vehicle ahead, but also those that are about to join their way
+inside the junction or have just left it. This is the table of those places: for every two
+movements, how far before the end of its own way each of them is when it meets the other.
 Source: `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.28).
 """
 
@@ -13,15 +13,17 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-from minisim.junction.geometry import Intersection, Path
-
-Floats = npt.NDArray[np.float64]
+from minisim.junction.geometry import Intersection
+from minisim.junction.paths import Floats, Path, distances_along
+from minisim.junction.turns import Turn, turns
 
 #: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
 DIVERGED = 2.5
+
+#: Ways that bend by less than this are straight [°].
+BENT = math.degrees(1e-4)
 
 
 class Meeting(IntEnum):
@@ -64,17 +66,15 @@ class _Curve(NamedTuple):
     @classmethod
     def of(cls, path: Path, intersection: Intersection) -> _Curve:
         """The given curve where there is one, else the arc."""
-        length = path.exit - path.entry
         if intersection.ways is None:
-            return cls(path.points, length)
+            return cls(path.points, path.crossing)
         way = intersection.ways[intersection.index(path.movement)]
-        return cls(np.asarray(way.points, dtype=float), length, way.wait)
+        return cls(np.asarray(way.points, dtype=float), path.crossing, way.wait)
 
     @property
     def distances(self) -> Floats:
         """Of the points along the polyline [m]."""
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return distances_along(self.points)
 
     @property
     def line(self) -> shapely.LineString:
@@ -138,11 +138,9 @@ def sagittas(intersection: Intersection, length: float) -> Floats:
     """
     chord = length + 2.0
     result = np.zeros(len(intersection.paths))
-    for p, path in enumerate(intersection.paths):
-        (ix, iy), (ox, oy) = path.heading_in.tolist(), path.heading_out.tolist()
-        turn = math.atan2(ix * oy - iy * ox, ix * ox + iy * oy)
-        far = turn < -1e-4 if intersection.side == "left" else turn > 1e-4
-        if far:
-            radius = (path.exit - path.entry) / abs(turn)
+    for p, turn in enumerate(turns(intersection, BENT)):
+        if turn is Turn.FAR:
+            path = intersection.paths[p]
+            radius = path.crossing / abs(path.turn)
             result[p] = radius - math.sqrt(max(radius * radius - chord * chord / 4.0, 0.0))
     return result
