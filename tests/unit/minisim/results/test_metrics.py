@@ -24,7 +24,6 @@ from minisim.results.metrics import (
     TABLE,
     Metric,
     heading,
-    metric_named,
     recording,
 )
 from minisim.results.run import Run
@@ -163,7 +162,6 @@ def test_headings() -> None:
     assert heading("complete_waiting_time_s") == "waiting, with unfinished [s]"
     assert heading("trips") == "trips"
     assert heading("mine") == "mine"
-    assert metric_named(METRICS["trips"]) is metric_named("trips")
 
 
 # --- warm-up ---------------------------------------------------------------------------------
