@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -141,14 +141,14 @@ def _spread(name: str, values: list[float]) -> dict[str, float | None]:
 def _groups(run: Run, key: str) -> dict[str, Ints]:
     """Name of each group -> indices of its trips, among those that count."""
     trips, movements = run.counted, run.site.intersection.movements
-    names: Sequence[str]
+    names: Iterable[str]
     if key == "lanes":
         names, group = ARM_NAMES[: movements.n], trips.lane
     elif key == "movements":
         names, group = movements.names, movements.index_of[trips.lane, trips.manoeuvre]
     else:
-        names, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
-        names, group = names.tolist(), group[run.counted_rows]
+        kinds, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
+        names, group = kinds.tolist(), group[run.counted_rows]
     return {name: (group == k).nonzero()[0] for k, name in enumerate(names)}
 
 

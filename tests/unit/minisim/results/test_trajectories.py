@@ -106,7 +106,7 @@ def test_another_suffix_is_an_error(run: Run, tmp_path: Path) -> None:
 def test_a_frame_without_the_columns_is_an_error(
     tmp_path: Path, write: Callable[[Any, Path], None], frame: object
 ) -> None:
-    with pytest.raises(InputError, match=r"DataFrame|no column (time_s|demand_time_s)"):
+    with pytest.raises(InputError, match=r"DataFrame|no column (time_s|vehicle)"):
         write(frame, tmp_path / "out.csv")
 
 
