@@ -46,10 +46,10 @@ def meetings(intersection: Intersection) -> Floats:
     for p, q in itertools.permutations(range(len(paths)), 2):
         (way, end), (other, other_end) = curves[p], curves[q]
         if paths[p].movement.origin == paths[q].movement.origin:
-            table[p, q] = Meeting.PART, max(way.length - _parted(way, other), 0.0)
+            table[p, q] = Meeting.PART, max(way.length - _parted(way, other) * way.scale, 0.0)
         elif paths[p].exit_arm == paths[q].exit_arm:
             backwards = [_Curve(curve.points[::-1], curve.length) for curve in (end, other_end)]
-            table[p, q] = Meeting.JOIN, _parted(*backwards)
+            table[p, q] = Meeting.JOIN, _parted(*backwards) * end.scale
     return table
 
 
@@ -61,6 +61,11 @@ class _Curve(NamedTuple):
 
     points: Floats
     length: float
+
+    @property
+    def scale(self) -> float:
+        """Driven length over the polyline's."""
+        return self.length / float(distances_along(self.points)[-1])
 
 
 def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
@@ -79,21 +84,21 @@ def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
 
 
 def _parted(one: _Curve, two: _Curve) -> float:
-    """Driven distance on the first of two curves with one beginning to where they part [m]."""
+    """Distance along two curves with one beginning to where they part [m]."""
     ends = [float(distances_along(curve.points)[-1]) for curve in (one, two)]
-    return min(max(_until_apart(one, two), _until_apart(two, one)), *ends) * one.length / ends[0]
+    return min(max(_until_apart(one, two), _until_apart(two, one)), *ends)
 
 
 def _until_apart(curve: _Curve, other: _Curve) -> float:
     """Distance along a curve to where it stays `DIVERGED` from the other [m]."""
-    gaps = shapely.distance(shapely.points(curve.points), shapely.LineString(other.points))
+    line = shapely.LineString(other.points)
+    gaps = np.asarray(shapely.distance(shapely.points(curve.points), line))
     at = distances_along(curve.points)
     k = int(np.flatnonzero(gaps <= DIVERGED)[-1])
     if k == len(at) - 1:
         return curve.length
     share = (DIVERGED - gaps[k]) / (gaps[k + 1] - gaps[k])
-    rounding = curve.length - at[-1]
-    return float(at[k] + share * (at[k + 1] - at[k]) + rounding)
+    return float(at[k] + share * (at[k + 1] - at[k])) + (curve.length - float(at[-1]))
 
 
 def sagittas(intersection: Intersection, length: float) -> Floats:
