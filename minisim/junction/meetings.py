@@ -76,10 +76,11 @@ def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
     if intersection.ways is None:
         return [(_Curve(path.points, path.crossing),) * 2 for path in intersection.paths]
     curves = []
-    for way in intersection.ways:
+    for path, way in zip(intersection.paths, intersection.ways, strict=True):
         points = np.asarray(way.points, dtype=float)
         k = int(np.argmin(np.abs(distances_along(points) - way.wait)))
-        curves.append((_Curve(points, way.length), _Curve(points[k:], way.length - way.wait)))
+        length = path.crossing
+        curves.append((_Curve(points, length), _Curve(points[k:], length - way.wait)))
     return curves
 
 
