@@ -36,10 +36,6 @@ def run() -> Run:
     return minisim.simulate(scenario, FixedTime(), seed=1, record="all")
 
 
-def write_fcd_of(run: Run) -> Callable[[pd.DataFrame, Path], None]:
-    return lambda frame, path: write_fcd(frame, path, run.site)
-
-
 def frame_of(*rows: tuple[float, int, str, int, float]) -> pd.DataFrame:
     """A trajectory frame from (time, vehicle, lane, manoeuvre, s)."""
     frame = pd.DataFrame(rows, columns=["time_s", "vehicle", "lane", "manoeuvre", "s_m"])
@@ -77,14 +73,6 @@ def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_p
     assert "nan" not in path.read_text(encoding="utf-8").lower()
 
 
-def test_times_are_written_as_people_write_them(tmp_path: Path) -> None:
-    frame = frame_of((3 * 0.1, 0, "a", 1, 0.1 + 0.2))
-    write_trajectories(frame, tmp_path / "t.csv")
-    assert (tmp_path / "t.csv").read_text(encoding="utf-8").splitlines()[1] == (
-        "0.3,0,a,1,0.3,0.0,0.0,0.0,0.0,0.0,True"
-    )
-
-
 def test_parquet_without_pyarrow_says_what_to_install(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,11 +80,6 @@ def test_parquet_without_pyarrow_says_what_to_install(
     with pytest.raises(MissingExtraError, match=r"pip install 'minisim\[parquet\]'"):
         write_trips(run.trips, tmp_path / "trips.parquet")
     assert os.listdir(tmp_path) == []
-
-
-def test_another_suffix_is_an_error(run: Run, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"allowed: \.csv, \.parquet"):
-        write_trips(run.trips, tmp_path / "trips.xlsx")
 
 
 @pytest.mark.parametrize(
@@ -120,14 +103,12 @@ def test_fcd_follows_the_schema_of_sumo(run: Run, tmp_path: Path) -> None:
 
     root = ET.parse(path).getroot()
     assert root.tag == "fcd-export"
+    assert {(step.tag, *step.attrib) for step in root} == {("timestep", "time")}
     times = [float(step.attrib["time"]) for step in root]
-    assert {step.tag for step in root} == {"timestep"}
-    assert {tuple(step.attrib) for step in root} == {("time",)}
     assert times == sorted(set(times))
     vehicles = [vehicle for step in root for vehicle in step]
-    assert {vehicle.tag for vehicle in vehicles} == {"vehicle"}
-    assert {tuple(vehicle.attrib) for vehicle in vehicles} == {
-        ("id", "x", "y", "angle", "type", "speed", "pos", "lane", "slope")
+    assert {" ".join((vehicle.tag, *vehicle.attrib)) for vehicle in vehicles} == {
+        "vehicle id x y angle type speed pos lane slope"
     }
     for vehicle in vehicles:
         values = {k: float(v) for k, v in vehicle.attrib.items() if k not in ("lane", "type")}
@@ -224,12 +205,6 @@ def test_a_place_that_cannot_be_written_is_one_clear_error(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_device_is_not_replaced_by_a_file(run: Run) -> None:
-    with pytest.raises(FileError, match="not an ordinary file"):
-        write_fcd(run.trajectories, os.devnull, run.site)
-    assert not Path(os.devnull).is_file()
-
-
 def test_a_failure_halfway_leaves_the_old_file(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -245,9 +220,3 @@ def test_a_failure_halfway_leaves_the_old_file(
         write_fcd(run.trajectories, path, run.site)
     assert path.read_text(encoding="utf-8") == "old"
     assert os.listdir(tmp_path) == ["fcd.xml"]
-
-
-@pytest.mark.parametrize("path", [5, None, b"x.csv"])
-def test_a_path_must_be_a_path(run: Run, path: Any) -> None:
-    with pytest.raises(InputError, match="output file"):
-        write_trips(run.trips, path)
