@@ -108,10 +108,9 @@ def test_zones_of_merging_paths_end_where_the_rear_has_left() -> None:
         )
 
 
-def test_no_zones_without_conflict() -> None:
-    assert np.array_equal(
-        np.isfinite(conflict_zones(JUNCTION, SITE.vehicle)[..., 0]), SITE.conflicts
-    )
+def test_zones_are_where_movements_conflict() -> None:
+    zones = conflict_zones(JUNCTION, SITE.vehicle)
+    assert np.array_equal(np.isfinite(zones[..., 0]), SITE.conflicts)
 
 
 def test_a_vehicle_is_in_the_way_until_its_body_has_left_it() -> None:

@@ -106,13 +106,6 @@ def test_position_moves_one_metre_a_metre(square: Intersection) -> None:
         assert steps.min() >= 0.5 * math.cos(theta / 2.0)
 
 
-def test_position_has_the_shape_of_s(square: Intersection) -> None:
-    path = square.path(Movement(0, 1))
-    assert path.position(3.0).shape == (2,)
-    assert path.position(np.zeros((4, 5))).shape == (4, 5, 2)
-    assert path.bodies(np.zeros(4), CAR).shape == (4, 4, 2)
-
-
 def test_paths_start_and_end_at_the_far_ends_of_their_arms(square: Intersection) -> None:
     for path in square.paths:
         start, end = path.position([0.0, path.length])

@@ -74,19 +74,19 @@ def test_ttc_and_drac_behind_a_slower_leader() -> None:
     assert row["drac_mps2"] == pytest.approx(5.0**2 / 30.0)
 
 
-def test_ttc_is_undefined_behind_a_faster_leader() -> None:
-    frame = frame_of(at(1, "a2", -80.0, 15.0), at(2, "a2", -100.0, 10.0))
+@pytest.mark.parametrize(
+    ("leader", "follower", "ttc"),
+    [((-80.0, 15.0), (-100.0, 10.0), np.nan), ((-80.0, 5.0), (-84.0, 10.0), 0.0)],
+    ids=["a faster leader", "bodies that overlap"],
+)
+def test_without_closing_in_or_a_gap_there_is_no_drac(
+    leader: tuple[float, float], follower: tuple[float, float], ttc: float
+) -> None:
+    frame = frame_of(at(1, "a2", *leader), at(2, "a2", *follower))
     (row,) = following(frame, SITE).to_dict("records")
-    assert np.isnan(row["ttc_s"])
+    assert row["ttc_s"] == pytest.approx(ttc, nan_ok=True)
     assert np.isnan(row["drac_mps2"])
-    assert safety_summary(frame, SITE)["min_ttc_s"] is None
-
-
-def test_bodies_that_overlap_have_no_time_left_and_no_drac() -> None:
-    frame = frame_of(at(1, "a2", -80.0, 5.0), at(2, "a2", -84.0, 10.0))
-    (row,) = following(frame, SITE).to_dict("records")
-    assert row["ttc_s"] == 0.0
-    assert np.isnan(row["drac_mps2"])
+    assert safety_summary(frame, SITE)["min_ttc_s"] == (None if np.isnan(ttc) else ttc)
 
 
 def test_each_follows_the_one_ahead_at_the_same_time_and_lane() -> None:
