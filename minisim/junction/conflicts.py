@@ -7,9 +7,9 @@ conflict when their corridors come closer than `CLEARANCE`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache, wraps
-from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +18,10 @@ import shapely
 from minisim.errors import number
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools
-from minisim.junction.paths import Floats, Path, Size
+from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
 Shapes = npt.NDArray[np.object_]
-
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
 
 #: Room between two corridors that may be driven at once [m]: twice the static buffer of 0.25 m
 #: around each body in Dresner & Stone, JAIR 31 (2008), §3.
@@ -40,26 +37,6 @@ CLEARING_STEP = CLEARANCE / 2.0
 AREA_STEP = 0.1
 
 
-def by_size(
-    kept: int,
-) -> Callable[
-    [Callable[Concatenate[Intersection, Size, _P], _R]],
-    Callable[Concatenate[Intersection, VehicleType | Size, _P], _R],
-]:
-    """Decorator: keep the last results of a function of a junction and the size of a vehicle."""
-
-    def decorate(function: Any) -> Any:
-        known = lru_cache(maxsize=kept)(function)
-
-        @wraps(function)
-        def look_up(intersection: Intersection, vehicle: VehicleType | Size, *more: Any) -> Any:
-            return known(intersection, Size(vehicle.length, vehicle.width), *more)
-
-        return look_up
-
-    return decorate
-
-
 class Areas(NamedTuple):
     """Conflict areas of every two movements, shape (m, m) each [m], NaN where there is none.
 
@@ -71,7 +48,7 @@ class Areas(NamedTuple):
     leave: Floats
 
 
-def corridor(path: Path, vehicle: VehicleType | Size) -> shapely.Geometry:
+def corridor(path: Path, vehicle: VehicleType) -> shapely.Geometry:
     """The area that a body sweeps from when its front enters to when its rear has left."""
     first, last = path.entry, path.exit + vehicle.length
     count = math.ceil((last - first) / SWEEP_STEP) + 1
@@ -80,19 +57,19 @@ def corridor(path: Path, vehicle: VehicleType | Size) -> shapely.Geometry:
     return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
 
 
-def bodies(path: Path, fronts: Floats, vehicle: VehicleType | Size) -> Shapes:
+def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
     """Bodies on a path with their fronts at these `s`, shape (fronts,)."""
     return np.asarray(shapely.polygons(path.bodies(fronts, vehicle)))
 
 
-@by_size(256)
-def corridors(intersection: Intersection, vehicle: Size) -> Shapes:
+@lru_cache(maxsize=256)
+def corridors(intersection: Intersection, vehicle: VehicleType) -> Shapes:
     """The corridors of all movements, prepared for many tests, shape (m,)."""
     return _prepared([corridor(path, vehicle) for path in intersection.paths])
 
 
-@by_size(256)
-def separation(intersection: Intersection, vehicle: Size) -> Floats:
+@lru_cache(maxsize=256)
+def separation(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """Distance [m] between the corridors of every two movements, shape (m, m).
 
     0 where they overlap, and between movements from one arm, which begin together.
@@ -105,15 +82,15 @@ def separation(intersection: Intersection, vehicle: Size) -> Floats:
 
 
 def conflicts(
-    intersection: Intersection, vehicle: VehicleType | Size, clearance: float = CLEARANCE
+    intersection: Intersection, vehicle: VehicleType, clearance: float = CLEARANCE
 ) -> Bools:
     """Whether two movements come closer than `clearance` [m]; shape (m, m), symmetric."""
     number("clearance [m]", clearance, low=0, high=10)
     return np.asarray(separation(intersection, vehicle) <= clearance)
 
 
-@by_size(256)
-def entry_room(intersection: Intersection, vehicle: Size) -> float:
+@lru_cache(maxsize=256)
+def entry_room(intersection: Intersection, vehicle: VehicleType) -> float:
     """Smallest distance [m] between a vehicle held at its entry and a corridor of another arm.
 
     0 means that the vehicle does not fit the lanes: turning into an exit lane, it would touch
@@ -126,8 +103,8 @@ def entry_room(intersection: Intersection, vehicle: Size) -> float:
     return float(distance[movements.origins[:, None] != np.arange(intersection.n)].min())
 
 
-@by_size(256)
-def conflict_zones(intersection: Intersection, vehicle: Size) -> Floats:
+@lru_cache(maxsize=256)
+def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """The conflict zones of all movements, shape (m, m, 2) [m], NaN where two do not conflict.
 
     A vehicle on path p comes closer than `CLEARANCE` to corridor q only while its front bumper is
@@ -149,8 +126,8 @@ def conflict_zones(intersection: Intersection, vehicle: Size) -> Floats:
     return _fixed(zones)
 
 
-@by_size(256)
-def clearing_distances(intersection: Intersection, vehicle: Size) -> Floats:
+@lru_cache(maxsize=256)
+def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
 
     `[p, q]`: from there on the body of a vehicle of movement q keeps `CLEARANCE` from the corridor
@@ -170,8 +147,8 @@ def clearing_distances(intersection: Intersection, vehicle: Size) -> Floats:
     return _fixed(distances)
 
 
-@by_size(256)
-def conflict_areas(intersection: Intersection, vehicle: Size) -> Areas:
+@lru_cache(maxsize=256)
+def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
     """Where on its path a vehicle is in the way of another movement inside the junction."""
     paths = intersection.paths
     fronts = [np.arange(path.entry, path.exit + vehicle.length, AREA_STEP) for path in paths]
@@ -186,14 +163,14 @@ def conflict_areas(intersection: Intersection, vehicle: Size) -> Areas:
     return Areas(*(_fixed(np.where(both, table, np.nan)) for table in (enter, leave)))
 
 
-def _rivals(intersection: Intersection, vehicle: Size) -> Bools:
+def _rivals(intersection: Intersection, vehicle: VehicleType) -> Bools:
     """Whether two movements conflict and come from different arms."""
     return conflicts(intersection, vehicle) & intersection.movements.apart
 
 
 def _reaching(
     intersection: Intersection,
-    vehicle: Size,
+    vehicle: VehicleType,
     fronts: Sequence[Floats],
     areas: Shapes,
     pairs: Bools,

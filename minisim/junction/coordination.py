@@ -9,15 +9,16 @@ other.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from minisim.junction.conflicts import CLEARANCE, Shapes, bodies, by_size
+from minisim.junction.conflicts import CLEARANCE, Shapes, bodies
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools
-from minisim.junction.paths import Floats, Path, Size
+from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
 #: Grid of positions [m].
@@ -70,8 +71,10 @@ class Region(NamedTuple):
         return float(rows[-1] + 1) * STEP if len(rows) else 0.0
 
 
-@by_size(4096)
-def region(intersection: Intersection, vehicle: Size, first: int, second: int) -> Region | None:
+@lru_cache(maxsize=4096)
+def region(
+    intersection: Intersection, vehicle: VehicleType, first: int, second: int
+) -> Region | None:
     """The forbidden region of two movements, by index; None where bodies never come near."""
     near, close = _grids(intersection, vehicle, min(first, second), max(first, second))
     if not near.any():
@@ -82,7 +85,7 @@ def region(intersection: Intersection, vehicle: Size, first: int, second: int) -
 
 
 def passes(
-    intersection: Intersection, vehicle: VehicleType | Size, first: int, x: float,
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float,
     second: int, y: float,
 ) -> bool:  # fmt: skip
     """Whether a vehicle on one path can pass a vehicle that stands on another path.
@@ -108,9 +111,9 @@ def _free(blocked: Bools, first: float, second: float) -> float:
     return max(int(row + ahead[0]) * STEP - first, 0.0) if len(ahead) else math.inf
 
 
-@by_size(4096)
+@lru_cache(maxsize=4096)
 def _squeezes(
-    intersection: Intersection, vehicle: Size, first: int, x: float, second: int, y: float
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
 ) -> bool:
     """`passes`, measured; the grid is too coarse for the last decimetres."""
     one, other = intersection.paths[first], intersection.paths[second]
@@ -120,9 +123,9 @@ def _squeezes(
     return bool((shapely.distance(moves, stands) > TIGHT).all())
 
 
-@by_size(4096)
+@lru_cache(maxsize=4096)
 def _grids(
-    intersection: Intersection, vehicle: Size, first: int, second: int
+    intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
     """Whether the bodies come closer than `CLEARANCE`, and than `CLOSE`, near each grid point."""
     one, other = (_until_clear(intersection.paths[k], vehicle) for k in (first, second))
@@ -130,7 +133,7 @@ def _grids(
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
 
 
-def _until_clear(path: Path, vehicle: Size) -> Shapes:
+def _until_clear(path: Path, vehicle: VehicleType) -> Shapes:
     """The body with its front at each grid point, until its rear has left the junction."""
     past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
     return bodies(path, path.entry + past, vehicle)

@@ -9,16 +9,16 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
-from minisim.junction.conflicts import by_size
 from minisim.junction.geometry import Intersection
-from minisim.junction.paths import Floats, Path, Size
+from minisim.junction.paths import Floats, Path
+from minisim.vehicle import VehicleType
 
 #: Extra lateral room before a vehicle that turns off no longer obstructs the lane [m].
 BRANCH_ROOM = 0.5
 
 
-@by_size(256)
-def branch(intersection: Intersection, vehicle: Size) -> Floats:
+@lru_cache(maxsize=256)
+def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """Where movements from one arm part, shape (m, m) [m].
 
     `[p, q]` is the smallest `s` on path p at which a rear bumper no longer obstructs path q.

@@ -23,13 +23,6 @@ Floats = npt.NDArray[np.float64]
 ARC_SEGMENTS = 32
 
 
-class Size(NamedTuple):
-    """The size of a vehicle [m]."""
-
-    length: float
-    width: float
-
-
 class Way(NamedTuple):
     """Another simulator's curve through the junction.
 
@@ -114,7 +107,7 @@ class Path:
         heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
         return front - heading * (length / 2.0), heading
 
-    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType | Size) -> Floats:
+    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
         """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
         centre, heading = self.pose(s, vehicle.length)
         along = heading * (vehicle.length / 2.0)

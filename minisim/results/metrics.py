@@ -93,8 +93,7 @@ class Metric:
     @property
     def heading(self) -> str:
         """Title and unit, such as "waiting [s]"."""
-        words = self.title or self.name
-        return f"{words} [{self.unit}]" if self.unit else words
+        return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
 
     def values(self, subject: Run | Trips, count: int) -> Floats:
         """One value a trip, shape (count,), NaN where there is none.

@@ -16,10 +16,11 @@ site:
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from minisim.control import Site
 from minisim.errors import instance
@@ -39,12 +40,6 @@ from minisim.results.trajectories import (
     movement_index,
 )  # fmt: skip
 from minisim.results.trips import Ints
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-#: Table of a monitor: column -> values.
-Columns = dict[str, npt.NDArray[Any]]
 
 #: Longer than any path [m]: keeps the vehicles apart in one ascending array.
 _FAR = 1e6
@@ -74,9 +69,9 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
         InputError: a column is missing, or the site does not have a movement.
     """
     rows = _rows(frame, site)
-    follow = _following(rows, site)
-    pets = _encroachments(rows, site)["pet_s"]
-    ttc = np.concatenate([follow["ttc_s"], _crossings(rows, site)["ttc_s"]])
+    follow = following(rows, site)
+    pets = encroachments(rows, site)["pet_s"]
+    ttc = np.concatenate([follow["ttc_s"], crossings(rows, site)["ttc_s"]])
     braking = -frame[ACCELERATION].to_numpy(dtype=float)
     return {
         "min_ttc_s": _extreme(np.min, ttc),
@@ -99,17 +94,32 @@ def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     return frame[near]
 
 
-def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Every follower and its leader at every step.
 
     Returns:
         Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN
         while not closing, and 0 where bodies overlap. DRAC is NaN without a gap.
     """
-    return _frame(_following, frame, site)
+    rows = _rows(frame, site)
+    in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
+    follower, leader, gap = (np.concatenate(both) for both in zip(in_lane, to_exit, strict=True))
+    closing = rows.v[follower] - rows.v[leader]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
+        drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
+    return pd.DataFrame({
+        "time_s": rows.time[follower],
+        "follower": rows.vehicle[follower],
+        "leader": rows.vehicle[leader],
+        "gap_m": gap,
+        "closing_mps": closing,
+        "ttc_s": ttc,
+        "drac_mps2": drac,
+    })  # fmt: skip
 
 
-def encroachments(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Every two vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle that is inside when its recording ends counts as leaving then. A vehicle whose entry
@@ -118,27 +128,71 @@ def encroachments(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     Returns:
         Columns `time_s` (the second enters), `first, second, pet_s`, sorted by time.
     """
-    return _frame(_encroachments, frame, site)
+    rows = _rows(frame, site)
+    areas = conflict_areas(site.intersection, site.vehicle)
+    vehicle, movement, enter, leave = _passages(rows, areas)
+    by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
+    pairs = [np.empty((0, 4))]
+    for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
+        passing = np.concatenate([by_movement[p], by_movement[q]])
+        other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
+        start, end = enter[passing, other], leave[passing, other]
+        order = np.argsort(start, kind="stable")
+        order = order[np.isfinite(start[order])]
+        changes = other[order[:-1]] != other[order[1:]]
+        first, second = order[:-1][changes], order[1:][changes]
+        ids = vehicle[passing[first]], vehicle[passing[second]]
+        pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
+    time, firsts, seconds, pets = np.concatenate(pairs).T
+    order = np.argsort(time, kind="stable")
+    return pd.DataFrame({
+        "time_s": time[order],
+        "first": firsts[order].astype(np.int64),
+        "second": seconds[order].astype(np.int64),
+        "pet_s": pets[order],
+    })  # fmt: skip
 
 
-def crossings(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Every step at which two vehicles with right of way are on a crossing course.
 
     Returns:
         Columns `time_s, first, second, ttc_s`.
     """
-    return _frame(_crossings, frame, site)
+    rows = _rows(frame, site)
+    areas = conflict_areas(site.intersection, site.vehicle)
+    clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
+    going = np.flatnonzero(rows.goes & (rows.s < clear[rows.movement]))
+    firsts, seconds, ttcs = [], [], []
+    pending, ahead = np.arange(len(going)), 1
+    while len(pending := pending[pending + ahead < len(going)]):
+        pending = pending[rows.step[going[pending]] == rows.step[going[pending + ahead]]]
+        a, b = going[pending], going[pending + ahead]
+        p, q = rows.movement[a], rows.movement[b]
+        meet = np.isfinite(areas.enter[p, q])
+        a, b, p, q = a[meet], b[meet], p[meet], q[meet]
+        a_in, a_out = _times(rows, a, areas.enter[p, q]), _times(rows, a, areas.leave[p, q])
+        b_in, b_out = _times(rows, b, areas.enter[q, p]), _times(rows, b, areas.leave[q, p])
+        a_first = a_in <= b_in
+        late = np.where(a_first, b_in, a_in)
+        free = np.where(a_first, a_out, b_out)
+        course = (late > 0.0) & (late < free)
+        firsts.append(np.where(a_first, a, b)[course])
+        seconds.append(np.where(a_first, b, a)[course])
+        ttcs.append(late[course])
+        ahead += 1
+    first, second = _join(firsts), _join(seconds)
+    return pd.DataFrame({
+        "time_s": rows.time[first],
+        "first": rows.vehicle[first],
+        "second": rows.vehicle[second],
+        "ttc_s": _join(ttcs, np.float64),
+    })  # fmt: skip
 
 
-def _frame(
-    monitor: Callable[[Rows, Site], Columns], frame: pd.DataFrame, site: Site
-) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.DataFrame(monitor(_rows(frame, site), site))
-
-
-def _rows(frame: pd.DataFrame, site: Site) -> Rows:
+def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
+    if isinstance(frame, Rows):
+        return frame
     instance("site", site, Site)
     check_trajectories(frame)
     frame = frame.sort_values([TIME, VEHICLE])
@@ -154,24 +208,6 @@ def _rows(frame: pd.DataFrame, site: Site) -> Rows:
         v=speed,
         goes=frame[RIGHT_OF_WAY].to_numpy(dtype=bool) | (s >= entries[movement]),
     )
-
-
-def _following(rows: Rows, site: Site) -> Columns:
-    in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
-    follower, leader, gap = (np.concatenate(both) for both in zip(in_lane, to_exit, strict=True))
-    closing = rows.v[follower] - rows.v[leader]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
-        drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
-    return {
-        "time_s": rows.time[follower],
-        "follower": rows.vehicle[follower],
-        "leader": rows.vehicle[leader],
-        "gap_m": gap,
-        "closing_mps": closing,
-        "ttc_s": ttc,
-        "drac_mps2": drac,
-    }
 
 
 def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
@@ -220,31 +256,6 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     return follower[pairs], leader[pairs], gap[pairs]
 
 
-def _encroachments(rows: Rows, site: Site) -> Columns:
-    areas = conflict_areas(site.intersection, site.vehicle)
-    vehicle, movement, enter, leave = _passages(rows, areas)
-    by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
-    pairs = [np.empty((0, 4))]
-    for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
-        passing = np.concatenate([by_movement[p], by_movement[q]])
-        other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
-        start, end = enter[passing, other], leave[passing, other]
-        order = np.argsort(start, kind="stable")
-        order = order[np.isfinite(start[order])]
-        changes = other[order[:-1]] != other[order[1:]]
-        first, second = order[:-1][changes], order[1:][changes]
-        ids = vehicle[passing[first]], vehicle[passing[second]]
-        pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
-    time, firsts, seconds, pets = np.concatenate(pairs).T
-    order = np.argsort(time, kind="stable")
-    return {
-        "time_s": time[order],
-        "first": firsts[order].astype(np.int64),
-        "second": seconds[order].astype(np.int64),
-        "pet_s": pets[order],
-    }
-
-
 def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
     """Vehicles and their movements (k,), and when they enter and leave the areas (k, m) [s]."""
     if not len(rows.time):
@@ -267,37 +278,6 @@ def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
     return vehicle, movement, np.where(seen, when(enter), np.nan), when(leave)
 
 
-def _crossings(rows: Rows, site: Site) -> Columns:
-    areas = conflict_areas(site.intersection, site.vehicle)
-    clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
-    going = np.flatnonzero(rows.goes & (rows.s < clear[rows.movement]))
-    firsts, seconds, ttcs = [], [], []
-    pending, ahead = np.arange(len(going)), 1
-    while len(pending := pending[pending + ahead < len(going)]):
-        pending = pending[rows.step[going[pending]] == rows.step[going[pending + ahead]]]
-        a, b = going[pending], going[pending + ahead]
-        p, q = rows.movement[a], rows.movement[b]
-        meet = np.isfinite(areas.enter[p, q])
-        a, b, p, q = a[meet], b[meet], p[meet], q[meet]
-        a_in, a_out = _times(rows, a, areas.enter[p, q]), _times(rows, a, areas.leave[p, q])
-        b_in, b_out = _times(rows, b, areas.enter[q, p]), _times(rows, b, areas.leave[q, p])
-        a_first = a_in <= b_in
-        late = np.where(a_first, b_in, a_in)
-        free = np.where(a_first, a_out, b_out)
-        course = (late > 0.0) & (late < free)
-        firsts.append(np.where(a_first, a, b)[course])
-        seconds.append(np.where(a_first, b, a)[course])
-        ttcs.append(late[course])
-        ahead += 1
-    first, second = _join(firsts), _join(seconds)
-    return {
-        "time_s": rows.time[first],
-        "first": rows.vehicle[first],
-        "second": rows.vehicle[second],
-        "ttc_s": _join(ttcs, np.float64),
-    }
-
-
 def _times(rows: Rows, row: Ints, place: Floats) -> Floats:
     """Time until the fronts pass `place` at their present speeds [s]; 0 where they have passed."""
     distance = place - rows.s[row]
@@ -309,6 +289,7 @@ def _join(parts: list[npt.NDArray[Any]], dtype: type = np.int64) -> npt.NDArray[
     return np.concatenate([np.empty(0, dtype), *parts])
 
 
-def _extreme(of: Callable[[Floats], Any], values: Floats) -> float | None:
-    values = values[np.isfinite(values)]
-    return float(of(values)) if len(values) else None
+def _extreme(of: Callable[[Floats], Any], values: npt.ArrayLike) -> float | None:
+    numbers = np.asarray(values, dtype=float)
+    numbers = numbers[np.isfinite(numbers)]
+    return float(of(numbers)) if len(numbers) else None

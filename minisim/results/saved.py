@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from minisim.control import Plan, Site
@@ -147,8 +146,8 @@ def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
     return Run(
         **values,
         columns=Trips(end=float(head["end"]), **columns),
-        trace=_records(trace),
-        rows=_records(rows),
+        trace=np.asarray(trace.to_records(index=False)),
+        rows=np.asarray(rows.to_records(index=False)),
         kinds=tuple(trips.get("kind", ())),
     )
 
@@ -160,7 +159,7 @@ def written(value: object) -> Any:
         InputError: something that is no number, text, array, collection or object of our classes.
     """
     if isinstance(value, np.generic):
-        return written(value.item())
+        value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
         return {"float": repr(value)}
     if value is None or isinstance(value, bool | str | int | float):
@@ -254,11 +253,3 @@ def _need_pyarrow() -> None:
 def _parquet(columns: Any) -> bytes:
     data: bytes = pd.DataFrame(columns).to_parquet(index=False, engine="pyarrow")
     return data
-
-
-def _records(frame: pd.DataFrame) -> npt.NDArray[Any]:
-    """The rows of a table as one structured array."""
-    records = np.empty(len(frame), list(frame.dtypes.items()))
-    for name in frame.columns:
-        records[name] = frame[name]
-    return records
