@@ -22,7 +22,6 @@ from minisim.results.run import Run
 from minisim.results.summary import TRIP_COLUMNS
 from minisim.results.trajectories import (
     TRAJECTORY_COLUMNS,
-    movement_index,
     write_fcd,
     write_trajectories,
     write_trips,
@@ -168,13 +167,6 @@ def test_a_movement_that_the_site_does_not_have_is_an_error(
     with pytest.raises(InputError, match=message):
         write_fcd(frame, tmp_path / "fcd.xml", run.site)
     assert os.listdir(tmp_path) == []
-
-
-def test_movements_are_numbered_as_in_the_intersection(run: Run) -> None:
-    movements = run.site.intersection.movements
-    rows = [(0.0, i, "abcd"[m.origin], m.manoeuvre, 5.0) for i, m in enumerate(movements)]
-    frame = frame_of(*rows)
-    assert movement_index(frame, run.site).tolist() == list(range(12))
 
 
 # All or nothing.
