@@ -178,7 +178,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
     # The studies of perception name what errs, not a series; that of humans their share.
-    label, _, share = (experiment.label or "dim").partition("-humans-")
+    label, _, share = (experiment.label or "dim").partition("+humans=")
     base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)

@@ -32,10 +32,6 @@ def agent(lane: str, *, goes: bool = False, crossing: bool = False, **rules: str
     return result
 
 
-def test_a_new_agent_waits() -> None:
-    assert agent("a").right_of_way is False
-
-
 def test_alone_it_goes() -> None:
     assert agent("d").decide(percept("d2")) is True
 
@@ -133,14 +129,3 @@ def test_the_order_of_the_table_counts() -> None:
     assert [agent(lane).decide(scene) for lane in "abd"] == [False, True, True]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("table",), "table must be a DecisionTable"),
-        ((TABLE, "harmonius"), "unknown gate 'harmonius'.*did you mean 'harmonious'"),
-        ((TABLE, "clear", "never"), "unknown commit rule 'never'"),
-    ],
-)
-def test_rules_are_checked(arguments: tuple[object, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Rules(*arguments)  # type: ignore[arg-type]

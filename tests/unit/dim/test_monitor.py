@@ -485,37 +485,3 @@ def run_of(scenario: Scenario, dim: Dim) -> Run:
 # Errors.
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"time_margin": -1.0}, "time_margin .s. must be at least 0 and at most 10"),
-        ({"time_margin": 10.5}, "time_margin .s. must be at least 0 and at most 10,"),
-        ({"look_ahead": 0.0}, "look_ahead .s. must be at least 0.5 and at most 30"),
-        ({"look_ahead": 30.5}, "look_ahead .s. must be at least 0.5 and at most 30,"),
-        ({"tolerance": 0.0}, "tolerance .m. must be above 0 and at most 1"),
-        ({"tolerance": 1.5}, "tolerance .m. must be above 0 and at most 1,"),
-        ({"tolerance": math.nan}, "tolerance .m. must be"),
-        ({"deceleration": 0.0}, "deceleration of the monitor .m/s². must be at least 1"),
-        ({"deceleration": 1001}, "deceleration of the monitor .m/s². must be .* at most 1000"),
-        ({"deceleration": "hard"}, "deceleration of the monitor .m/s². must be a number"),
-        ({"patience": 0.0}, "patience .s. must be at least 0.5 and at most 60"),
-        ({"patience": 61.0}, "patience .s. must be at least 0.5 and at most 60,"),
-    ],
-)
-def test_bad_parameters_are_named(options: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Monitor(**options)  # type: ignore[arg-type]
-
-
-def test_bounds_are_allowed() -> None:
-    Monitor(time_margin=0, look_ahead=0.5, tolerance=1, deceleration=1000, patience=0.5)
-    Monitor(time_margin=10, look_ahead=30, tolerance=1e-3, deceleration=1, patience=60)
-
-
-def test_what_is_no_monitor_is_refused() -> None:
-    with pytest.raises(InputError, match="monitor"):
-        Dim(monitor=True)  # type: ignore[arg-type]
-
-
-def test_its_name_tells() -> None:
-    assert Dim(monitor=Monitor()).name == "dim:monitor=on"

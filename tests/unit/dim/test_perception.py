@@ -167,16 +167,3 @@ def test_exact_perception_is_the_view_itself() -> None:
     assert ExactPerception() == ExactPerception()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((2, Zones(), 2.0, "paper"), "number of arms"),
-        ((13, Zones(), 2.0, "paper"), "number of arms"),
-        ((4, "zones", 2.0, "paper"), "zones must be a Zones"),
-        ((4, Zones(), 0.0, "paper"), r"^deceleration \[m/s²\] must be"),
-        ((4, Zones(), 2.0, "papr"), "unknown commit rule 'papr'.*did you mean 'paper'"),
-    ],
-)
-def test_readers_are_checked(arguments: tuple[object, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Reader(*arguments)  # type: ignore[arg-type]

@@ -107,21 +107,6 @@ def test_a_watch_notes_who_passes_the_start() -> None:
     assert watch.look(5.0, [car(2, 0, 2.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 5.0}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"turn_time": 0.9}, "turn_time"),
-        ({"turn_time": 3600.5}, "turn_time"),
-        ({"turn_time": "10"}, "turn_time"),
-        ({"sensor_range": 0.0}, "sensor_range"),
-        ({"priorities": "rotate"}, "unknown priorities 'rotate'.*did you mean 'rotating'"),
-    ],
-)
-def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Dim(**arguments)  # type: ignore[arg-type]
-
-
 # --- the session -----------------------------------------------------------------------------
 
 
@@ -149,11 +134,6 @@ def test_a_session_lets_go_who_waits_longest() -> None:
     assert words(session.decide(View(3.0, (second, first)))) == ["wake 9.28"]
     # Both have waited for 8.28 s, which is as much as counts; it is b's turn from 10 s on.
     assert words(session.decide(View(12.0, (second, first)))) == ["wake 20"]
-
-
-def test_names() -> None:
-    assert Dim(priorities="rotating").name == "dim:priorities=rotating"
-    assert Dim(order="lanes", priorities="waiting").name == "dim:order=lanes,priorities=waiting"
 
 
 @given(

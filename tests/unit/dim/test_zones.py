@@ -85,36 +85,6 @@ def test_a_speed_above_the_limit_is_painted_on_the_whole_red_zone() -> None:
     assert red == Marking("red", 38, 8, 15.0)
 
 
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("red", -1),
-        ("red", float("nan")),
-        ("yellow", 0),
-        ("yellow", "6"),
-        ("green", 0),
-        ("green", COMMIT_MARGIN / 2),
-        ("green", float("inf")),
-        ("red_speed", 0),
-        ("red_speed", None),
-    ],
-)
-def test_zones_are_checked(field: str, value: object) -> None:
-    label = "red_speed [m/s]" if field == "red_speed" else f"{field} zone [m]"
-    with pytest.raises(InputError, match=rf"^{re.escape(label)} must be"):
-        Zones(**{field: value})  # type: ignore[arg-type]
-
-
-def test_the_largest_zones_and_speed() -> None:
-    Zones(red=1000.0, yellow=1000.0, green=1000.0, red_speed=100.0)
-    Zones(red=0.0, green=COMMIT_MARGIN)
-    for field in ("red", "yellow", "green"):
-        with pytest.raises(InputError, match=field):
-            Zones(**{field: 1000.5})
-    with pytest.raises(InputError, match="red_speed"):
-        Zones(red_speed=100.5)
-
-
 def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
     place = site()  # approach lanes of 492.8 m, vehicles of 4 m
     Zones(red=480.7).check(place)

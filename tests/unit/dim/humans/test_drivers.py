@@ -160,18 +160,6 @@ def test_bad_parameters_are_named(parameters: dict[str, Any], message: str) -> N
         replace(Humans(), **parameters)
 
 
-def test_bounds_are_allowed() -> None:
-    humans = Humans(
-        critical_gaps=(0, 60, 0),
-        follow_up=(0, 60, 0),
-        deviation=1,
-        reaction=0.5,
-        unsignalled=(0, 1),
-    )
-    assert humans.critical_gaps == humans.follow_up == (0.0, 60.0, 0.0)
-    assert Humans(deviation=0, reaction=60).reaction == 60
-
-
 def test_lists_become_tuples() -> None:
     """As in an experiment file; a recipe must hash."""
     gaps: Any = [5, 5, 5]

@@ -142,7 +142,7 @@ def test_what_the_host_has_to_provide() -> None:
     assert hasty.sight == alone.sight
     noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
     assert Mixed(noisy).start(SITE).plan.period == 0.2
-    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15,frame=0.2)-humans-0.2"
+    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15,frame=0.2)+humans=0.2"
 
 
 def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:
@@ -313,29 +313,8 @@ def test_the_groups_of_a_run_make_up_the_whole() -> None:
 
 def test_a_mixed_controller_is_a_value() -> None:
     mixed = Mixed(Dim(gate="harmonious"), 0.25)
-    assert mixed.name == "dim:gate=harmonious-humans-0.25"
+    assert mixed.name == "dim:gate=harmonious+humans=0.25"
     assert pickle.loads(pickle.dumps(mixed)) == mixed
     assert hash(mixed) == hash(Mixed(Dim(gate="harmonious"), 0.25))
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"share": 1.1}, "share of humans must be at least 0 and at most 1, got 1.1"),
-        ({"share": -0.1}, "share of humans"),
-        ({"share": float("nan")}, "share of humans"),
-        ({"share": "half"}, "share of humans must be a number"),
-        ({"dim": AllWayStop()}, "dim must be a Dim"),
-        ({"humans": 0.2}, "humans must be a Humans, got 0.2"),
-        ({"trust": "all"}, "unknown trust 'all'; allowed: motion, signals, silence"),
-    ],
-)
-def test_bad_parameters_are_named(parameters: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        replace(MIXED, **parameters)
-
-
-@pytest.mark.parametrize("count", [-1, 1.5, "x"])
-def test_a_bad_number_of_vehicles_is_named(count: Any) -> None:
-    with pytest.raises(InputError, match="number of vehicles must be an integer of at least 0"):
-        MIXED.human(1, count)

@@ -114,13 +114,3 @@ def test_hidden_is_what_shapely_says_in_many_scenes() -> None:
 BODY = st.builds(at, floats(-20, 20), floats(-20, 20), floats(0, 6.3))
 
 
-@given(BODY, BODY, st.lists(BODY, max_size=3))
-def test_hidden_is_what_shapely_says(eye: Body, target: Body, others: list[Body]) -> None:
-    blocking = [outline(body) for body in others]
-    corners = list(outline(target).exterior.coords)[:4]
-    lines = [shapely.LineString([(eye.x, eye.y), end]) for end in [*corners, (target.x, target.y)]]
-    gaps = [min((line.distance(area) for area in blocking), default=1.0) for line in lines]
-    depths = [max((line.intersection(a).length for a in blocking), default=0.0) for line in lines]
-    # A line that just touches a corner is a matter of rounding.
-    assume(all(gap > 1e-9 or depth > 1e-6 for gap, depth in zip(gaps, depths, strict=True)))
-    assert BODIES.hidden(eye, target, others) == all(gap == 0.0 for gap in gaps)
