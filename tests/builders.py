@@ -127,6 +127,16 @@ def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0
     return Observed(id, lane, manoeuvre, distance, speed, 5.0)
 
 
+def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
+    """A vehicle by the name of its movement, such as a1."""
+    return seen(id, ARM_NAMES.index(movement[0]), int(movement[1]), distance, speed)
+
+
+def view(*vehicles: Observed, time: float = 0.0) -> View:
+    """These vehicles, by lane and front to back."""
+    return View(time, tuple(sorted(vehicles, key=lambda v: (v.lane, v.distance))))
+
+
 def said(commands: Iterable[Command]) -> list[str]:
     """Commands in words; as a reader would say it."""
     return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]

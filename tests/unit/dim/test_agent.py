@@ -7,7 +7,6 @@ import pytest
 from dim import DecisionTable, HarmonyMatrix
 from dim.agent import GATES, Agent, Rules
 from dim.perception import Percept
-from minisim.errors import InputError
 
 MATRIX = HarmonyMatrix.paper(4)
 TABLE = DecisionTable(MATRIX)
@@ -127,5 +126,3 @@ def test_the_order_of_the_table_counts() -> None:
     scene = percept("a2 b1 d2")
     assert [Agent(i, i, by_lanes).decide(scene) for i in (0, 1, 3)] == [True, False, False]
     assert [agent(lane).decide(scene) for lane in "abd"] == [False, True, True]
-
-

@@ -7,21 +7,14 @@ from dataclasses import dataclass
 
 import pytest
 
-from dim import Dim, HarmonyMatrix, Zones
+from dim import Dim, HarmonyMatrix, Monitor, Zones
 from dim.agent import GATES
-from dim.controller import DimSession
 from dim.perception import See
 from minisim.control import Controller, Go, Hold, Observed, Session, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from scenarios import five_way, four_way, three_way
-
-MATRIX = HarmonyMatrix.paper(4)
-
-
-def car(vehicle: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
-    lane, manoeuvre = MATRIX.movements[MATRIX.index(movement)]
-    return Observed(vehicle, lane, manoeuvre, distance, speed, 4.0)
+from tests.builders import car, view
 
 
 class Scene:
@@ -34,8 +27,7 @@ class Scene:
     def show(self, *cars: Observed) -> str:
         """The commands as text, such as `go 1, hold 2`."""
         self.time += 1.0
-        vehicles = sorted(cars, key=lambda c: (c.lane, c.distance))
-        commands = self.session.decide(View(self.time, tuple(vehicles)))
+        commands = self.session.decide(view(*cars, time=self.time))
         return ", ".join(self._word(command) for command in commands)
 
     def _word(self, command: object) -> str:
@@ -264,10 +256,7 @@ def test_wake_up_marks(gate: str, commit: str, marks: tuple[float, ...]) -> None
     ("dim", "name"),
     [
         (Dim(), "dim"),
-        (Dim(gate="harmonious"), "dim:gate=harmonious"),
-        (Dim(order="lanes"), "dim:order=lanes"),
-        (Dim(commit="paper"), "dim:commit=paper"),
-        (Dim(priorities="inflow"), "dim:priorities=inflow"),
+        (Dim(monitor=Monitor()), "dim:monitor=on"),
         (Dim(priorities=(1, 0, 2)), "dim:priorities=(1,0,2)"),
         (
             Dim("lanes", "paper", "harmonious", "inflow"),
@@ -331,29 +320,18 @@ def test_sites_that_it_cannot_serve() -> None:
         Dim().start(four_way(arm_length=40.0).site())
     with pytest.raises(InputError, match="site must be a Site"):
         Dim().start("four-way")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="dim must be a Dim"):
-        DimSession("dim", site)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("priorities", "message"),
     [
-        ({"order": "sizes"}, r"unknown order 'sizes'.*did you mean 'size'"),
-        ({"commit": "stopable"}, r"unknown commit rule 'stopable'.*did you mean 'stoppable'"),
-        ({"gate": "harmony"}, r"unknown gate 'harmony'.*did you mean 'harmonious'"),
-        ({"gate": None}, "unknown gate None"),
-        ({"priorities": "inflows"}, r"unknown priorities 'inflows'.*did you mean 'inflow'"),
-        ({"priorities": (0, 2)}, "priorities of 2 lanes are the ranks 0 … 1"),
-        ({"priorities": 3}, "priorities must be lane ranks or 'inflow', got 3"),
-        ({"priorities": ("a", "b")}, "lane rank"),
-        ({"priorities": (0, 10**5000)}, "priorities of 2 lanes"),
-        ({"zones": 30}, "zones must be a Zones"),
-        ({"matrix": "paper"}, "matrix must be a HarmonyMatrix"),
-        ({"perception": "exact"}, "perception must be a Perception"),
-        ({"period": 0}, "period"),
-        ({"period": "1"}, "period"),
+        ("inflows", r"unknown priorities 'inflows'.*did you mean 'inflow'"),
+        ((0, 2), "priorities of 2 lanes are the ranks 0 … 1"),
+        (3, "priorities must be lane ranks or 'inflow', got 3"),
+        (("a", "b"), "lane rank"),
+        ((0, 10**5000), "priorities of 2 lanes"),
     ],
 )
-def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
+def test_priorities_are_checked(priorities: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        Dim(**arguments)  # type: ignore[arg-type]
+        Dim(priorities=priorities)  # type: ignore[arg-type]

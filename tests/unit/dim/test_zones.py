@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import re
 
 import pytest
 
 from dim import Zones
-from minisim.control import COMMIT_MARGIN, Marking, Site
+from minisim.control import Marking, Site
 from minisim.errors import InputError
 from scenarios import FAIR, PAPER, four_way
 

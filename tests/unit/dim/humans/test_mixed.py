@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from baselines import AllWayStop
 from dim import Dim, Humans, Mixed, NoisyPerception
 from dim.agent import GATES
 from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
-from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios import four_way
 from scenarios.recipe import Recipe
@@ -316,5 +314,3 @@ def test_a_mixed_controller_is_a_value() -> None:
     assert mixed.name == "dim:gate=harmonious+humans=0.25"
     assert pickle.loads(pickle.dumps(mixed)) == mixed
     assert hash(mixed) == hash(Mixed(Dim(gate="harmonious"), 0.25))
-
-

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from dim.senses.sight import Bodies, Body
@@ -112,5 +112,3 @@ def test_hidden_is_what_shapely_says_in_many_scenes() -> None:
 
 
 BODY = st.builds(at, floats(-20, 20), floats(-20, 20), floats(0, 6.3))
-
-
