@@ -40,12 +40,6 @@ def test_the_clique_goes_and_the_others_wait() -> None:
     assert [agent(lane).decide(scene) for lane in "abcd"] == [True, True, False, False]
 
 
-def test_it_remembers_its_answer() -> None:
-    a = agent("a")
-    a.decide(percept("a1"))
-    assert a.right_of_way is True
-
-
 def test_a_new_decision_revokes() -> None:
     c = agent("c")
     assert c.decide(percept("c2")) is True
@@ -55,7 +49,7 @@ def test_a_new_decision_revokes() -> None:
 
 
 @pytest.mark.parametrize("goes", [False, True])
-def test_clear_gate_decisions_stand_while_anybody_crosses(goes: bool) -> None:
+def test_clear_gate_decisions_stand_while_any_vehicle_crosses(goes: bool) -> None:
     harmonious_or_not = [percept("a1", "c1"), percept("a1", "b3"), percept("a1 b2 d2", "a1")]
     for scene in harmonious_or_not:
         assert agent("a", goes=goes).decide(scene) is goes
@@ -77,7 +71,7 @@ def test_past_half_of_the_green_zone_others_grant_it_the_right_of_way(gate: str)
 @pytest.mark.parametrize("gate", GATES)
 @pytest.mark.parametrize("goes", [False, True])
 def test_behind_its_lanes_front_vehicle_it_does_what_it_did(goes: bool, gate: str) -> None:
-    """Also when that one is committed: then nobody of lane a takes part."""
+    """Also when that one is committed: then no vehicle of lane a takes part."""
     for scene in (percept("a1 b1"), percept("b1", "a1"), percept("", "a1")):
         follower = Agent(7, 0, Rules(TABLE, gate))
         follower.right_of_way = goes
@@ -113,7 +107,7 @@ def test_harmonious_gate(lane: str, participants: str, crossing: str, goes: bool
         assert ego.decide(scene) is goes
 
 
-def test_gates_agree_while_nobody_crosses() -> None:
+def test_gates_agree_while_no_vehicle_crosses() -> None:
     for participants in ("a1 b2 c2 d2", "a3 b3 c3 d3", "b2 c1", "d1"):
         scene = percept(participants)
         for lane in sorted({m[0] for m in participants.split()}):

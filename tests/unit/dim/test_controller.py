@@ -70,7 +70,7 @@ def test_the_order_decides(gate: str) -> None:
 
 
 def test_a_late_arrival_waits_until_the_junction_is_clear() -> None:
-    """The paper's case 2: decisions stand while anyone crosses, even in harmony."""
+    """The paper's case 2: decisions stand while a vehicle crosses, even in harmony."""
     scene = Scene(Dim())
     assert scene.show(car(1, "c2", 7.9, 4.8)) == "go 1"
     assert scene.show(car(1, "c2", -3.0, 5.0), car(2, "a1", 8.0, 4.8)) == ""
@@ -78,7 +78,7 @@ def test_a_late_arrival_waits_until_the_junction_is_clear() -> None:
     assert scene.show(car(2, "a1", 2.2)) == "go 2"
 
 
-def test_who_holds_the_right_of_way_keeps_it_while_another_crosses() -> None:
+def test_a_right_of_way_is_kept_while_another_vehicle_crosses() -> None:
     scene = Scene(Dim())
     both = [car(1, "a1", 2.2), car(2, "b2", 2.2)]
     assert scene.show(*both) == "go 1, go 2"
@@ -91,7 +91,7 @@ def test_who_holds_the_right_of_way_keeps_it_while_another_crosses() -> None:
 
 
 @EVERY_GATE
-def test_a_new_decision_revokes_a_right_of_way_that_nobody_has_used(gate: str) -> None:
+def test_a_new_decision_revokes_an_unused_right_of_way(gate: str) -> None:
     scene = Scene(Dim(gate=gate))
     assert scene.show(car(3, "c2", 2.2)) == "go 3"
     assert scene.show(car(3, "c2", 2.1, 0.6), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
@@ -179,7 +179,7 @@ def test_a_vehicle_follows_those_of_its_lane_beside_harmonious_others() -> None:
 
 
 @pytest.mark.parametrize(("gate", "commands"), [("clear", ""), ("harmonious", "go 2, hold 3")])
-def test_nobody_of_a_lane_takes_part_until_its_committed_front_vehicle_has_entered(
+def test_no_vehicle_of_a_lane_takes_part_until_its_committed_front_vehicle_has_entered(
     gate: str, commands: str
 ) -> None:
     """c2 may go beside a2; the follower a3 is in conflict with it, and of a higher lane."""
@@ -210,7 +210,7 @@ def test_sessions_share_nothing_but_the_table() -> None:
 
 @dataclass(frozen=True)
 class Blind:
-    """Everyone sees only itself."""
+    """Each vehicle sees only itself."""
 
     name = "blind"
     period = None

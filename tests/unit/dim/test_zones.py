@@ -1,4 +1,4 @@
-"""Road markings: where the limit holds, and that everybody can come down to it."""
+"""Road markings: where the limit holds, and that vehicles can slow down to it."""
 
 from __future__ import annotations
 
