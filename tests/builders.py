@@ -16,6 +16,7 @@ import numpy as np
 from hypothesis import settings
 
 from dim import Dim, NoisyPerception
+from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Command,
@@ -135,6 +136,23 @@ def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed
 def view(*vehicles: Observed, time: float = 0.0) -> View:
     """These vehicles, by lane and front to back."""
     return View(time, tuple(sorted(vehicles, key=lambda v: (v.lane, v.distance))))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A perception that errs in intents as told.
+
+    Attributes:
+        read: a view, an ego and a vehicle -> the manoeuvre that the ego reads.
+    """
+
+    read: Callable[[View, Observed, Observed], int]
+    period: float | None = 0.1
+
+    def start(self, site: Site) -> See:
+        return lambda view, ego: view._replace(
+            vehicles=tuple(v._replace(manoeuvre=self.read(view, ego, v)) for v in view.vehicles)
+        )
 
 
 def said(commands: Iterable[Command]) -> list[str]:

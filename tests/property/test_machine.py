@@ -24,13 +24,12 @@ from hypothesis.stateful import (
 from dim import Dim
 from dim.agent import GATES
 from dim.decision import ORDERS
-from dim.perception import See
 from dim.proofs.conformance import Checked
 from minisim.control import Brake, Command, Controller, Observed, Site, View, can_stop
 from minisim.errors import CollisionError
 from minisim.simulation import Simulation
 from scenarios import Scenario, regular
-from tests.builders import replayed
+from tests.builders import Reading, replayed
 
 #: Short roads: a vehicle reaches the yellow zone in a few seconds.
 ARM_LENGTH = 80.0
@@ -152,23 +151,14 @@ class Change:
     until: float
 
 
-@dataclass(frozen=True)
-class Indicators:
-    """All vehicles, its own driver too, go by what the indicators show at the time."""
+def indicators(changes: tuple[Change, ...]) -> Reading:
+    """All vehicles, even the one itself, go by what its indicator shows at the time."""
 
-    changes: tuple[Change, ...]
-    name = "indicators"
-    period = 0.1
+    def shown(view: View, _: Observed, vehicle: Observed) -> int:
+        now = (c for c in changes if c.vehicle == vehicle.id and view.time < c.until - 1e-6)
+        return next((c.shown for c in now), vehicle.manoeuvre)
 
-    def start(self, site: Site) -> See:
-        def see(view: View, ego: Observed) -> View:
-            shown = {c.vehicle: c.shown for c in self.changes if view.time < c.until - 1e-6}
-            return View(
-                view.time,
-                tuple(v._replace(manoeuvre=shown.get(v.id, v.manoeuvre)) for v in view.vehicles),
-            )
-
-        return see
+    return Reading(shown)
 
 
 @dataclass(frozen=True)
@@ -243,7 +233,7 @@ class DisturbedTraffic(Traffic):
             self.trips, self.changes = before
 
     def _controller(self) -> Controller:
-        dim = replace(self.dim, perception=Indicators(self.changes))
+        dim = replace(self.dim, perception=indicators(self.changes))
         return Stalling(dim, self.stalls)
 
 

@@ -41,11 +41,6 @@ EVERY_GATE = pytest.mark.parametrize("gate", GATES)
 
 
 @EVERY_GATE
-def test_an_empty_junction_needs_no_command(gate: str) -> None:
-    assert Scene(Dim(gate=gate)).show() == ""
-
-
-@EVERY_GATE
 def test_alone_it_goes_at_the_yellow_zone_and_is_told_once(gate: str) -> None:
     scene = Scene(Dim(gate=gate))
     assert scene.show(car(1, "b3", 8.4, 5.0)) == ""
@@ -54,19 +49,6 @@ def test_alone_it_goes_at_the_yellow_zone_and_is_told_once(gate: str) -> None:
     assert scene.show(car(1, "b3", 2.0, 5.0)) == ""
     assert scene.show(car(1, "b3", -8.0, 5.0)) == ""
     assert scene.show() == ""
-
-
-@EVERY_GATE
-def test_the_papers_example(gate: str) -> None:
-    waiting = [car(i, m, 2.2) for i, m in enumerate(["a1", "b2", "c2", "d2"])]
-    assert Scene(Dim(gate=gate)).show(*waiting) == "go 0, go 1"
-
-
-@EVERY_GATE
-def test_the_order_decides(gate: str) -> None:
-    scene = [car(1, "a2", 2.2), car(2, "b1", 2.2), car(3, "d2", 2.2)]
-    assert Scene(Dim(gate=gate)).show(*scene) == "go 2, go 3"
-    assert Scene(Dim(gate=gate, order="lanes")).show(*scene) == "go 1"
 
 
 def test_a_late_arrival_waits_until_the_junction_is_clear() -> None:
@@ -134,12 +116,6 @@ def test_paper_commit_at_half_of_the_green_zone() -> None:
     assert scene.show(car(3, "c2", 1.1, 5.0), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
     # ...and past it the others grant it the right of way: now two conflicting vehicles go.
     assert scene.show(car(3, "c2", 0.9, 4.9), car(2, "b2", 7.5, 4.8)) == "go 3"
-
-
-def test_stoppable_commit_does_not_revoke_there() -> None:
-    scene = Scene(Dim())
-    assert scene.show(car(3, "c2", 2.2)) == "go 3"
-    assert scene.show(car(3, "c2", 1.1, 5.0), car(2, "b2", 8.0, 4.8)) == ""
 
 
 def test_paper_commit_counts_a_standing_vehicle_past_half_as_crossing() -> None:
@@ -292,12 +268,6 @@ def test_lanes_by_inflow() -> None:
         site = four_way(split=split).site()
         assert dim.ranks(site) == ranks
         assert dim.start(site).rules.table.priorities == ranks
-
-
-def test_priorities_decide_ties() -> None:
-    pair = [car(1, "a2", 2.2), car(2, "b2", 2.2)]
-    assert Scene(Dim()).show(*pair) == "go 1"
-    assert Scene(Dim(priorities=(1, 0, 2, 3))).show(*pair) == "go 2"
 
 
 def test_the_matrix_comes_from_the_site_unless_given() -> None:
