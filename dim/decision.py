@@ -1,9 +1,9 @@
 """Which vehicles cross: one right of way from the participants' movements, the same for all.
 
 The participants are the nodes of a graph, with an edge where two movements are in harmony; a
-clique of it can cross at once (paper, "Decentralized Intersection Management"). A total order of our
-own chooses among several cliques: vehicles that decide alone must agree, and a graph library lists
-cliques in an arbitrary order.
+clique of it can cross at once (paper, "Decentralized Intersection Management"). A total order of
+our own chooses among several cliques: vehicles that decide alone must agree, and a graph library
+lists cliques in an arbitrary order.
 """
 
 from __future__ import annotations
@@ -268,20 +268,20 @@ def _reason(
     ranks: tuple[int, ...],
 ) -> str:
     chosen, n = cliques[0], len(ranks)
-    who = " ".join(map(str, chosen))
+    names = " ".join(map(str, chosen))
     lanes = " ".join(ARM_NAMES[lane] for lane in sorted(range(n), key=ranks.__getitem__))
     if len(participants) == 1:
-        return f"{who} is alone."
+        return f"{names} is alone."
     if len(cliques) == 1:
-        return f"{who} are all in harmony."
+        return f"{names} are all in harmony."
     if order == "lanes":
         return (
-            f"{who} holds the highest-priority lanes of all {len(cliques)} maximal cliques "
+            f"{names} holds the highest-priority lanes of all {len(cliques)} maximal cliques "
             f"(priority {lanes}), whatever their size."
         )
     if len(tied) == 1:
-        return f"{who} is the only clique of {len(chosen)}, the largest size."
+        return f"{names} is the only clique of {len(chosen)}, the largest size."
     return (
         f"{len(tied)} cliques tie at the largest size, {len(chosen)}; "
-        f"{who} holds the highest-priority lanes of them (priority {lanes})."
+        f"{names} holds the highest-priority lanes of them (priority {lanes})."
     )
