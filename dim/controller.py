@@ -171,7 +171,7 @@ class DimSession:
         dim: the recipe.
         site: where it runs.
         follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
-        truth: what vehicles would see of a view without an error, for the tally of errors.
+        takes: how vehicles take what they have seen of a true view: (true, seen) -> taken.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class DimSession:
         dim: Dim,
         site: Site,
         follows: Callable[[int], bool] = lambda _: True,
-        truth: Callable[[View], View] = lambda view: view,
+        takes: Callable[[View, View], View] | None = None,
     ) -> None:
         instance("site", site, Site)
         zones = dim.zones
@@ -201,12 +201,13 @@ class DimSession:
         )
         self._start = zones.yellow_start + ROUNDING
         self._ranks = _ranking(dim, site)
-        self.see = dim.perception.start(site)
+        see = dim.perception.start(site)
+        self.see = see if takes is None else lambda view, ego: takes(view, see(view, ego))
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
-        self._truth = truth
+        self._takes = takes
         errs = dim.perception.period is not None
         self._tally = Tally(self.rules, self.reader, self._start) if errs else None
 
@@ -243,12 +244,13 @@ class DimSession:
                 look_again |= vehicle in percept.crossing
                 waiting |= vehicle in percept.participants
         self._agents = agents
+        going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
         if self._monitors is not None:
-            going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
             commands += self._monitors.look(view, sights, going)
             look_again |= self._monitors.needed
         if self._tally is not None:
-            self._tally.count(self._truth(view), sights, table, commands)
+            true = view if self._takes is None else self._takes(view, view)
+            self._tally.count(true, sights, table, going)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:

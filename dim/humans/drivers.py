@@ -130,7 +130,7 @@ class Readings:
     def __init__(self, humans: Humans, site: Site, drivers: Drivers) -> None:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
-        self._drivers = drivers
+        self.drivers = drivers
         self._rows = site.intersection.movements.rows
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
@@ -146,7 +146,7 @@ class Readings:
         movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
         alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
-        driver = self._drivers[vehicle.id]
+        driver = self.drivers[vehicle.id]
         turn = self.turns[movement]
         if driver.human:
             shown = Turn.THROUGH if driver.careless < self._silent[turn] else turn

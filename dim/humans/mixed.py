@@ -24,11 +24,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
-from dim.perception import ROUNDING, STANDING, UNKNOWN, Perception, See
+from dim.perception import ROUNDING, STANDING, UNKNOWN
 from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.junction.movements import Bools, Movements
@@ -51,7 +51,7 @@ class Mixed:
     )  # fmt: skip
     humans: Humans = part("how they drive", Humans, default=Humans())
     trust: str = word(
-        "what vehicles of DIM believe about a human's way, see `dim.humans.drivers.TRUSTS`",
+        "what vehicles of DIM believe about a human's way, as in `Humans.trust`",
         TRUSTS, default="motion",
     )  # fmt: skip
 
@@ -77,14 +77,10 @@ class MixedSession:
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
         drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
-        cautious, take = _Cautious(mixed.dim.perception, mixed), _caution(mixed, site)
-        self._dim = DimSession(
-            replace(mixed.dim, perception=cautious),
-            site,
-            lambda id: not drivers[id].human,
-            truth=lambda view: take(view, view),
-        )
-        self._humans = _Humans(mixed, site, drivers)
+        readings = Readings(mixed.humans, site, drivers)
+        takes = _caution(mixed, site, readings)
+        self._dim = DimSession(mixed.dim, site, lambda id: not drivers[id].human, takes)
+        self._humans = _Humans(mixed, site, readings)
         plan = self._dim.plan
         self.plan: Plan = replace(
             plan,
@@ -109,28 +105,9 @@ class MixedSession:
         return [*others, min(wakes, key=lambda wake: wake.time)] if wakes else others
 
 
-@dataclass(frozen=True)
-class _Cautious:
-    """The perception of vehicles of DIM, and what they then believe about humans."""
-
-    perception: Perception
-    mixed: Mixed
-
-    @property
-    def period(self) -> float | None:
-        """That of the perception; humans ask for more views while they are there."""
-        return self.perception.period
-
-    def start(self, site: Site) -> See:
-        """Begin a run."""
-        see_all, take = self.perception.start(site), _caution(self.mixed, site)
-        return lambda view, ego: take(view, see_all(view, ego))
-
-
-def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
+def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, View], View]:
     """How a vehicle of DIM takes what it has seen of a true view."""
-    drivers = Drivers(mixed.humans, mixed.share, site.seed)
-    readings, movements = Readings(mixed.humans, site, drivers), site.intersection.movements
+    drivers, movements = readings.drivers, site.intersection.movements
     start = mixed.dim.zones.yellow_start + ROUNDING
     latest: list[View] = []  # what was seen last, and how it was taken
 
@@ -177,10 +154,9 @@ def _taken(
 class _Humans:
     """The human drivers of a run; they look `sight` [m] far before the junction."""
 
-    def __init__(self, mixed: Mixed, site: Site, drivers: Drivers) -> None:
+    def __init__(self, mixed: Mixed, site: Site, readings: Readings) -> None:
         humans, zones = mixed.humans, mixed.dim.zones
-        self._humans, self._drivers = humans, drivers
-        self._readings = Readings(humans, site, drivers)
+        self._humans, self._drivers, self._readings = humans, readings.drivers, readings
         self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
         self._line = zones.hold_distance + LINE
         self._yellow = zones.yellow_start + ROUNDING

@@ -15,12 +15,12 @@ are 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from dim.agent import Agent, Rules
 from dim.decision import DecisionTable
 from dim.perception import Percept, Reader
-from minisim.control import Command, Go, Hold, View
+from minisim.control import View
 
 
 class Tally:
@@ -56,7 +56,7 @@ class Tally:
         true: View,
         sights: Mapping[int, View],
         table: DecisionTable,
-        commands: Iterable[Command],
+        going: set[int],
     ) -> None:
         """Count one look around.
 
@@ -64,7 +64,7 @@ class Tally:
             true: what vehicles would see without an error.
             sights: what each vehicle that follows DIM has seen, by its id.
             table: the present one.
-            commands: what the vehicles decided.
+            going: ids of the vehicles that now have the right of way.
         """
         passed, self._since = true.time - self._since, true.time
         self._disagreement += passed * self._disagree
@@ -74,12 +74,12 @@ class Tally:
         self._before = before
         truth = self._reader.read(true)
         should = self._rightly(true, sights, truth, table)
-        self._carry_out(commands, sights)
-        wrongly = {v for v in self._going if v not in should and v not in truth.crossing}
+        self._going = going
+        wrongly = going - should - set(truth.crossing)
         self._false_grants += len(wrongly - self._blamed)
-        self._blamed = (self._blamed & self._going) | wrongly
+        self._blamed = (self._blamed & going) | wrongly
         self._disagree = len(self._choices(truth, sights, table)) > 1
-        self._stuck = bool(truth.participants) and not truth.crossing and not self._going
+        self._stuck = bool(truth.participants) and not truth.crossing and not going
 
     def _rightly(
         self, true: View, sights: Mapping[int, View], truth: Percept, table: DecisionTable
@@ -94,14 +94,6 @@ class Tally:
             if agent.decide(truth, table):
                 rightly.add(vehicle.id)
         return rightly
-
-    def _carry_out(self, commands: Iterable[Command], near: Iterable[int]) -> None:
-        for command in commands:
-            if isinstance(command, Go):
-                self._going.add(command.vehicle)
-            elif isinstance(command, Hold):
-                self._going.discard(command.vehicle)
-        self._going.intersection_update(near)
 
     def _choices(
         self, truth: Percept, sights: Mapping[int, View], table: DecisionTable

@@ -142,7 +142,7 @@ def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
 
 @pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
 def test_a_vehicle_that_must_wait_anyway_does_not_disagree(gate: str, lasts: float) -> None:
-    """While c1 crosses, no other enters by the paper's gate; a reads d as d3, not as a left turn."""
+    """While c1 crosses, no other enters by the paper's gate; a reads d1 as d3."""
     views = [
         (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
          seen(4, 3, 1, 2.1))
