@@ -147,7 +147,7 @@ def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str])
 def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
     printed = json.loads(ok(capsys, *arguments, "--json"))
-    assert printed["controller"] == "dim-humans-0.4"
+    assert printed["controller"] == "dim+humans=0.4"
     groups = printed["kinds"]
     assert groups["human"]["trips"] + groups["automated"]["trips"] == printed["trips"]
     rows = {words[0]: words[1:] for line in ok(capsys, *arguments).splitlines()
