@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Following(NamedTuple):
-    """Car following of a site's vehicles (SI units), as `minisim.vehicle.VehicleType` has it."""
+    """Car following of a site's vehicles, from `minisim.vehicle.VehicleType` (SI units)."""
 
     dt: float
     a: float
@@ -69,13 +69,10 @@ class Course(NamedTuple):
 def courses(site: Site) -> tuple[Course, ...]:
     """The courses of all movements of a site."""
     junction = site.intersection
+    turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
     return tuple(
-        Course(
-            path.exit - path.entry,
-            min(site.speed_limit, junction.turn_speed(path.movement, LATERAL_ACCELERATION)),
-            path.exit_arm,
-        )
-        for path in junction.paths
+        Course(path.exit - path.entry, min(site.speed_limit, turn), path.exit_arm)
+        for path, turn in zip(junction.paths, turns, strict=True)
     )
 
 
@@ -113,8 +110,7 @@ def predict(
     Args:
         law: its car following.
         course: through the junction.
-        position: past the junction entry [m].
-        speed: [m/s].
+        position, speed: its state now [m], [m/s].
         lane: the vehicle ahead in its lane.
         exit_lane: the one that enters the same exit lane before it.
         beyond: how far past the exit the rear is followed [m].
@@ -126,60 +122,50 @@ def predict(
     """
     steps = math.ceil(horizon / law.dt)
     s, v = np.empty(steps), np.empty(steps)
-    count = _drive(
-        law, course.crossing, course.turn, position, speed, beyond,
-        lane.s, lane.v, lane.until,
-        exit_lane.s, exit_lane.v, exit_lane.shift,
-        s, v,
-    )  # fmt: skip
+    count = _drive(law, course, position, speed, lane, exit_lane, beyond, s, v)
     return (s[:count].copy(), v[:count].copy()) if count else None
 
 
 @njit
 def _drive(
     law: Following,
-    crossing: float,
-    turn: float,
+    course: Course,
     position: float,
     speed: float,
+    lane: Leader,
+    exit_lane: Leader,
     beyond: float,
-    lane_s: Floats,
-    lane_v: Floats,
-    lane_until: float,
-    exit_s: Floats,
-    exit_v: Floats,
-    exit_shift: float,
     s_out: Floats,
     v_out: Floats,
 ) -> int:
     """Fill `s_out` and `v_out`; the steps filled, or 0 where the vehicle does not get through."""
     s, v = position, speed
-    end = crossing + law.length + beyond
+    end = course.crossing + law.length + beyond
     for k in range(len(s_out)):
         s_out[k], v_out[k] = s, v
         if s >= end:
             return k + 1
         z = 0.0
         first = True  # no vehicle is between it and the junction
-        if k < len(lane_s):
-            first = lane_s[k] >= 0.0
-            rear = lane_s[k] - law.length
-            if rear < lane_until:
+        if k < len(lane.s):
+            first = lane.s[k] >= 0.0
+            rear = lane.s[k] - law.length
+            if rear < lane.until:
                 if rear <= s:
                     return 0
-                z = gap_ratio(v, rear - s, lane_v[k], law.a, law.b, law.headway, law.min_gap)
-        if k < len(exit_s) and exit_s[k] >= 0.0 and (first or s >= 0.0):
-            gap = exit_s[k] + exit_shift - law.length - s
+                z = gap_ratio(v, rear - s, lane.v[k], law.a, law.b, law.headway, law.min_gap)
+        if k < len(exit_lane.s) and exit_lane.s[k] >= 0.0 and (first or s >= 0.0):
+            gap = exit_lane.s[k] + exit_lane.shift - law.length - s
             if gap <= 0.0:
                 return 0
-            z = max(z, gap_ratio(v, gap, exit_v[k], law.a, law.b, law.headway, law.min_gap))
-        v0 = turn if 0.0 <= s < crossing else law.limit
+            z = max(z, gap_ratio(v, gap, exit_lane.v[k], law.a, law.b, law.headway, law.min_gap))
+        v0 = course.turn if 0.0 <= s < course.crossing else law.limit
         if law.improved:
             acc = iidm(v, v0, z, law.a, law.b, law.delta)
         else:
             acc = idm(v, v0, z, law.a, law.b, law.delta)
-        if s < 0.0 and v + acc * law.dt > turn:
-            slower = max(speed_towards(v, turn, -s, law.b, law.dt), turn)
+        if s < 0.0 and v + acc * law.dt > course.turn:
+            slower = max(speed_towards(v, course.turn, -s, law.b, law.dt), course.turn)
             acc = min(acc, max((slower - v) / law.dt, -law.b))
         s, v = ballistic(s, v, max(acc, -law.b_max), law.dt)
     return 0

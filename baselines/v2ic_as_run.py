@@ -32,9 +32,9 @@ import shapely
 
 from baselines.v2ic import CRAWL
 from minisim.control import Advise, Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance
+from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
@@ -66,16 +66,13 @@ WIDE = 20.0
 class V2ICAsRun:
     """V2I-C as the authors of the paper ran it, for 4 arms; it may collide."""
 
+    name = Name("v2ic-as-run")
+
     approach_speed: float = real(
         "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "
         "vehicle's own) in the others", "m/s",
         above=0, high=100, default=16.6,
     )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `v2ic-as-run:approach_speed=14`."""
-        return spelled("v2ic-as-run", self)
 
     def start(self, site: Site) -> V2ICAsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""
@@ -120,7 +117,7 @@ class AsRunList:
     """The authors' loop body: the serving list, and the desired speeds that follow from it.
 
     Attributes:
-        order: ids in the serving list, in order of registration.
+        order: ids of the listed vehicles, in order of registration.
         granted: ids of the vehicles that were released ("priority 0").
     """
 
@@ -170,14 +167,11 @@ class AsRunList:
 class V2ICAsRunSession:
     """One run: reads the host's views, and commands what changes.
 
-    Attributes:
-        rules: the authors' loop body.
-        plan: what the host has to provide: a wake-up at insertion, where vehicles register, and
-            where they leave the list; in between at every step while any waits.
+    It is called at insertion, where vehicles register, and where they leave the list; in between
+    at every step while any waits.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
-        instance("site", site, Site)
         junction = site.intersection
         self._rows = junction.movements.rows
         if junction.n != 4:
