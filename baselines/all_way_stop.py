@@ -3,7 +3,7 @@
 The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), with one
 difference. SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
 for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it has left their way, so
-no two can collide whatever it does there.
+two vehicles cannot collide whatever it does there.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class AllWayStop:
     The first vehicle of each lane queues from the moment when it stands at the line; equal times
     go by arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle has
     stood for longer, and every conflicting vehicle that was let go has left its way. So vehicles
-    that do not conflict go together, and may overtake in the queue. But none is passed over for
-    ever, since a waiting vehicle keeps every later conflicting one back.
+    that do not conflict go together, and may overtake in the queue. Each gets its turn, since a
+    waiting vehicle keeps back every later one that conflicts with it.
     """
 
     name = Name("all-way-stop")
@@ -50,9 +50,8 @@ class AllWayStop:
 class AllWayStopSession:
     """Since when each vehicle stands, and which were let go.
 
-    It is called when a vehicle comes to the line, when the junction gets clear, and when it asks
-    for that: at the earliest time at which a vehicle at the line can stand, has stood long enough,
-    or can find its way free.
+    It is called when a vehicle comes to the line, when the junction clears, and at the earliest
+    time at which a vehicle at the line can stand, has stood long enough, or can find its way free.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:

@@ -1,8 +1,8 @@
 """Where a vehicle will be, step by step, if it drives on by the car-following law of the hosts.
 
-The vehicle is alone on its path, behind at most two others with known motion: the one ahead in its
-lane, and the one that goes before it into the same exit lane. Positions here are distances past the
-junction entry, negative before it.
+The vehicle follows at most two others, whose motion is known: the one ahead in its lane, and the
+one that enters the same exit lane before it. Positions are distances past the junction entry,
+negative before it.
 """
 
 from __future__ import annotations
@@ -37,33 +37,18 @@ class Following(NamedTuple):
     @classmethod
     def of(cls, site: Site) -> Following:
         """The law of a site's vehicles on its roads."""
-        vehicle = site.vehicle
-        return cls(
-            dt=site.dt,
-            a=vehicle.acceleration,
-            b=vehicle.deceleration,
-            b_max=vehicle.max_deceleration,
-            headway=vehicle.headway,
-            min_gap=vehicle.min_gap,
-            delta=vehicle.exponent,
-            improved=vehicle.model == "iidm",
-            length=vehicle.length,
-            limit=site.speed_limit,
-        )
+        v = site.vehicle
+        rates = v.acceleration, v.deceleration, v.max_deceleration
+        gaps = v.headway, v.min_gap, v.exponent
+        return cls(site.dt, *rates, *gaps, v.model == "iidm", v.length, site.speed_limit)
 
 
 class Course(NamedTuple):
-    """What a prediction needs of a path.
+    """What a prediction needs of a path."""
 
-    Attributes:
-        crossing: from entry to exit [m].
-        turn: highest speed inside the junction [m/s].
-        exit_arm: index of the arm that it leaves by.
-    """
-
-    crossing: float
-    turn: float
-    exit_arm: int
+    crossing: float  #: from entry to exit [m]
+    turn: float  #: highest speed inside the junction [m/s]
+    exit_arm: int  #: index of the arm that it leaves by
 
 
 def courses(site: Site) -> tuple[Course, ...]:
@@ -77,18 +62,12 @@ def courses(site: Site) -> tuple[Course, ...]:
 
 
 class Leader(NamedTuple):
-    """A vehicle with known motion, as its follower meets it.
+    """A vehicle with known motion, as its follower meets it."""
 
-    Attributes:
-        s, v: its positions [m] and speeds [m/s], one a step from now on; after the last it is gone.
-        until: its rear matters up to this position on its own path [m].
-        shift: added to its position to measure it on the follower's path [m].
-    """
-
-    s: Floats
-    v: Floats
-    until: float = math.inf
-    shift: float = 0.0
+    s: Floats  #: positions [m], one a step from now on; after the last it is gone
+    v: Floats  #: speeds [m/s]
+    until: float = math.inf  #: its rear matters up to this position on its own path [m]
+    shift: float = 0.0  #: added to its position to measure it on the follower's path [m]
 
 
 NO_LEADER = Leader(np.empty(0), np.empty(0))
@@ -107,18 +86,9 @@ def predict(
 ) -> tuple[Floats, Floats] | None:
     """Positions [m] and speeds [m/s] of a vehicle, one a step from now on, if it may drive on.
 
-    Args:
-        law: its car following.
-        course: through the junction.
-        position, speed: its state now [m], [m/s].
-        lane: the vehicle ahead in its lane.
-        exit_lane: the one that enters the same exit lane before it.
-        beyond: how far past the exit the rear is followed [m].
-        horizon: [s].
-
-    Returns:
-        None where it does not get through within the horizon, or where a leader appears beside or
-        behind it, which would be an emergency.
+    It follows the vehicle ahead in its lane and the one that enters its exit lane before it, until
+    its rear is `beyond` [m] past the exit. None if that takes longer than the horizon [s], or if a
+    leader appears beside or behind it, which would be an emergency.
     """
     steps = math.ceil(horizon / law.dt)
     s, v = np.empty(steps), np.empty(steps)
@@ -138,7 +108,7 @@ def _drive(
     s_out: Floats,
     v_out: Floats,
 ) -> int:
-    """Fill `s_out` and `v_out`; the steps filled, or 0 where the vehicle does not get through."""
+    """Fill `s_out` and `v_out`; the number of steps, or 0 if the vehicle does not get through."""
     s, v = position, speed
     end = course.crossing + law.length + beyond
     for k in range(len(s_out)):

@@ -1,19 +1,19 @@
 """V2I-C: a serving list at the roadside advises every vehicle when to reach its stop line.
 
 Source: Li, Liu, PLOS ONE 15(7), 2020, e0235644, and the authors' own code. A unit at the junction
-lists the vehicles in its range in the order in which they came. It knows when each will have left
-the junction. A vehicle in conflict with some ahead of it in the list is told to arrive when the
-last of those leaves. Where we differ, we differ for safety's sake:
+lists the vehicles in its range in the order of arrival, and estimates when each will have left. A
+vehicle that conflicts with some ahead of it in the list is told to arrive when the last of them
+leaves. We differ from the source for safety:
 
-- distances are those to the true stop line, and a vehicle has left when its rear bumper is out of
-  the junction; the conflicts are those of the geometry, merging included;
+- distances are to the true stop line, and a vehicle has left when its rear bumper is out of the
+  junction; the conflicts are those of the geometry, merging included;
 - a speed is advice: the vehicle accelerates and brakes as its car following does, never above the
   limit, and stops at its line unless the unit has let it go;
-- the right of way is given only when every conflicting vehicle ahead in the list *has* left, even
-  when the time until then is estimated to be 0. It is never taken back. A conflicting vehicle that
-  comes later waits in the same way, so two vehicles in conflict never hold it at once;
-- leaving times are capped (`leaving_time`), because distance over speed explodes at low speed, and
-  a crawling vehicle would stop those behind it in the list far from the junction.
+- a vehicle gets the right of way only when every conflicting vehicle ahead in the list *has* left,
+  even if the estimated time until then is 0, and never loses it. Later vehicles wait in the same
+  way, so two vehicles in conflict never hold it at once;
+- leaving times are capped (`leaving_time`): distance over speed explodes at low speed, and a
+  crawling vehicle would stop those behind it in the list far from the junction.
 """
 
 from __future__ import annotations

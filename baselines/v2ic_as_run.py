@@ -1,18 +1,17 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
 `baselines.v2ic` is the intended controller. This module holds what the comparison in the paper ran
-instead, quirk by quirk, and no other module knows of them:
+instead, quirk by quirk. No other module knows these quirks:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
-   junction begins at 488.7 m; so the "stop line" is 108.7 m before the junction, and vehicles
+   junction begins at 488.7 m. So the "stop line" is 108.7 m before the junction, and vehicles
    leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
 2. *right-hand conflicts*: the conflicts are those of right-hand traffic, the network is
    left-hand: of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
-3. *no stop line*: vehicles never stop for one; they are advised speeds, and a vehicle that cannot
-   keep out of the way drives on;
+3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
 4. *free for a moment is free*: at its release a vehicle is expected to leave after (v_des − v)/a,
-   though the speed is cut to 20 m/s. That is 1.3 s instead of 11 s, for one step, for the vehicles
-   behind it in the list;
+   though the speed is cut to 20 m/s: for one step 1.3 s instead of 11 s, for the vehicles behind
+   it in the list;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
    so vehicles leave at 20 m/s;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
@@ -83,7 +82,7 @@ class V2ICAsRun:
 def right_hand_conflicts() -> tuple[frozenset[int], ...]:
     """For each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
 
-    Movements are numbered as `Intersection.movements` does. Only centre lines count.
+    Movements are numbered as in `Intersection.movements`. Only centre lines count.
     """
     junction = Intersection((0.0, 90.0, 180.0, 270.0), side="right", junction_radius=WIDE)
     ways = [shapely.LineString(path.points) for path in junction.paths]
@@ -110,7 +109,7 @@ class Platoon(NamedTuple):
     movement: int
     driven: float
     speed: float
-    order: tuple[float, ...] = ()
+    order: tuple[float, ...]
 
 
 class AsRunList:

@@ -24,10 +24,10 @@ class Actuated:
     """A signal that prolongs a green while vehicles follow each other closely enough.
 
     One phase an approach, in a fixed order; none is left out. Each lane has a loop before the
-    junction. While the last vehicle left it less than `max_gap` ago, the green goes on: for what
-    is left of `detector_gap`, in which that vehicle reaches the line, up to a whole second of the
-    phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
-    beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
+    junction. While the last vehicle left it less than `max_gap` ago, the green goes on for the rest
+    of `detector_gap`, in which that vehicle reaches the line. It is rounded up to a whole second of
+    the phase and never goes beyond `max_green`. A vehicle that stands on the loop leaves no gap.
+    `min_green` is for the vehicles past the loop at the start of a green, which are not seen.
 
     The time of a phase runs from the green that is really shown: a head waits until no vehicle
     crosses its way.

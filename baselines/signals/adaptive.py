@@ -21,11 +21,11 @@ class Adaptive:
 
     One phase an approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
-    it takes to the stop line at the speed limit, if that is before `max_green`. While the other
-    lanes are empty, a green goes on too.
+    that it needs to the stop line at the speed limit, if that is before `max_green`. While the
+    other lanes are empty, a green goes on too.
 
     The time of a phase runs from the green that is really shown: a head waits until no vehicle
-    crosses its way. Time lost is that against the speed limit, whatever a driver would like.
+    crosses its way. Time is lost against the speed limit, whatever a driver would like.
     Defaults are SUMO's, greens and amber those of the authors' network.
     """
 

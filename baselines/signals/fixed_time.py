@@ -14,7 +14,6 @@ from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
 from minisim.parameters import Name, checked, declared, real, switch
 
-
 #: What the head of a lane shows one after the other.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 

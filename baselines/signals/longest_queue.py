@@ -18,10 +18,10 @@ from minisim.parameters import Name, declared, real
 class LongestQueue:
     """A signal that turns to the approach with the most vehicles, every few seconds.
 
-    One phase an approach: while one lane carries all turns, every two approaches of a junction
-    have movements that conflict, so no two can be green together. Among equal queues the one whose
-    last green is the longest ago goes first, then in the order a, b, c…; an empty junction keeps
-    its green. A lane may wait for long while others always have more.
+    One phase an approach: since one lane carries all turns, any two approaches have movements that
+    conflict, and cannot be green together. Among equal queues the one whose last green is the
+    longest ago goes first, then in the order a, b, c…; an empty junction keeps its green. A lane
+    may wait for long while others always have more.
     """
 
     name = Name("longest-queue")
