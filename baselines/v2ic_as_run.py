@@ -46,16 +46,12 @@ NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks no vehicle [s]
 
 #: Distance driven at which a vehicle leaves the list [m].
 LEFT = REFERENCE + PLATOON + STOP_LINE
-
 #: Distances driven between which a vehicle registers [m].
 FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
-
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
-
 #: Room for rounding where a mark and a distance are compared [m].
 ROUNDING = 1e-9
-
 #: A junction radius at which opposite far turns do not meet, as on the junction of several lanes
 #: that the conflicts were written for [m].
 WIDE = 20.0
@@ -97,18 +93,12 @@ def right_hand_conflicts() -> tuple[frozenset[int], ...]:
 
 
 class Platoon(NamedTuple):
-    """What the rules know of one vehicle at one moment.
+    """What the rules know of one vehicle at one moment."""
 
-    Attributes:
-        movement: index of its movement.
-        driven: distance since insertion [m].
-        speed: [m/s].
-        order: sorts vehicles that register in the same step, as the authors' driver spawned them.
-    """
-
-    movement: int
-    driven: float
-    speed: float
+    movement: int  #: its index
+    driven: float  #: distance since insertion [m]
+    speed: float  #: [m/s]
+    #: Sorts vehicles that register in the same step, as the authors' driver spawned them.
     order: tuple[float, ...]
 
 

@@ -23,15 +23,10 @@ def check_greens(shortest: float, longest: float) -> None:
 
 
 class Verdict(NamedTuple):
-    """What a rule says of the present phase.
+    """What a rule says of the present phase."""
 
-    Attributes:
-        lane: whose turn it is; another lane than now ends the phase.
-        after: time until the next look [s]; it does not matter when the phase ends.
-    """
-
-    lane: int
-    after: float
+    lane: int  #: whose turn it is; another lane than now ends the phase
+    after: float  #: time until the next look [s]; it does not matter when the phase ends
 
 
 class PhaseSession:

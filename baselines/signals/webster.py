@@ -21,21 +21,14 @@ MIN_GREEN = 2.0
 
 @dataclass(frozen=True)
 class SignalTiming:
-    """A signal's timing and what it means for a demand.
+    """A signal's timing and what it means for a demand."""
 
-    Attributes:
-        cycle: [s].
-        greens: of each lane [s].
-        flow_ratio: Webster's Y, the sum over the lanes of inflow over saturation flow.
-        saturation: degree of saturation x = qC/(sg) of each lane; above 1 its queue grows.
-        capped: whether the optimum cycle was cut to a maximum (or does not exist).
-    """
-
-    cycle: float
-    greens: tuple[float, ...]
-    flow_ratio: float
+    cycle: float  #: [s]
+    greens: tuple[float, ...]  #: of each lane [s]
+    flow_ratio: float  #: Webster's Y, the sum over the lanes of inflow over saturation flow
+    #: Degree of saturation x = qC/(sg) of each lane. Above 1 its queue grows while demand lasts.
     saturation: tuple[float, ...]
-    capped: bool = False
+    capped: bool = False  #: whether the optimum cycle was cut to a maximum (or does not exist)
 
 
 def webster(
@@ -64,11 +57,11 @@ def webster(
     Raises:
         InputError: a value out of range, or a `max_cycle` without room for the minimal greens.
     """
-    flows = [
-        number("rate [veh/h]", rate, low=0, high=1e5) for rate in numbers("rates [veh/h]", rates)
-    ]
+    flows = numbers("rates [veh/h]", rates)
     if not flows:
         raise InputError("rates must have at least one lane")
+    for flow in flows:
+        number("rate [veh/h]", flow, low=0, high=1e5)
     n = len(flows)
     number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=60)
@@ -79,7 +72,7 @@ def webster(
     ratio = sum(flows) / saturation_flow
     capped = ratio > MAX_FLOW_RATIO and optimal_cycle(ratio, lost) > max_cycle
     total = (max_cycle if capped else optimal_cycle(ratio, lost)) - lost
-    shares = [1.0] * n if equal_greens or ratio == 0.0 else flows
+    shares = (1.0,) * n if equal_greens or ratio == 0.0 else flows
     greens = [total * share / sum(shares) for share in shares]
     if capped:
         greens = _raise_within(greens, min_green)
