@@ -299,6 +299,16 @@ def spelled(name: str, recipe: object) -> str:
     return f"{name}:{arguments}" if arguments else name
 
 
+class Name:
+    """The attribute `name` of a recipe: its spelling, with `word` before any parameters."""
+
+    def __init__(self, word: str) -> None:
+        self._word = word
+
+    def __get__(self, recipe: object, kind: type) -> str:
+        return spelled(self._word, recipe)
+
+
 def _arguments(recipe: Any) -> str:
     values = ((it, getattr(recipe, it.name)) for it in parameters(recipe.__class__))
     return ",".join(

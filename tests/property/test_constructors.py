@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 import scenarios
 from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue, webster, webster_delay
-from baselines.signals.heads import Phase, Program
 from dim import Dim, ExactPerception, HarmonyMatrix, NoisyPerception, Zones, decide, explain
 from minisim import simulate
 from minisim.arrivals import Arrivals, Demand, read_arrivals
@@ -133,8 +132,6 @@ CASES = {
         LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0}
     ),
     "AllWayStop": Case(AllWayStop, {"reaction": 1.0}),
-    "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
-    "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
     "webster": Case(
         webster,
         {"rates": (100.0,) * 4, "saturation_flow": 1500.0, "lost_time_per_phase": 2.0,
