@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import AsJson
 from scenarios.cli.shared.terminal import show_json
 
 #: Columns of the output.
@@ -26,9 +26,9 @@ WIDTH = 80
 def controllers(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="List the parameters of this one.", show_default=False),
+        typer.Argument(metavar="NAME", help="List the parameters of this one."),
     ] = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
     if name is None:

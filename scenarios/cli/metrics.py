@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import AsJson
 from scenarios.cli.shared.terminal import show, show_json
 
 #: What is said of a metric.
@@ -17,7 +17,7 @@ SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation"
     "minisim metrics --json\n\n"
     "minisim run four-way --metrics waiting_time_s,max_drac_mps2 --by movement"
 )
-def metrics(as_json: AsJson = False) -> None:
+def metrics(as_json: options.AsJson = False) -> None:
     """List what is measured: names, units, meanings and equations."""
     from minisim.results.metrics import TABLE
     from scenarios.cli.shared.report import metrics_table

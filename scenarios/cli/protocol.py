@@ -10,15 +10,8 @@ import typer
 from minisim.errors import InputError
 from minisim.files import check_file
 from minisim.junction.movements import ARM_NAMES
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    Order,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import answer, junction, names, protocol_text
 from scenarios.cli.shared.terminal import bar
 
@@ -40,7 +33,7 @@ MAX_ARMS = 4
     "-o two.gif"
 )
 def protocol(
-    scenario: ScenarioName,
+    scenario: options.ScenarioName,
     commit: Annotated[
         str,
         typer.Option(
@@ -57,7 +50,7 @@ def protocol(
             "them.",
         ),
     ] = "clear",
-    order: Order = "size",
+    order: options.Order = "size",
     priorities: Annotated[
         str,
         typer.Option(
@@ -69,14 +62,14 @@ def protocol(
     counterexample: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", show_default=False,
+            metavar="FILE.csv",
             help="Where it is unsafe: write arrivals with which simulated vehicles collide.",
         ),
     ] = None,
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
-    as_json: AsJson = False,
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
+    as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Visit every state of arrivals, decisions, commitments and clearings (3 and 4 arms).
 

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 import typer
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    Order,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import Plot, analysis_text, answer, claims_table, junction, names
 from scenarios.cli.shared.terminal import bar
 
@@ -24,13 +17,13 @@ from scenarios.cli.shared.terminal import bar
     "minisim verify five-way --order lanes --plot verification.png"
 )
 def verify(
-    scenario: ScenarioName,
-    order: Order = "size",
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
+    scenario: options.ScenarioName,
+    order: options.Order = "size",
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
     plot: Plot = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """Try every case that a junction can decide: the paper's claims, one by one."""
     from dim.proofs.verification import analyse, most_cliques

@@ -9,7 +9,7 @@ import pytest
 
 from minisim.parameters import parameters
 from scenarios.controllers import CONTROLLERS
-from tests.unit.scenarios.cli.test_cli import fails, ok
+from tests.unit.scenarios.cli.test_cli import ok
 
 
 def test_it_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,17 +54,3 @@ def test_a_class_of_ones_own(
     assert text == "own_signal:Slow: A slow signal.\n\n  green=30  (float)\n"
     run = ("run", "four-way", "--horizon", "60", "--no-safety", "--json")
     assert json.loads(ok(capsys, *run, "-c", "own_signal:Slow(green=20)"))["controller"] == "slow"
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("dum", "did you mean 'dim'"),
-        ("baselines:Fixed", "did you mean 'FixedTime'"),
-        ("own_none:X", "no module 'own_none'"),
-    ],
-)
-def test_an_unknown_one_is_one_line(
-    capsys: pytest.CaptureFixture[str], name: str, message: str
-) -> None:
-    assert message in fails(capsys, "controllers", name)

@@ -485,36 +485,6 @@ def test_means_are_drawn_over_density() -> None:
 
 # --- command line ----------------------------------------------------------------------------
 
-BAD = [
-    (("four-wy",), "unknown scenario"),
-    (("-c", "dm"), "did you mean 'dim'"),
-    (("-d", "-5"), "-5"),
-    (("--split", "4:x"), "4:x"),
-    (("-p", "fare"), "did you mean 'fair'"),
-    (("--seeds", "0"), "--seeds"),
-    (("--jobs", "0"), "--jobs"),
-    (("--horizon", "-1"), "horizon"),
-    (("--horizon", "0"), "horizon"),
-    (("--replay", "--seeds", "2"), "--seeds does not go with --replay"),
-    (("--replay", "6-way"), "unknown junction of a published run"),
-    (("--replay", "-d", "400"), "no dim run of 400"),
-    (("--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
-    (("three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
-    (("-p", "as_run", "-c", "reservation"), "reservation cannot serve four-way at 150"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a) for a, _ in BAD])
-def test_bad_input_is_one_line_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], named: str
-) -> None:
-    code = main(["crossval", *arguments, "--out", str(tmp_path / "new")])
-    captured = capsys.readouterr()
-    assert (code, captured.out, captured.err.count("\n")) == (2, "", 1)
-    assert named in captured.err
-    assert list(tmp_path.iterdir()) == []
-
 
 def test_a_file_in_place_of_the_folder_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
