@@ -101,7 +101,7 @@ class Case:
         if not self.same_law or self.scenario.horizon != HOUR:
             return None
         who = PUBLISHED.get(self.controller)
-        if who is None or not self.density.is_integer():
+        if who is None or not float(self.density).is_integer():
             return None
         cell = Cell(self.split, int(self.density), self.scenario.intersection.n, who)
         chosen = reference_rows(cell, metric, lane)

@@ -61,67 +61,39 @@ class Pair(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One metric of one lane.
+    """One metric of one lane, over all seeds; times in seconds."""
 
-    Attributes:
-        lane: "all" or a letter.
-        metric: one of `minisim.results.metrics.MEANS`.
-        trips: that ended, in minisim and in SUMO, over all seeds.
-        minisim, sumo: the mean over seeds of each run's mean [s].
-        difference: of the two means of a seed, mean over seeds [s].
-        ks: distance of the distributions of all trips; NaN where a host has none.
-        within: share of the trips that differ by less than `CLOSE`.
-    """
-
-    lane: str
-    metric: str
-    trips: tuple[int, int]
-    minisim: Interval
+    lane: str  # "all" or a letter
+    metric: str  # one of `minisim.results.metrics.MEANS`
+    trips: tuple[int, int]  # that ended, in minisim and in SUMO
+    minisim: Interval  # the mean over seeds of each run's mean
     sumo: Interval
-    difference: Interval
-    ks: float
-    within: float
+    difference: Interval  # of the two means of a seed, mean over seeds
+    ks: float  # distance of the distributions of all trips; NaN where a host has none
+    within: float  # share of the trips that differ by less than `CLOSE`
 
 
 class Divergence(NamedTuple):
-    """The first trip, in order of demand, that is not the same in both hosts.
-
-    Attributes:
-        seed: of the run.
-        vehicle: index into the trips.
-        movement: such as "a2".
-        depart: in minisim [s]; the time of its demand where it never got on the road.
-        end: when it had arrived in both [s]; the end of the run where it did not.
-        waiting, travel: in minisim and in SUMO [s], up to the end of the run.
-    """
+    """The first trip, in order of demand, that is not the same in both hosts; times in seconds."""
 
     seed: int
-    vehicle: int
-    movement: str
-    depart: float
-    end: float
-    waiting: tuple[float, float]
+    vehicle: int  # index into the trips
+    movement: str  # such as "a2"
+    depart: float  # in minisim; the time of its demand where it never got on the road
+    end: float  # when it had arrived in both; the end of the run where it did not
+    waiting: tuple[float, float]  # in minisim and in SUMO, up to the end of the run
     travel: tuple[float, float]
 
 
 class Parting(NamedTuple):
-    """The first moment at which a vehicle is at two places.
+    """The first moment at which a vehicle is at two places."""
 
-    Attributes:
-        time: [s].
-        vehicle: index into the trips.
-        movement: such as "a2".
-        positions: from the road entry, in minisim and in SUMO [m].
-        speeds: in minisim and in SUMO [m/s].
-        minisim, sumo: the trajectories around it (`Run.trajectories`).
-    """
-
-    time: float
-    vehicle: int
-    movement: str
-    positions: tuple[float, float]
-    speeds: tuple[float, float]
-    minisim: pd.DataFrame
+    time: float  # [s]
+    vehicle: int  # index into the trips
+    movement: str  # such as "a2"
+    positions: tuple[float, float]  # from the road entry, in minisim and in SUMO [m]
+    speeds: tuple[float, float]  # in minisim and in SUMO [m/s]
+    minisim: pd.DataFrame  # trajectories around it (`Run.trajectories`)
     sumo: pd.DataFrame
 
 

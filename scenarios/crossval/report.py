@@ -104,36 +104,8 @@ def summary(results: Sequence[Result]) -> str:
 
 def _rows(result: Result) -> Iterator[dict[str, Any]]:
     case = result.case
-    for row in result.rows:
-        yield {
-            **_identity(case),
-            "lane": row.lane,
-            "metric": row.metric,
-            "host": None,
-            "seed": None,
-            "seeds": len(result.pairs),
-            "trips_minisim": row.trips[0],
-            "trips_sumo": row.trips[1],
-            "minisim": row.minisim.mean,
-            "minisim_ci95": row.minisim.half_width,
-            "sumo": row.sumo.mean,
-            "sumo_ci95": row.sumo.half_width,
-            "difference": row.difference.mean,
-            "difference_ci95": row.difference.half_width,
-            "ks": row.ks,
-            "within": row.within,
-            "collisions_minisim": result.collisions[0],
-            "collisions_sumo": result.collisions[1],
-            "published": _published(case, row),
-            "error": None,
-        }
-    for failure in result.failures:
-        yield {**_identity(case), **failure._asdict()}
-
-
-def _identity(case: Case) -> dict[str, Any]:
     scenario = case.scenario
-    return {
+    cell = {
         "controller": case.controller,
         "scenario": scenario.name,
         "arms": scenario.intersection.n,
@@ -143,6 +115,19 @@ def _identity(case: Case) -> dict[str, Any]:
         "arrivals": "drawn" if case.published is None else "published",
         "horizon_s": scenario.horizon,
     }
+    for row in result.rows:
+        means = {}
+        for what in ("minisim", "sumo", "difference"):
+            means[what], means[f"{what}_ci95"], _ = getattr(row, what)
+        yield {
+            **cell, "lane": row.lane, "metric": row.metric, "host": None, "seed": None,
+            "seeds": len(result.pairs), "trips_minisim": row.trips[0], "trips_sumo": row.trips[1],
+            **means, "ks": row.ks, "within": row.within,
+            "collisions_minisim": result.collisions[0], "collisions_sumo": result.collisions[1],
+            "published": _published(case, row), "error": None,
+        }  # fmt: skip
+    for failure in result.failures:
+        yield {**cell, **failure._asdict()}
 
 
 def _tolerances() -> tuple[str, ...]:

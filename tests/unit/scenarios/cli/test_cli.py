@@ -373,7 +373,7 @@ BAD = [
     (("run", "custom", "--bearings", "0,10,90"), "at least 30°"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
-    (("run", "four-way", "--split", "1:1:inf:1"), "written like 4:3:2:1, got '1:1:inf:1'"),
+    (("run", "four-way", "--split", "1:1:inf:1"), "must be a finite number, got inf"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
