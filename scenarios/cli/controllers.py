@@ -13,14 +13,13 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import show_json
 
-#: Columns of the output.
+#: Columns of the terminal.
 WIDTH = 80
 
 
 @app.command(
-    epilog="Name a controller with parameters as in -c dim:gate=harmonious,monitor=on. One of your "
-    "own is -c mymodule:MyController(k=3) or -c path/to/file.py:MyController, and needs a line in "
-    "no file of ours.\n\n"
+    epilog="Give parameters as in -c dim:gate=harmonious,monitor=on. A controller of your own "
+    "needs no registration: -c mymodule:MyController(k=3) or -c path/to/file.py:MyController.\n\n"
     "[bold]Examples[/bold]\n\nminisim controllers dim\n\nminisim controllers mymodule:MyController"
 )
 def controllers(
@@ -31,8 +30,12 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
+    from scenarios.controllers import CONTROLLERS, described, package_of, plugins
+
     if name is None:
-        meanings = dict(_meanings())
+        meanings = {known: _meaning(entry.make) for known, entry in CONTROLLERS.items()}
+        for known, plugin in plugins().items():
+            meanings[known] = f"of the package {package_of(plugin)} ({plugin.value})"
         if as_json:
             show_json(meanings)
             return
@@ -40,9 +43,8 @@ def controllers(
         for known, meaning in meanings.items():
             typer.echo(_wrapped(f"{known:{width}}{meaning}", width))
         return
-    from scenarios.controllers import described
-
-    make = described(name).make
+    ours = name.partition(":")[0]
+    make = described(ours if ours in CONTROLLERS else name).make
     meaning, parameters = _meaning(make), list(_parameters(make))
     if as_json:
         show_json({"name": name, "meaning": meaning, "parameters": parameters})
@@ -54,15 +56,6 @@ def controllers(
             if kind["parameters"]:
                 typer.echo("\n" + _wrapped(f"{parameter['name']}={word}: {kind['meaning']}", 0))
                 _show_parameters(kind["parameters"])
-
-
-def _meanings() -> Iterator[tuple[str, str]]:
-    from scenarios.controllers import CONTROLLERS, package_of, plugins
-
-    for entry in CONTROLLERS.values():
-        yield entry.name, _meaning(entry.make)
-    for name, plugin in plugins().items():
-        yield name, f"of the package {package_of(plugin)} ({plugin.value})"
 
 
 def _meaning(make: Callable[..., Any]) -> str:

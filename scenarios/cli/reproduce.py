@@ -13,14 +13,14 @@ from scenarios.cli.shared.terminal import bar
 from scenarios.studies import NAMES, study_named
 
 if TYPE_CHECKING:
-    from scenarios.studies.shared.reproduction import Made
+    pass
 
 
 @app.command(
-    epilog="Simulates the paper's grid twice, as its text prescribes it and as the published runs "
-    "were made, and what the paper leaves open: every controller on equal terms, gates, rules of "
-    "priority and capacities. Writes DIR/report.md, DIR/figures and the store. What the store has "
-    "already is not simulated again, so an interrupted run goes on where it was.\n\n"
+    epilog="Simulates the paper's grid twice: as its text prescribes it, and as the published runs "
+    "were made. Then comes what the paper leaves open: every controller on equal terms, gates, "
+    "rules of priority and capacities. Writes DIR/report.md, DIR/figures and the store. A run that "
+    "is in the store is not made again, so an interrupted command continues where it stopped.\n\n"
     "[bold]How long[/bold]\n\n"
     "Processor time with 10 seeds, on a machine that simulates an hour under DIM in 0.1 s: text, "
     "the paper's grid of 700 hours and the first to be run, 2.5 minutes; fair 6; gate and fairness "
@@ -65,7 +65,7 @@ def reproduce(
     names = [study_named(name).name for name in only or NAMES]
     workers = options.processes(jobs)
     if store is not None and store.exists():
-        Store(store, create=False).close()  # refused before a folder is made
+        Store(store, create=False).close()  # a wrong one is refused before a folder is made
     folder = make_folder(out)
     pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
@@ -73,7 +73,10 @@ def reproduce(
         for name in names:
             with bar(f"simulating {name}") as progress:
                 made.append(make(name, effort, rows, workers, progress))
-            typer.echo(_done(made[-1]), err=True)
+            done = made[-1]
+            took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
+            failed = f", {len(done.failed)} failed" if done.failed else ""
+            typer.echo(f"{name}: {took}{failed}", err=True)
         with bar("drawing") as progress:
             files = write_report(
                 Archive(find_in(rows), effort), made, workers, folder, pictures, progress,
@@ -84,8 +87,3 @@ def reproduce(
     broken = sum(len(part.failed) for part in made)
     if broken:
         typer.echo(f"{broken} runs failed; the report names them", err=True)
-
-
-def _done(made: Made) -> str:
-    took = f"{made.name}: {made.computed} of {made.runs} runs computed in {made.wall_s:.0f} s"
-    return f"{took}, {len(made.failed)} failed" if made.failed else took

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -119,7 +119,8 @@ def run(
     try:
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
-        error.add_note(_unwritten(files))
+        unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
+        error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise
     with bar("measuring"):
         summary = result.summary(recipe.metrics, [by])
@@ -149,9 +150,3 @@ def _refuse_sumo_options(given: Mapping[str, object]) -> None:
     if asked:
         need = "needs" if len(asked) == 1 else "need"
         raise InputError(f"{' and '.join(asked)} {need} --host sumo")
-
-
-def _unwritten(files: Sequence[Path]) -> str:
-    """Which files are missing after a collision has stopped the run, and how to get them."""
-    wrote = f"{', '.join(map(str, files))} not written; " if files else ""
-    return f"{wrote}--on-collision record notes collisions and goes on"

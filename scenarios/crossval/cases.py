@@ -135,10 +135,8 @@ def replayed_cases(
     """The published runs of these controllers, junctions, densities and splits; all where empty.
 
     Args:
-        names: of the junctions.
-        controllers: command-line names, of `PUBLISHED`.
-        densities: mean inflows a lane [veh/h].
-        splits: as the runs are labelled.
+        names, controllers: of junctions and controllers on the command line.
+        densities, splits: as the runs are labelled; densities are mean inflows a lane [veh/h].
         profile: None is each run's own vehicle, with the controller of the run; any other vehicle
             goes with the controller of that profile.
         horizon: simulated time [s].

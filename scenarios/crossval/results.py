@@ -41,24 +41,14 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a case gave.
-
-    Attributes:
-        case: that was run.
-        pairs: the seeds that both hosts finished.
-        collisions: in minisim and in SUMO, over all runs that ended well.
-        failures: the runs that failed.
-        sumo: version of SUMO, empty where it did not run.
-        parting: where a second, shorter run sees the hosts part; None where it sees no such
-            moment, or was not made.
-    """
+    """What a case gave."""
 
     case: Case
-    pairs: tuple[Pair, ...] = ()
-    collisions: tuple[int, int] = (0, 0)
+    pairs: tuple[Pair, ...] = ()  # the seeds that both hosts finished
+    collisions: tuple[int, int] = (0, 0)  # in minisim and in SUMO, over the runs that ended well
     failures: tuple[Failure, ...] = ()
-    sumo: str = ""
-    parting: Parting | None = None
+    sumo: str = ""  # its version; empty where it did not run
+    parting: Parting | None = None  # None where a second run saw none, or was not made
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

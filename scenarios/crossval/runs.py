@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run, ScenarioLike
 
-HOSTS: Final = ("minisim", "sumo")
+#: Host -> where its `simulate` is, imported when it is needed.
+HOSTS: Final = {"minisim": "minisim.simulation", "sumo": "minisim.sumo"}
 
 #: Folder of SUMO's kept runs, inside that of the report; they take nearly all the time.
 KEPT: Final = "sumo"
@@ -151,12 +152,7 @@ def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:
 
 
 def _host(name: str) -> Host:
-    if name == "sumo":
-        from minisim.sumo import simulate as simulate_in_sumo
-
-        return simulate_in_sumo
-    from minisim.simulation import simulate
-
+    simulate: Host = importlib.import_module(HOSTS[name]).simulate
     return simulate
 
 
@@ -204,12 +200,9 @@ def _parted(
 
 
 def _failures(made: Mapping[tuple[str, int], object], doing: str = "") -> tuple[Failure, ...]:
-    return tuple(
-        Failure(host, seed, f"{doing}{_reason(error)}")
-        for (host, seed), error in made.items()
-        if isinstance(error, BaseException)
-    )
-
-
-def _reason(error: BaseException) -> str:
-    return str(error) if isinstance(error, MinisimError) else f"{type(error).__name__}: {error}"
+    failures = []
+    for (host, seed), error in made.items():
+        if isinstance(error, BaseException):
+            kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+            failures.append(Failure(host, seed, f"{doing}{kind}{error}"))
+    return tuple(failures)

@@ -142,6 +142,7 @@ def sweep_table(cells: pd.DataFrame) -> Table:
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
         if cell["runs"]:
             collisions = int(cell["collisions"])
+            unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
             table.add_row(
                 *named,
                 cell["controller"],
@@ -149,15 +150,11 @@ def sweep_table(cells: pd.DataFrame) -> Table:
                 *(_interval(cell, metric) for metric in CELL_COLUMNS),
                 f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
                 Text(str(collisions), style="bold red" if collisions else ""),
-                Text(_settled(cell), style="yellow"),
+                Text(unsettled, style="yellow"),
             )
         else:
             table.add_row(*named, cell["controller"], f"0{failed}", style="red")
     return table
-
-
-def _settled(cell: Mapping[Hashable, Any]) -> str:
-    return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
 
 
 def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:

@@ -316,13 +316,12 @@ def test_animate_checks_before_it_simulates(
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", str(tmp_path))
     here = str(tmp_path)
-    assert ".gif, .mp4, .html" in fails(capsys, "animate", "four-way", "-o", f"{here}/film.avi")
-    assert "ffmpeg" in fails(capsys, "animate", "four-way", "-o", f"{here}/film.mp4")
-    missing = fails(capsys, "animate", "four-way", "-o", f"{here}/no/film.gif")
-    assert f"no folder {here}/no" in missing
-    for option, value in (("--fps", "11"), ("--start", "1e300"), ("--seconds", "1e300")):
-        message = fails(capsys, "animate", "four-way", "-o", f"{here}/f.gif", option, value)
-        assert option.lstrip("-") in message
+    for file, more, said in (
+        ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
+        ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
+        ("f.gif", ("--start", "1e300"), "start"), ("f.gif", ("--seconds", "1e300"), "seconds"),
+    ):  # fmt: skip
+        assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
     recorded = tmp_path / "f.gif"
     recorded.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
     again = f"{here}/../{tmp_path.name}/f.gif"
@@ -395,6 +394,7 @@ BAD = [
     (("run", "four-way", "--trips", str(ROOT)), "allowed"),
     (("run", "four-way", "--fcd", str(ROOT)), "allowed"),
     (("run", "four-way", "--fcd", "fcd.csv"), "allowed: .xml"),
+    (("run", "four-way", "--trips", "trips.csv", "--fcd", "none/fcd.xml"), "no folder"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
     (("decide", "four-way"), "MOVEMENTS"),
@@ -428,11 +428,7 @@ BAD = [
     (("sweep", "paper", "--seeds", "0"), "--seeds must be an integer 1"),
     (("sweep", "paper", "--seeds", "many"), "many"),
     (("sweep", "paper", "--horizon", "-5"), "--horizon [s] must be above 0"),
-    (("sweep", "paper", "--horizon", "nan"), "--horizon [s] must be above 0"),
-    (
-        ("sweep", "paper", "--horizon", "inf"),
-        "--horizon [s] must be above 0 and at most 1e+07, got inf",
-    ),
+    (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
     (("sweep", "paper", "--export", "missing/rows.csv"), "there is no folder"),
@@ -447,20 +443,13 @@ BAD = [
     (("reproduce", "--seeds", "1"), "seeds must be an integer"),
     (("reproduce", "--jobs", "0"), "--jobs must be an integer 1 … 1024, got 0"),
     (("reproduce", "--only", "fare"), "did you mean 'fair'"),
-    (
-        (
-            "crossval",
-            "four-wy",
-        ),
-        "unknown scenario",
-    ),
+    (("crossval", "four-wy"), "unknown scenario"),
     (("crossval", "-c", "dm"), "did you mean 'dim'"),
     (("crossval", "-d", "-5"), "-5"),
     (("crossval", "--split", "4:x"), "4:x"),
     (("crossval", "-p", "fare"), "did you mean 'fair'"),
     (("crossval", "--seeds", "0"), "--seeds"),
     (("crossval", "--jobs", "0"), "--jobs"),
-    (("crossval", "--horizon", "-1"), "horizon"),
     (("crossval", "--horizon", "0"), "horizon"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
@@ -486,12 +475,6 @@ def test_broken_arrivals_name_the_line(capsys: pytest.CaptureFixture[str], tmp_p
     arrivals = tmp_path / "arrivals.csv"
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
     assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
-
-
-def test_one_bad_output_writes_none(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    good, bad = tmp_path / "trips.csv", tmp_path / "none" / "fcd.xml"
-    fails(capsys, "run", "four-way", *SHORT, "--trips", str(good), "--fcd", str(bad))
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -84,14 +84,6 @@ def pair(seed: int = 1, waiting_sumo: Sequence[float] = (0, 1, 2, 3.5)) -> Pair:
 # --- statistics ------------------------------------------------------------------------------
 
 
-def test_ks_distance_of_shifted_steps() -> None:
-    """0 … 9 against the same plus k: k of 10 lie beyond, so the distance is k/10."""
-    sample = np.arange(10.0)
-    for k in range(11):
-        assert ks_distance(sample, sample + k) == pytest.approx(k / 10.0)
-    assert ks_distance([0.0], [0.0, 1.0, 2.0, 3.0]) == 0.75
-
-
 @given(
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
@@ -315,15 +307,6 @@ def test_replays_are_judged_by_the_papers_means() -> None:
     assert "Against the paper" not in markdown([drawn], "x", {})
 
 
-def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
-    case = Case(four_way(150, profile="fair"), "dim")
-    frame = table([result(case, pair(1), pair(2))])
-    assert len(frame) == 5 * len(MEANS)
-    assert frame["error"].isna().all()
-    row = frame[(frame["lane"] == "all") & (frame["metric"] == "waiting_time_s")].iloc[0]
-    assert (row["seeds"], row["trips_minisim"], row["trips_sumo"]) == (2, 8, 6)
-
-
 def test_a_run_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def die(*_: object, **__: object) -> None:
         raise SumoError("SUMO's process died | after 3.0 s")
@@ -445,14 +428,6 @@ def test_means_are_drawn_over_density() -> None:
 
 
 # --- command line ----------------------------------------------------------------------------
-
-
-def test_a_file_in_place_of_the_folder_is_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    (tmp_path / "afile").write_text("")
-    assert main(["crossval", "--quick", "--out", str(tmp_path / "afile")]) == 2
-    assert "afile: it is a file" in capsys.readouterr().err
 
 
 def test_without_sumo_the_install_command_is_told(
