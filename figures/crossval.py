@@ -35,7 +35,10 @@ TAIL: Final = 0.995
 
 
 def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figure]]:
-    """Every figure of a comparison: name of its file, caption, and the figure itself."""
+    """Every figure of a comparison: name of its file, caption, and the figure itself.
+
+    All densities of a junction, split and controller are drawn together.
+    """
     groups: dict[tuple[str, ...], list[Result]] = {}
     for result in results:
         if result.rows:
@@ -55,11 +58,7 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
 
 
 def means_figure(results: Sequence[Result]) -> Figure:
-    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's.
-
-    Args:
-        results: of one junction, split and controller, by density.
-    """
+    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's."""
     figure = style.new_figure(8.6, 4.0)
     panels = figure.subplots(1, len(JUDGED))
     figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
@@ -90,11 +89,7 @@ def means_figure(results: Sequence[Result]) -> Figure:
 
 
 def trips_figure(results: Sequence[Result]) -> Figure:
-    """Distributions of both hosts above, the same trip in both below; one column a density.
-
-    Args:
-        results: of one junction, split and controller, by density.
-    """
+    """Distributions of both hosts above, the same trip in both below; one column a density."""
     columns = len(results)
     figure = style.new_figure(max(6.4, 2.7 * columns + 0.9), 7.6)
     panels = figure.subplots(3, columns, squeeze=False)
@@ -243,7 +238,6 @@ def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
 
 
 def _group(result: Result) -> tuple[str, ...]:
-    """What is drawn together: all densities of a junction, split and controller."""
     return result.case.scenario.name, result.case.split, result.case.controller
 
 

@@ -112,23 +112,20 @@ def crossval(
     if replay:
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
+        densities, splits = (QUICK_DENSITIES, ["balanced"]) if quick else ([], [])
         cases = replayed_cases(
-            scenarios or [],
-            controller or ["dim"],
-            density or (QUICK_DENSITIES if quick else []),
-            split or (["balanced"] if quick else []),
-            profile,
-            horizon,
-        )
+            scenarios or [], controller or ["dim"], density or densities, split or splits,
+            profile, horizon,
+        )  # fmt: skip
     else:
-        cells = product(
-            scenarios or ["four-way"],
-            split or ["balanced"],
-            controller or CONTROLLERS,
-            density or (QUICK_DENSITIES if quick else DENSITIES),
+        make = partial(
+            scenario_named, profile="fair" if profile is None else profile, horizon=horizon
         )
-        named = partial(scenario_named, profile=profile or "fair", horizon=horizon)
-        cases = [Case(named(name, density=q, split=s), who) for name, s, who, q in cells]
+        cells = product(
+            scenarios or ["four-way"], split or ["balanced"], controller or CONTROLLERS,
+            density or (QUICK_DENSITIES if quick else DENSITIES),
+        )  # fmt: skip
+        cases = [Case(make(name, density=q, split=shares), who) for name, shares, who, q in cells]
     if seeds is None:
         seeds = 2 if quick else 3
     numbers = range(1, 1 + integer("--seeds", seeds, low=1, high=1000))
@@ -168,12 +165,9 @@ def _command(context: typer.Context) -> str:
     words = ["minisim", "crossval"]
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
-        if not value or parameter.name in ("jobs", "out"):
-            continue
-        option = [parameter.opts[0]] if parameter.param_type_name == "option" else []
-        if value is True:
-            words += option
-            continue
-        for item in value if isinstance(value, list | tuple) else [value]:
-            words += [*option, f"{item:g}" if isinstance(item, float) else str(item)]
+        if value and parameter.name not in ("jobs", "out"):
+            flag = parameter.opts[:1] if parameter.param_type_name == "option" else []
+            for item in value if isinstance(value, list | tuple) else [value]:
+                shown = f"{item:g}" if isinstance(item, float) else str(item)
+                words += flag if item is True else [*flag, shown]
     return shlex.join(words)

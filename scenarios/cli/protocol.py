@@ -83,8 +83,8 @@ def protocol(
     what, matrix = junction(scenario, bearings, side, profile)
     if matrix.n > MAX_ARMS:
         raise InputError(
-            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and with "
-            "them too many states"
+            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and too many "
+            "states"
         )
     rules = Protocol(matrix, order, gate, commit, priorities)
     with bar("visiting all states") as progress:
@@ -93,10 +93,7 @@ def protocol(
     if counterexample is not None:
         _write_counterexample(what, search, counterexample)
     facts = {
-        "scenario": what.name,
-        "order": order,
-        "gate": gate,
-        "commit": commit,
+        "scenario": what.name, "order": order, "gate": gate, "commit": commit,
         "priorities": priorities,
         "states": search.states,
         "transitions": search.transitions,
@@ -107,7 +104,7 @@ def protocol(
             ARM_NAMES[k]: lasso and {"stem": names(lasso.stem), "cycle": names(lasso.cycle)}
             for k, lasso in enumerate(lassos)
         },
-    }
+    }  # fmt: skip
     answer(as_json, facts, protocol_text(what.name, search, lassos), wrote=counterexample)
     if search.unsafe or search.stuck is not None:
         raise typer.Exit(1)

@@ -129,10 +129,8 @@ def first_divergence(pair: Pair) -> Divergence | None:
 def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
     """The first of the common moments at which a vehicle's positions are more than `APART` apart.
 
-    If several vehicles are at that moment, it is the one that is farthest apart.
-
-    Args:
-        minisim, sumo: trajectories of the same run (`Run.trajectories`).
+    If several vehicles are at that moment, it is the one that is farthest apart. Both frames are
+    trajectories of the same run (`Run.trajectories`).
     """
     both = minisim.merge(sumo, on=[TIME, VEHICLE], suffixes=("", "_sumo"))
     both["apart"] = (both[S] - both[f"{S}_sumo"]).abs()

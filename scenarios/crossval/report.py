@@ -26,16 +26,13 @@ NOTHING: Final = "–"
 def write_report(
     results: Sequence[Result], folder: Path, command: str, figures: Mapping[str, str]
 ) -> None:
-    """Write both files, each whole or not at all.
+    """Write both files, each whole or not at all; raises `FileError`.
 
     Args:
         results: of the comparison.
         folder: to write to; the figures are already there.
         command: that makes the report again.
         figures: file name -> caption.
-
-    Raises:
-        FileError: a file cannot be written.
     """
     write_table(table(results), folder / CSV)
     write_text(folder / REPORT, markdown(results, command, figures))
@@ -132,8 +129,7 @@ def _rows(result: Result) -> Iterator[dict[str, Any]]:
 
 def _tolerances() -> tuple[str, ...]:
     hosts = ", ".join(
-        f"mean {JUDGED[metric].lower()} {tolerance}"
-        for metric, tolerance in HOST_TOLERANCES.items()
+        f"mean {JUDGED[name].lower()} {tolerance}" for name, tolerance in HOST_TOLERANCES.items()
     )
     return (
         "Means are over the trips that ended before the horizon, as SUMO and the paper count them; "
@@ -174,11 +170,7 @@ def _verdicts(results: Sequence[Result]) -> str:
 def _means(results: Sequence[Result], metric: str) -> str:
     return markdown_table(
         ("cell", "minisim", "SUMO", "difference", "KS", "published"),
-        (
-            (result.case.name, *_cells(result.case, result.row(metric)))
-            for result in results
-            if result.rows
-        ),
+        ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows),
     )
 
 
@@ -229,11 +221,8 @@ def _lanes(results: Sequence[Result]) -> str:
 
 
 def _cells(case: Case, row: Row) -> tuple[str, ...]:
-    return (
-        *map(_interval, (row.minisim, row.sumo, row.difference)),
-        _number(row.ks, 3),
-        _number(_published(case, row)),
-    )
+    means = map(_interval, (row.minisim, row.sumo, row.difference))
+    return *means, _number(row.ks, 3), _number(_published(case, row))
 
 
 def _published(case: Case, row: Row) -> float | None:
@@ -265,22 +254,15 @@ def _partings(results: Sequence[Result]) -> str:
 
 
 def _trip(first: Divergence) -> tuple[str, ...]:
-    return (
-        str(first.seed),
-        f"vehicle {first.vehicle} ({first.movement}), on the road from {first.depart:.2f} s",
-        _both(first.waiting),
-        _both(first.travel),
-    )
+    which = f"vehicle {first.vehicle} ({first.movement}), on the road from {first.depart:.2f} s"
+    return str(first.seed), which, _both(first.waiting), _both(first.travel)
 
 
 def _moment(parting: Parting | None) -> tuple[str, ...]:
     if parting is None:
         return NOTHING, NOTHING, NOTHING
-    return (
-        f"vehicle {parting.vehicle} ({parting.movement}) at {parting.time:.2f} s",
-        _both(parting.positions),
-        _both(parting.speeds),
-    )
+    which = f"vehicle {parting.vehicle} ({parting.movement}) at {parting.time:.2f} s"
+    return which, _both(parting.positions), _both(parting.speeds)
 
 
 def _both(values: tuple[float, float]) -> str:

@@ -63,8 +63,7 @@ def crossvalidate(
     Replays have one run: their arrivals are not drawn.
 
     Args:
-        cases, seeds: what to run.
-        jobs: processes.
+        cases, seeds, jobs: what to run, and in how many processes.
         progress: called with the number of runs done and of all.
         folder: where SUMO's runs are kept and looked for; None runs them all.
     """

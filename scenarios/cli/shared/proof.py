@@ -92,17 +92,16 @@ def analysis_text(analysis: Analysis) -> Text:
     """Sizes, ties and the worst cases."""
     from dim.proofs.verification import most_cliques
 
-    text = Text()
     sizes = "  ".join(f"{size}: {cases}" for size, cases in analysis.sizes.items())
     ties = "  ".join(f"{tied}: {cases}" for tied, cases in analysis.ties.items())
     share = analysis.tied / analysis.cases
-    text.append("cases by vehicles that go    ", "dim").append(f"{sizes}\n")
-    text.append("cases by largest cliques     ", "dim").append(f"{ties}\n")
-    text.append("cases with a tie             ", "dim").append(f"{analysis.tied} ({share:.0%})\n")
-    text.append("worst case                   ", "dim").append(
-        f"{analysis.most_tied} cliques tie "
-        f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})"
-    )
+    text = Text.assemble(
+        ("cases by vehicles that go    ", "dim"), f"{sizes}\n",
+        ("cases by largest cliques     ", "dim"), f"{ties}\n",
+        ("cases with a tie             ", "dim"), f"{analysis.tied} ({share:.0%})\n",
+        ("worst case                   ", "dim"), f"{analysis.most_tied} cliques tie "
+        f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
+    )  # fmt: skip
     for size, (first, count) in analysis.worst.items():
         cases = "1 case" if count == 1 else f"{count} cases"
         text.append(f"\n{'':29}of size {size}: {cases}, such as {_spaced(first)}")

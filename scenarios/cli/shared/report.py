@@ -34,11 +34,7 @@ def run_parts(
 ) -> Iterator[Text | Table]:
     """What was run, its table, and what has one number a run.
 
-    Args:
-        summary: of the run.
-        metrics: that were asked for.
-        by: one of `GROUPS`, a line of the table for each.
-        counts: what wrong perception did, where it was counted (`dim.senses.tally`).
+    The counts are those of `dim.senses.tally`: what wrong perception did.
     """
     yield Text.assemble(
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
