@@ -42,7 +42,7 @@ def animate(
     seed: options.Seed = 0,
     arrivals: options.Arrivals = None,
 ) -> None:  # fmt: skip
-    """Write an animation: who waits, who has the right of way, who crosses."""
+    """Write an animation: which vehicles wait, have the right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file

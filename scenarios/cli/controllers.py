@@ -13,9 +13,6 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import show_json
 
-#: Columns of the terminal.
-WIDTH = 80
-
 
 @app.command(
     epilog="Give parameters as in -c dim:gate=harmonious,monitor=on. A controller of your own "
@@ -97,4 +94,4 @@ def _show_parameters(parameters: list[dict[str, Any]]) -> None:
 
 
 def _wrapped(text: str, indent: int) -> str:
-    return textwrap.fill(text, WIDTH, subsequent_indent=" " * indent, break_long_words=False)
+    return textwrap.fill(text, 80, subsequent_indent=" " * indent, break_long_words=False)

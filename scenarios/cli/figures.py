@@ -16,7 +16,7 @@ from scenarios.cli.shared.terminal import bar, show
 
 @app.command(
     epilog="A figure of results needs runs in a store; [bold]minisim reproduce[/bold] makes them. "
-    "What a figure lacks, its small print says.\n\n"
+    "The small print of a figure says which runs it lacks.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim figures --list\n\n"
     "minisim figures maps worst-case webster --out figures\n\n"

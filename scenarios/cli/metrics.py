@@ -6,13 +6,13 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import show, show_json
 
-#: What is said of a metric.
+#: What is printed about a metric.
 SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation", "usual")
 
 
 @app.command(
     epilog="Means are over the trips that ended before the horizon, as SUMO and the paper count "
-    "them; complete means count the others up to there, too.\n\n"
+    "them; complete means also count the others, up to the horizon.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim metrics --json\n\n"
     "minisim run four-way --metrics waiting_time_s,max_drac_mps2 --by movement"

@@ -24,7 +24,7 @@ MAX_ARMS = 4
 
 
 @app.command(
-    epilog="Exit code 1 where the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
+    epilog="Exit code 1 if the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
     "--priorities rotating or waiting two minutes and a gigabyte.\n\n[bold]Examples[/bold]\n\n"
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
@@ -63,7 +63,7 @@ def protocol(
         Path | None,
         typer.Option(
             metavar="FILE.csv",
-            help="Where it is unsafe: write arrivals with which simulated vehicles collide.",
+            help="If it is unsafe: write arrivals with which simulated vehicles collide.",
         ),
     ] = None,
     bearings: options.Bearings = None,

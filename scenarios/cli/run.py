@@ -14,8 +14,6 @@ from scenarios.cli.shared.app import app
 from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
 from scenarios.cli.shared.terminal import bar, show, show_json
 
-HOSTS = ("minisim", "sumo")
-
 
 def _file(help: str) -> Any:
     return typer.Option(metavar="FILE", rich_help_panel=options.FILES, help=help)
@@ -99,7 +97,7 @@ def run(
             check_file(xml, ".xml")
     asked = asked_metrics([] if metrics is None else [name.strip() for name in metrics.split(",")])
     choice("--by", by, GROUPS)
-    if choice("host", host, HOSTS) == "minisim":
+    if choice("host", host, ("minisim", "sumo")) == "minisim":
         _refuse_sumo_options({
             "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
             "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",

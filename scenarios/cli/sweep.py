@@ -23,19 +23,17 @@ if TYPE_CHECKING:
     from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
-#: Key of a file -> its value where it is left out, as `scenarios.sweep.file` has it.
+#: Key of a file -> the default that `scenarios.sweep.file` gives it.
 DEFAULTS = {
     "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
     "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
     "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
 }  # fmt: skip
-#: A junction of one's own, as a file has it, and how the help shows brackets.
+#: A junction of your own, as it is written in a file, and how brackets are escaped in the help.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
 PLAIN = str.maketrans({"[": r"\["})
 LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
-#: The study that is the paper's grid as its text prescribes it.
-PAPER = {"paper": "text"}
 #: Studies that are lists of experiments.
 STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
 
@@ -134,9 +132,9 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
     """Those of a study or of a file; a word without a suffix that is no file names a study."""
     from scenarios.sweep.file import check_can_run, read_experiments
 
-    studies = (*PAPER, *STUDIES)
+    studies = ("paper", *STUDIES)
     if what in studies or not (Path(what).suffix or Path(what).exists()):
-        study = study_named(PAPER.get(what, choice("study", what, studies)))
+        study = study_named("text" if what == "paper" else choice("study", what, studies))
         runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
         recipes = [recipe for _, recipe in runs]
     else:
@@ -149,7 +147,7 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
 def _run(
     experiments: list[Recipe], executor: Executor | None, jobs: int, store: Store, out: Path
 ) -> pd.DataFrame:
-    """The rows in the order of the experiments, with a bar that tells of failures."""
+    """The rows in the order of the experiments, with a bar that counts failures."""
     import pandas as pd
 
     from scenarios.sweep.keys import key_of

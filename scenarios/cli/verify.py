@@ -11,7 +11,7 @@ from scenarios.cli.shared.terminal import bar
 
 
 @app.command(
-    epilog="Exit code 1 where a claim is false. 6 arms take about 20 s.\n\n"
+    epilog="Exit code 1 if a claim is false. 6 arms take about 20 s.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim verify four-way\n\n"
     "minisim verify five-way --order lanes --plot verification.png"
@@ -25,7 +25,7 @@ def verify(
     plot: Plot = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Try every case that a junction can decide: the paper's claims, one by one."""
+    """Check the paper's claims one by one, in every case that can occur at a junction."""
     from dim.proofs.verification import analyse, most_cliques
 
     what, matrix = junction(scenario, bearings, side, profile)

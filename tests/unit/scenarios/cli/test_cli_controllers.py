@@ -1,4 +1,4 @@
-"""`minisim controllers`, and `-c` with a controller of one's own."""
+"""`minisim controllers`, and `-c` with a controller of your own."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ def test_it_lists_the_parameters_of_each(capsys: pytest.CaptureFixture[str], nam
 def test_nested_recipes_are_listed_too(capsys: pytest.CaptureFixture[str]) -> None:
     text = ok(capsys, "controllers", "dim")
     assert "perception=noisy: " in text
+    assert ok(capsys, "controllers", "dim:gate=harmonious").split()[1:] == text.split()[1:]
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
 
-def test_a_class_of_ones_own(
+def test_a_class_of_your_own(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -124,7 +124,7 @@ def test_the_extra_is_named_where_it_is_missing(
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
-def test_whoever_is_ended_leaves_a_store_and_says_how_to_go_on(
+def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
     number: signal.Signals, code: int, word: str, tmp_path: Path
 ) -> None:
     file, path = tmp_path / "e.toml", tmp_path / "s.db"

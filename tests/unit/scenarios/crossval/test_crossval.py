@@ -106,14 +106,14 @@ def test_ks_distance_needs_numbers(bad: object) -> None:
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
     rows = {(row.lane, row.metric): row for row in compare([pair()], 3)}
     assert set(rows) == {(lane, metric) for lane in ("all", "a", "b", "c") for metric in MEANS}
-    everyone = rows["all", "waiting_time_s"]
-    assert everyone.trips == (4, 3)
-    assert everyone.minisim.mean == pytest.approx(1.5)
-    assert everyone.sumo.mean == pytest.approx((0 + 1 + 3.5) / 3)
-    assert everyone.difference.mean == pytest.approx(0.0)
-    assert math.isnan(everyone.difference.half_width), "one seed tells no spread"
-    assert everyone.ks == pytest.approx(1 / 3), "at 3: 4 of 4 against 2 of 3"
-    assert everyone.within == pytest.approx(3 / 4), "the third waited 2 s so far in both"
+    overall = rows["all", "waiting_time_s"]
+    assert overall.trips == (4, 3)
+    assert overall.minisim.mean == pytest.approx(1.5)
+    assert overall.sumo.mean == pytest.approx((0 + 1 + 3.5) / 3)
+    assert overall.difference.mean == pytest.approx(0.0)
+    assert math.isnan(overall.difference.half_width), "one seed tells no spread"
+    assert overall.ks == pytest.approx(1 / 3), "at 3: 4 of 4 against 2 of 3"
+    assert overall.within == pytest.approx(3 / 4), "the third waited 2 s so far in both"
     assert rows["a", "travel_time_s"].within == pytest.approx(1 / 2), "the third is far apart"
     assert rows["b", "travel_time_s"].difference.mean == pytest.approx((0.05 + 1.0) / 2)
     empty = rows["c", "travel_time_s"]
