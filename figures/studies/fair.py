@@ -45,7 +45,7 @@ def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
     Raises:
         MissingRunsError: no pair has two demands in common.
     """
-    known = losses(results.good)
+    known = {} if results.good.empty else losses(results.good)
     if not known:
         raise MissingRunsError(
             "the store has no two demands at which DIM and another controller ran with two common "
