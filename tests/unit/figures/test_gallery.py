@@ -91,8 +91,7 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
 
 
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
-    needed = {need for item in GALLERY.values() for need in item.needs}
-    assert needed == set(NAMES)
+    assert {need for item in GALLERY.values() for need in item.needs} == set(NAMES)
 
 
 def test_the_study_of_the_guide_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
