@@ -67,7 +67,6 @@ def reproduce(
     if store is not None and store.exists():
         Store(store, create=False).close()  # a wrong one is refused before a folder is made
     folder = make_folder(out)
-    pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
         made = []
         for name in names:
@@ -79,10 +78,9 @@ def reproduce(
             typer.echo(f"{name}: {took}{failed}", err=True)
         with bar("drawing") as progress:
             files = write_report(
-                Archive(find_in(rows), effort), made, workers, folder, pictures, progress,
-                parts=names,
-            )  # fmt: skip
-    typer.echo(f"wrote {files} figures and tables to {pictures}")
+                Archive(find_in(rows), effort), made, workers, folder, progress, parts=names
+            )
+    typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
     broken = sum(len(part.failed) for part in made)
     if broken:

@@ -1,4 +1,4 @@
-"""Experiments on wrong perception: what is asked for, what is counted, and how sure a rate is."""
+"""Wrong perception: the collision of the docs, what a run counts, and intervals of rates."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ WRONG = NoisyPerception(0.15)
      (100, 81.364, 121.627)],
 )  # fmt: skip
 def test_poisson_interval_of_the_tables(count: int, low: float, high: float) -> None:
-    """Garwood's limits, from tables of χ²: χ²(2k; 0.025)/2 and χ²(2k+2; 0.975)/2."""
+    """Garwood's limits from tables of χ²: χ²(2k; 0.025)/2 and χ²(2k+2; 0.975)/2."""
     assert poisson_interval(count) == pytest.approx((low, high), abs=5e-4)
 
 
 def test_poisson_interval_by_its_definition() -> None:
-    """At the upper limit so few events have probability 0.05, at the lower so many."""
+    """7 events or fewer have probability 0.05 at the upper limit, 7 or more at the lower one."""
     low, high = poisson_interval(7, 0.9)
 
     def at_most(k: int, mean: float) -> float:
@@ -46,7 +46,7 @@ def test_poisson_interval_by_its_definition() -> None:
 
 
 def test_the_collision_that_docs_explain() -> None:
-    """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
+    """docs/safety.md, "Wrong perception": all vehicles but c3 itself take it for c2."""
     scenario = four_way(250, profile="fair")
     with pytest.raises(CollisionError) as caught:
         simulate(scenario, Dim(perception=WRONG), 1)
@@ -68,7 +68,7 @@ def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
     assert main([*RUN, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)"]) == 0
     assert "false grants" in capsys.readouterr().out
     assert main([*RUN, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["crossings"] >= found["trips"] - found["unfinished"]
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["crossings"] >= summary["trips"] - summary["unfinished"]
     assert main(RUN) == 0
     assert "false grants" not in capsys.readouterr().out
