@@ -2,9 +2,9 @@
 
 Beside this room, `dim` and `baselines` may look into `minisim.junction` (geometry, conflicts,
 movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
-and what they refuse), `minisim.streams` (random numbers), and `minisim.carfollowing` with
-`minisim.jit` (equations, for those that predict). None of these leads to the engine room, to the
-hosts or to the results; `make lint` proves it.
+and what they refuse), `minisim.files` (writers), `minisim.streams` (random numbers), and
+`minisim.carfollowing` with `minisim.jit` (equations, for those that predict). None of these leads
+to the engine room, to the hosts or to the results; `make lint` proves it.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.

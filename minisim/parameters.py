@@ -27,7 +27,7 @@ from functools import cache
 from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
 
-from minisim.errors import choice, instance, integer, number, numbers, show
+from minisim.errors import InputError, choice, instance, integer, number, numbers, show
 
 _T = TypeVar("_T")
 
@@ -170,19 +170,23 @@ def reals(
     *,
     low: float = -math.inf,
     high: float = math.inf,
+    count: int | None = None,
     optional: bool = False,
     label: str = "",
     default: Any = MISSING,
 ) -> Any:
-    """Any sequence of finite numbers in [low, high], kept as a tuple."""
+    """Any sequence of finite numbers in [low, high], or of so many, kept as a tuple."""
 
     def check(title: str, value: Any) -> Any:
         found = numbers(title, value)
+        if count not in (None, len(found)):
+            raise InputError(f"{title} must be {count} numbers, got {found}")
         for i, one in enumerate(found):
             number(f"{title}[{i}]", one, low=low, high=high)
         return found
 
     allowed = "numbers" if _range(low, high) == "number" else f"numbers {_range(low, high)}"
+    allowed = allowed if count is None else f"{count} {allowed}"
     return _field(meaning, unit, allowed, label, check, optional, default)
 
 

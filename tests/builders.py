@@ -16,6 +16,7 @@ import numpy as np
 from hypothesis import settings
 
 from dim import Dim, NoisyPerception
+from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Command,
@@ -127,6 +128,33 @@ def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0
     return Observed(id, lane, manoeuvre, distance, speed, 5.0)
 
 
+def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
+    """A vehicle by the name of its movement, such as a1."""
+    return seen(id, ARM_NAMES.index(movement[0]), int(movement[1]), distance, speed)
+
+
+def view(*vehicles: Observed, time: float = 0.0) -> View:
+    """These vehicles, by lane and front to back."""
+    return View(time, tuple(sorted(vehicles, key=lambda v: (v.lane, v.distance))))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A perception that errs in intents as told.
+
+    Attributes:
+        read: a view, an ego and a vehicle -> the manoeuvre that the ego reads.
+    """
+
+    read: Callable[[View, Observed, Observed], int]
+    period: float | None = 0.1
+
+    def start(self, site: Site) -> See:
+        return lambda view, ego: view._replace(
+            vehicles=tuple(v._replace(manoeuvre=self.read(view, ego, v)) for v in view.vehicles)
+        )
+
+
 def said(commands: Iterable[Command]) -> list[str]:
     """Commands in words; as a reader would say it."""
     return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
@@ -178,7 +206,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
     # The studies of perception name what errs, not a series; that of humans their share.
-    label, _, share = (experiment.label or "dim").partition("-humans-")
+    label, _, share = (experiment.label or "dim").partition("+humans=")
     base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)

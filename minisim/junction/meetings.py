@@ -1,13 +1,14 @@
 """Where two ways through a junction meet, as SUMO sees it.
 
-SUMO's vehicles follow not only the vehicle ahead, but also those that are about to join their way
-inside the junction or have just left it. This is the table of those places: for every two
-movements, how far before the end of its own way each of them is when it meets the other.
+SUMO's vehicles follow not only the vehicle ahead, but also vehicles that are about to join their
+way inside the junction or have just left it. For every two movements, this is the distance from
+the place where their ways meet to the end of each way.
 Source: `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.28).
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from enum import IntEnum
 from typing import NamedTuple
@@ -16,7 +17,7 @@ import numpy as np
 import shapely
 
 from minisim.junction.geometry import Intersection
-from minisim.junction.paths import Floats, Path, distances_along
+from minisim.junction.paths import Floats, distances_along
 from minisim.junction.turns import Turn, turns
 
 #: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
@@ -40,94 +41,65 @@ def meetings(intersection: Intersection) -> Floats:
     `[p, q]` holds the kind (`Meeting`) and the distance on way p from where it meets way q to the
     junction exit [m].
     """
-    curves = [_Curve.of(path, intersection) for path in intersection.paths]
-    table = np.zeros((len(curves), len(curves), 2))
-    for p, (path, curve) in enumerate(zip(intersection.paths, curves, strict=True)):
-        for q, (rival, other) in enumerate(zip(intersection.paths, curves, strict=True)):
-            if p == q:
-                continue
-            if path.movement.origin == rival.movement.origin:
-                table[p, q] = _part(curve, other)
-            elif path.exit_arm == rival.exit_arm:
-                table[p, q] = _join(curve.behind_wait, other.behind_wait)
+    curves, paths = _curves(intersection), intersection.paths
+    table = np.zeros((len(paths), len(paths), 2))
+    for p, q in itertools.permutations(range(len(paths)), 2):
+        (way, end), (other, other_end) = curves[p], curves[q]
+        if paths[p].movement.origin == paths[q].movement.origin:
+            table[p, q] = Meeting.PART, max(way.length - _parted(way, other) * way.scale, 0.0)
+        elif paths[p].exit_arm == paths[q].exit_arm:
+            backwards = [_Curve(curve.points[::-1], curve.length) for curve in (end, other_end)]
+            table[p, q] = Meeting.JOIN, _parted(*backwards) * end.scale
     return table
 
 
 class _Curve(NamedTuple):
-    """A way or its second part: polyline, driven length and waiting position [m].
+    """A way or a part of it: its polyline and the length that a vehicle drives on it [m].
 
     The polyline's own length may differ a little: SUMO rounds lengths, and scales positions.
     """
 
     points: Floats
     length: float
-    wait: float = 0.0
-
-    @classmethod
-    def of(cls, path: Path, intersection: Intersection) -> _Curve:
-        """The given curve where there is one, else the arc."""
-        if intersection.ways is None:
-            return cls(path.points, path.crossing)
-        way = intersection.ways[intersection.index(path.movement)]
-        return cls(np.asarray(way.points, dtype=float), path.crossing, way.wait)
-
-    @property
-    def distances(self) -> Floats:
-        """Of the points along the polyline [m]."""
-        return distances_along(self.points)
-
-    @property
-    def line(self) -> shapely.LineString:
-        """The polyline for shapely."""
-        return shapely.LineString(self.points)
 
     @property
     def scale(self) -> float:
         """Driven length over the polyline's."""
-        return self.length / float(self.distances[-1])
-
-    @property
-    def backwards(self) -> _Curve:
-        """The same from its end."""
-        return self._replace(points=self.points[::-1])
-
-    @property
-    def behind_wait(self) -> _Curve:
-        """What lies behind the waiting position, a point of the polyline: what others can meet."""
-        if self.wait == 0.0:
-            return self
-        k = int(np.argmin(np.abs(self.distances - self.wait)))
-        return _Curve(self.points[k:], self.length - self.wait)
+        return self.length / float(distances_along(self.points)[-1])
 
 
-Place = tuple[int, float]
+def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
+    """Each way, and its part behind the waiting position, a point of the polyline.
 
-
-def _part(way: _Curve, other: _Curve) -> Place:
-    apart = _parted(way, other) * way.scale
-    return Meeting.PART, max(way.length - apart, 0.0)
-
-
-def _join(way: _Curve, other: _Curve) -> Place:
-    return Meeting.JOIN, _parted(way.backwards, other.backwards) * way.scale
+    Only that part can meet a way that joins.
+    """
+    if intersection.ways is None:
+        return [(_Curve(path.points, path.crossing),) * 2 for path in intersection.paths]
+    curves = []
+    for path, way in zip(intersection.paths, intersection.ways, strict=True):
+        points = np.asarray(way.points, dtype=float)
+        k = int(np.argmin(np.abs(distances_along(points) - way.wait)))
+        length = path.crossing
+        curves.append((_Curve(points, length), _Curve(points[k:], length - way.wait)))
+    return curves
 
 
 def _parted(one: _Curve, two: _Curve) -> float:
-    """Distance along two curves with one beginning to where both are `DIVERGED` [m]."""
-    near = max(_until_apart(one, two), _until_apart(two, one))
-    return min(near, float(one.distances[-1]), float(two.distances[-1]))
+    """Distance along two curves with one beginning to where they part [m]."""
+    ends = [float(distances_along(curve.points)[-1]) for curve in (one, two)]
+    return min(max(_until_apart(one, two), _until_apart(two, one)), *ends)
 
 
 def _until_apart(curve: _Curve, other: _Curve) -> float:
-    """Distance along the curve to where it stays `DIVERGED` from the other [m]."""
-    gaps = np.asarray(shapely.distance(shapely.points(curve.points), other.line))
-    at = curve.distances
-    rounding = curve.length - float(at[-1])
+    """Distance along a curve to where it stays `DIVERGED` from the other [m]."""
+    line = shapely.LineString(other.points)
+    gaps = np.asarray(shapely.distance(shapely.points(curve.points), line))
+    at = distances_along(curve.points)
     k = int(np.flatnonzero(gaps <= DIVERGED)[-1])
     if k == len(at) - 1:
         return curve.length
     share = (DIVERGED - gaps[k]) / (gaps[k + 1] - gaps[k])
-    return float(at[k] + share * (at[k + 1] - at[k])) + rounding
+    return float(at[k] + share * (at[k + 1] - at[k])) + (curve.length - float(at[-1]))
 
 
 def sagittas(intersection: Intersection, length: float) -> Floats:

@@ -1,6 +1,6 @@
 """Paths through a junction, and bodies on them.
 
-`s` is how far a vehicle's front bumper has come on its path [m], from the start of its road.
+`s` is the distance of a vehicle's front bumper from the start of its road, along its path [m].
 """
 
 from __future__ import annotations
@@ -19,25 +19,18 @@ from minisim.vehicle import VehicleType
 
 Floats = npt.NDArray[np.float64]
 
-#: Segments of the polyline of an arc; the chord error at radius 5.6 m is 4 mm.
+#: Segments of an arc's polyline; the chord error at radius 5.6 m is 4 mm.
 ARC_SEGMENTS = 32
 
 
-class Size(NamedTuple):
-    """What geometry needs to know of a vehicle [m]."""
-
-    length: float
-    width: float
-
-
 class Way(NamedTuple):
-    """A given curve through the junction.
+    """Another simulator's curve through the junction.
 
     Attributes:
         points: x, y of its polyline from entry to exit [m].
-        length: what a vehicle drives on it [m]; simulators round.
-        wait: from the entry to the waiting position inside the junction that SUMO gives to some
-            far turns [m]; 0 where there is none.
+        length: what a vehicle drives on it [m]; simulators round it.
+        wait: distance from the entry to the waiting position inside the junction, which SUMO gives
+            to some far turns [m]; 0 where there is none.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -53,22 +46,21 @@ class Way(NamedTuple):
 
 
 def distances_along(points: Floats) -> Floats:
-    """How far along a polyline each of its points is [m], shape (points,)."""
+    """Distance of each point from the start of a polyline, along it [m], shape (points,)."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The whole way of one movement: approach lane, arc, exit lane.
+    """The path of one movement: approach lane, arc, exit lane.
 
     Attributes:
-        movement: what this is the path of.
-        exit_arm: index of the arm it leaves by.
+        movement, exit_arm: the movement, and the index of the arm that it leaves by.
         entry, exit: `s` of the junction's entry and exit [m].
         length: `s` at the end of the exit lane [m].
         radius: of the arc [m]; infinite when straight.
-        points: (ARC_SEGMENTS + 1, 2) polyline from entry to exit, equally spaced [m].
+        points: polyline from entry to exit, equally spaced [m], shape (ARC_SEGMENTS + 1, 2).
         heading_in, heading_out: unit vectors on the approach and exit lane, shape (2,).
     """
 
@@ -89,12 +81,12 @@ class Path:
 
     @property
     def turn(self) -> float:
-        """By how much it turns in the junction [rad], positive to the left, in (−π, π]."""
+        """Angle by which it turns in the junction [rad], positive to the left, in (−π, π]."""
         (ax, ay), (bx, by) = self.heading_in.tolist(), self.heading_out.tolist()
         return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
     def position(self, s: npt.ArrayLike) -> Floats:
-        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See `locate` too."""
+        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See also `locate`."""
         s = np.asarray(s, dtype=float)
         step = self.crossing / ARC_SEGMENTS
         t = np.clip((s - self.entry) / step, 0.0, ARC_SEGMENTS)
@@ -108,15 +100,14 @@ class Path:
     def pose(self, s: npt.ArrayLike, length: float) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
-        Both bumpers' middles lie on the path, so the body is the chord between them.
+        The body is the chord between its bumpers, whose middles both lie on the path.
         """
         front = self.position(s)
-        rear = self.position(np.asarray(s, dtype=float) - length)
-        along = front - rear
+        along = front - self.position(np.asarray(s, dtype=float) - length)
         heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
         return front - heading * (length / 2.0), heading
 
-    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType | Size) -> Floats:
+    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
         """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
         centre, heading = self.pose(s, vehicle.length)
         along = heading * (vehicle.length / 2.0)
@@ -136,13 +127,13 @@ def locate(
 ) -> tuple[float, float]:
     """`Path.position` of one point, in plain floats.
 
-    It takes lists and arrays alike, so that the kernel can compile it and plain Python can call it
-    millions of times.
+    It takes lists and arrays alike: the kernel compiles it, and plain Python calls it millions of
+    times.
 
     Args:
-        points: of the polyline from entry to exit, equally spaced [m].
-        headings: unit vectors on the approach (x, y) and exit lane (x, y).
-        crossing: length from entry to exit [m].
+        points: `Path.points`.
+        headings: `Path.heading_in` and `Path.heading_out`, four numbers.
+        crossing: `Path.crossing` [m].
         past: distance past the junction entry [m].
     """
     last = len(points) - 1

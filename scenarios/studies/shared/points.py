@@ -65,7 +65,7 @@ class ControllerPoint(NamedTuple):
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, split=self.split, profile=self.profile, horizon=horizon)
         controller = controller_named(self.controller, self.profile)
-        label = f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
+        label = f"{self.series}+humans={self.humans:g}" if self.humans else self.series
         return Recipe(scenario, controller, seed, self.humans, label=label, on_collision="record")
 
     @property

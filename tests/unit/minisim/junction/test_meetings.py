@@ -16,13 +16,11 @@ def test_ways_meet_where_sumo_says() -> None:
     site = four_way(profile="as_run").site()
     junction = site.intersection
     table = meetings(junction)
-    at = {str(m): k for k, m in enumerate(junction.movements)}
-    assert table[at["b3"], at["d1"]].tolist() == [Meeting.JOIN, pytest.approx(5.05, abs=0.01)]
-    # a vehicle that crosses a way is never followed on it
-    assert table[at["a2"], at["b2"], 0] == Meeting.NOWHERE
-    assert table[at["a1"], at["a3"], 0] == Meeting.PART
-    assert table[at["a1"], at["c1"], 0] == Meeting.NOWHERE
-    assert table[at["a2"], at["a2"], 0] == Meeting.NOWHERE
+    at = junction.index
+    assert table[at("b3"), at("d1")].tolist() == [Meeting.JOIN, pytest.approx(5.05, abs=0.01)]
+    assert table[at("a1"), at("a3"), 0] == Meeting.PART
+    for one, other in (("a2", "b2"), ("a1", "c1"), ("a2", "a2")):  # crossing is no meeting
+        assert table[at(one), at(other), 0] == Meeting.NOWHERE
 
 
 def test_arcs_meet_like_given_ways() -> None:

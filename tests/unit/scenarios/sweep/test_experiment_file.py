@@ -62,7 +62,7 @@ def test_shares_of_humans(tmp_path: Path) -> None:
     found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim:gate=harmonious"\n')
     dim = Dim(gate="harmonious")
     assert [e.driven for e in found] == [dim, Mixed(dim, 0.25)]
-    assert [e.name for e in found] == ["dim:gate=harmonious", "dim:gate=harmonious-humans-0.25"]
+    assert [e.name for e in found] == ["dim:gate=harmonious", "dim:gate=harmonious+humans=0.25"]
 
 
 def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
