@@ -87,8 +87,7 @@ class DelaySession(PhaseSession):
         delayed = [v for v in approaching if v.lane == lane and self._is_delayed(v, view.time)]
         times = [v.distance / self._speed_limit for v in delayed]
         in_time = [time for time in times if elapsed + time <= signal.max_green]
-        prolongation = max(in_time, default=0.0)
-        prolongation = max(prolongation, signal.min_green - elapsed)
+        prolongation = max(0.0, signal.min_green - elapsed, *in_time)
         idle = all(v.lane == lane for v in present)
         if idle and (elapsed < signal.max_green or signal.extend_max_green):
             prolongation = max(prolongation, IDLE)

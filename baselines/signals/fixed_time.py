@@ -74,10 +74,9 @@ class FixedTime:
                 max_cycle=self.max_cycle,
             )
             greens, capped = optimum.greens, optimum.capped
-        elif isinstance(self.greens, tuple):
-            greens, capped = self.greens, False
         else:
-            greens, capped = (self.greens,) * n, False
+            greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
+            capped = False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens).cycle
