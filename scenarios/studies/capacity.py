@@ -77,17 +77,12 @@ STUDY = CapacityStudy(
 
 
 class Capacity(NamedTuple):
-    """The capacity of a point.
+    """The capacity of a point."""
 
-    Attributes:
-        series: the controller.
-        arms: of the junction.
-        brackets: of each seed, the highest demand served and the lowest that was not
-            [veh/h/lane]; 0 where none was served, infinite where all were.
-    """
-
-    series: str
-    arms: int
+    series: str  # the controller
+    arms: int  # of the junction
+    #: Of each seed, the highest demand served and the lowest that was not [veh/h/lane]; 0 where
+    #: none was served, infinite where all were.
     brackets: tuple[tuple[float, float], ...]
 
     @property

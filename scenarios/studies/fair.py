@@ -40,22 +40,17 @@ STUDY = Study(
 
 
 class Crossing(NamedTuple):
-    """The demand from which on one controller does worse than another.
+    """The demand from which on one controller does worse than another."""
 
-    Attributes:
-        density: the lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is
-            positive at the lowest demand tried, +inf if it never is.
-        low, high: its interval, open (±inf) if the demands tried do not bound it.
-        until: where the mean difference falls back to 0 or less, +inf if it does not. Beyond the
-            capacity of both, neither wins.
-        tried: lowest and highest demand of both; nothing is known beyond.
-    """
-
+    #: The lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is positive
+    #: at the lowest demand tried, +inf if it never is.
     density: float
-    low: float
+    low: float  # low and high: its interval, open (±inf) if the demands tried do not bound it
     high: float
+    #: Where the mean difference falls back to 0 or less, +inf if it does not. Beyond the capacity
+    #: of both, neither wins.
     until: float
-    tried: tuple[float, float]
+    tried: tuple[float, float]  # lowest and highest demand of both; nothing is known beyond
 
     def __str__(self) -> str:
         bounded = math.isfinite(self.low) or math.isfinite(self.high)

@@ -97,22 +97,16 @@ def score(compared: pd.DataFrame, *, comparable: bool = True) -> Score:
 
 
 class Discrepancy(NamedTuple):
-    """A known cause of a difference between the paper and us.
+    """A known cause of a difference between the paper and us."""
 
-    Attributes:
-        number: in the list of discrepancies (docs).
-        study, series, arms, split, density, metric: where it holds; empty holds anywhere.
-        cause: in words.
-    """
-
-    number: int
-    study: str
+    number: int  # in the list of discrepancies (docs)
+    study: str  # this and the next five: where it holds; empty holds anywhere
     series: str
     arms: str
     split: str
     density: str
     metric: str
-    cause: str
+    cause: str  # in words
 
     def holds(self, study: str, row: Mapping[Any, Any]) -> bool:
         """Whether it holds for a study's row of `compare`."""

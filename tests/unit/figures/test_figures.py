@@ -68,9 +68,6 @@ def crash() -> Run:
     )
 
 
-# --- the junction ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
 def test_every_body_stays_on_the_asphalt(intersection: Intersection) -> None:
     asphalt = shapely.Polygon(drawing.outline(intersection, 100.0))
@@ -115,9 +112,6 @@ def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
         assert true.buffer(1e-6).covers(drawn), "a rounded body inside the model's rectangle"
         assert drawn.area > 0.93 * true.area
         assert drawn.covers(shapely.Polygon(drawing.place(glass, *front, angle)[0]))
-
-
-# --- film: the run by time -------------------------------------------------------------------
 
 
 def test_film_counts_what_the_trajectories_say(run: Run, film: Frames) -> None:
@@ -180,9 +174,6 @@ def test_nothing_recorded_is_an_error() -> None:
         Picture(minisim.simulate(four_way(300, horizon=5), Dim()))
 
 
-# --- the picture -----------------------------------------------------------------------------
-
-
 def pixels(image: Image.Image) -> npt.NDArray[np.int64]:
     return np.asarray(image).astype(np.int64)
 
@@ -230,8 +221,6 @@ def test_frame_times_are_steps() -> None:
         with pytest.raises(InputError):
             frame_times(*bad, 0.1)
 
-
-# --- files -----------------------------------------------------------------------------------
 
 images = st.lists(
     st.binary(min_size=48, max_size=48).map(
@@ -326,9 +315,6 @@ def test_save_refuses(tmp_path: Path) -> None:
     with pytest.raises(FileError):
         save(figure, tmp_path / "no" / "x.png")
     assert list(tmp_path.iterdir()) == []
-
-
-# --- plots -----------------------------------------------------------------------------------
 
 
 def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> None:

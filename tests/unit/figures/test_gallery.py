@@ -71,9 +71,6 @@ def texts_of(figure: Figure) -> list[str]:
     return [" ".join(text.get_text().split()) for text in figure.texts]
 
 
-# --- the gallery -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", GALLERY)
 def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archive) -> None:
     drawing = GALLERY[name].build(archive)
@@ -189,9 +186,6 @@ def test_losses_end_where_the_runs_do() -> None:
         GALLERY["losses"].build(Archive(alone, EFFORT))
 
 
-# --- what the pictures say -------------------------------------------------------------------
-
-
 def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
     figure = figure_of("waiting-4321", archive)
     for axes in figure.axes:
@@ -232,9 +226,6 @@ def test_log_axis_shows_plain_numbers() -> None:
     plots.log_time(axes, 0.0, 500.0, linear=0.1)
     figure.draw_without_rendering()
     assert [t.get_text() for t in axes.get_yticklabels()] == ["0", "0.1", "1", "10", "100"]
-
-
-# --- tables ----------------------------------------------------------------------------------
 
 
 def test_webster_table_by_hand() -> None:
@@ -289,9 +280,6 @@ def test_table_formats(tmp_path: Path) -> None:
         save_table(table, tmp_path / "t.xlsx")
     with pytest.raises(InputError, match="2 cells"):
         Table("t", ("a", "b"), (("1",),))
-
-
-# --- the report ------------------------------------------------------------------------------
 
 
 FEW = ("webster", "gate", "losses-table", "comparison-text")

@@ -29,6 +29,8 @@ from scenarios.controllers import controller_named
 from scenarios.demo import Tour
 from tests import ROOT
 
+Captured = pytest.CaptureFixture[str]
+
 SHORT = ("--horizon", "240", "--density", "300")
 
 #: The issue's keys of `minisim run --json`.
@@ -38,14 +40,14 @@ RUN_KEYS = {
 }  # fmt: skip
 
 
-def ok(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def ok(capsys: Captured, *arguments: str) -> str:
     code = main(arguments)
     captured = capsys.readouterr()
     assert (code, captured.err) == (0, "")
     return captured.out
 
 
-def fails(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
+def fails(capsys: Captured, *arguments: str, code: int = 2) -> str:
     returned = main(arguments)
     captured = capsys.readouterr()
     assert (returned, captured.out) == (code, "")
@@ -62,10 +64,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-# --- help ------------------------------------------------------------------------------------
-
-
-def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_every_command(capsys: Captured) -> None:
     text = ok(capsys, "--help")
     assert ok(capsys) == text
     assert all(f" {name} " in text for name in COMMANDS)
@@ -73,11 +72,11 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help(capsys: pytest.CaptureFixture[str], command: str) -> None:
+def test_every_command_has_help(capsys: Captured, command: str) -> None:
     assert f"minisim {command}" in ok(capsys, command, "--help")
 
 
-def test_run_help_has_examples_that_work(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_help_has_examples_that_work(capsys: Captured) -> None:
     lines = [" ".join(line.split()) for line in ok(capsys, "run", "--help").splitlines()]
     examples = [line for line in lines if line.startswith("minisim run ")]
     assert len(examples) == 2
@@ -92,7 +91,7 @@ def test_run_help_fits_on_two_screens() -> None:
     assert max(map(len, lines)) <= 80
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version(capsys: Captured) -> None:
     assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
 
 
@@ -107,10 +106,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-# --- run -------------------------------------------------------------------------------------
-
-
-def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_json_is_the_summary_and_safety(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "run", "four-way", *SHORT, "--seed", "3", "--json"))
     run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
     assert set(printed) >= RUN_KEYS
@@ -122,7 +118,7 @@ def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) 
     assert safety["min_pet_s"] > 0
 
 
-def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
     out = ok(capsys, "run", "five-way", *SHORT, "-c", "fixed-time", "-p", "fair")
     rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
     served = [int(rows[lane][0]) for lane in "abcde"]
@@ -132,7 +128,7 @@ def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str])
         assert word in out
 
 
-def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_tells_humans_from_the_others(capsys: Captured) -> None:
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
     printed = json.loads(ok(capsys, *arguments, "--json"))
     assert printed["controller"] == "dim+humans=0.4"
@@ -144,15 +140,13 @@ def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) ->
         assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
 
 
-def test_run_without_vehicles(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_without_vehicles(capsys: Captured) -> None:
     arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
     assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None
     assert "–" in ok(capsys, *arguments)
 
 
-def test_run_writes_trips_trajectories_and_fcd(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_run_writes_trips_trajectories_and_fcd(capsys: Captured, tmp_path: Path) -> None:
     trips, table, fcd = (tmp_path / name for name in ("trips.csv", "t.parquet", "fcd.xml"))
     plain = ok(capsys, "run", "four-way", *SHORT, "--json")
     full = ok(
@@ -169,7 +163,7 @@ def test_run_writes_trips_trajectories_and_fcd(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fcd.xml", "t.parquet", "trips.csv"]
 
 
-def test_run_replays_recorded_arrivals(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_run_replays_recorded_arrivals(capsys: Captured, tmp_path: Path) -> None:
     arrivals = tmp_path / "arrivals.csv"
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,c,1\n")
     printed = json.loads(
@@ -179,7 +173,7 @@ def test_run_replays_recorded_arrivals(capsys: pytest.CaptureFixture[str], tmp_p
     assert printed["lanes"]["c"]["trips"] == 1
 
 
-def test_split_turns_and_side_reach_the_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+def test_split_turns_and_side_reach_the_scenario(capsys: Captured) -> None:
     lanes = json.loads(
         ok(capsys, "run", "four-way", *SHORT, "--split", "1:0:0:0", "--turns", "0:1:0",
            "--side", "right", "--json")
@@ -187,9 +181,7 @@ def test_split_turns_and_side_reach_the_scenario(capsys: pytest.CaptureFixture[s
     assert [lanes[lane]["trips"] == 0 for lane in "abcd"] == [False, True, True, True]
 
 
-def test_collision_stops_the_run_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: Path) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
     said = fails(capsys, *arguments, code=1)
@@ -202,7 +194,7 @@ def test_collision_stops_the_run_and_writes_nothing(
 
 
 def test_without_safety_nothing_is_recorded(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records, real = [], minisim.simulation.Simulation
 
@@ -218,7 +210,7 @@ def test_without_safety_nothing_is_recorded(
     assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
 
 
-def test_metrics_that_were_asked_for_by_movement(capsys: pytest.CaptureFixture[str]) -> None:
+def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
     printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--no-safety", "--json"))
     assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
@@ -234,7 +226,7 @@ def test_metrics_that_were_asked_for_by_movement(capsys: pytest.CaptureFixture[s
         assert word in out
 
 
-def test_metrics_lists_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+def test_metrics_lists_the_table(capsys: Captured) -> None:
     listed = json.loads(ok(capsys, "metrics", "--json"))
     assert [metric["name"] for metric in listed] == list(METRICS)
     out = ok(capsys, "metrics")
@@ -243,15 +235,12 @@ def test_metrics_lists_the_table(capsys: pytest.CaptureFixture[str]) -> None:
         assert metric.meaning in out
 
 
-# --- harmony and decide ----------------------------------------------------------------------
-
-
-def test_harmony_csv_is_the_papers_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_csv_is_the_papers_file(capsys: Captured) -> None:
     published = (ROOT / "dim" / "data" / "harmony_4way.csv").read_text()
     assert ok(capsys, "harmony", "four-way", "--csv").split() == published.split()
 
 
-def test_harmony_table_json_and_csv_agree(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_table_json_and_csv_agree(capsys: Captured) -> None:
     arguments = ("harmony", "custom", "--bearings", "0,80,190,260", "--side", "right")
     printed = json.loads(ok(capsys, *arguments, "--json"))
     text = ok(capsys, *arguments, "--csv")
@@ -262,7 +251,7 @@ def test_harmony_table_json_and_csv_agree(capsys: pytest.CaptureFixture[str]) ->
     assert table.count("●") - 1 == sum(map(sum, printed["harmony"])), "and one in the title"
 
 
-def test_harmony_of_twelve_arms_is_not_cut(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_of_twelve_arms_is_not_cut(capsys: Captured) -> None:
     show(harmony_table(HarmonyMatrix(12, np.zeros((132, 132), dtype=bool))))
     lines = capsys.readouterr().out.splitlines()
     assert "…" not in "".join(lines)
@@ -270,7 +259,7 @@ def test_harmony_of_twelve_arms_is_not_cut(capsys: pytest.CaptureFixture[str]) -
     assert [line.count("·") for line in lines if line.startswith((" a", " l"))] == [132] * 22
 
 
-def test_clearance_only_removes_harmony(capsys: pytest.CaptureFixture[str]) -> None:
+def test_clearance_only_removes_harmony(capsys: Captured) -> None:
     def pairs(clearance: str) -> int:
         text = ok(capsys, "harmony", "five-way", "--clearance", clearance, "--json")
         return sum(map(sum, json.loads(text)["harmony"]))
@@ -278,7 +267,7 @@ def test_clearance_only_removes_harmony(capsys: pytest.CaptureFixture[str]) -> N
     assert pairs("0") >= pairs("0.5") > pairs("3")
 
 
-def test_decide_answers_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+def test_decide_answers_as_the_paper(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2", "--json"))
     assert printed["right_of_way"] == ["a1", "b2"]
     # Paper, section "Deadlock Analysis": (c2, a1), (a1, b2), (b2, d2).
@@ -290,17 +279,14 @@ def test_decide_answers_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None
     assert printed["reason"] in text
 
 
-def test_decide_plots(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_decide_plots(capsys: Captured, tmp_path: Path) -> None:
     for suffix, magic in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
         file = tmp_path / f"decision.{suffix}"
         ok(capsys, "decide", "three-way", "a1", "c2", "--plot", str(file))
         assert file.read_bytes().startswith(magic)
 
 
-# --- animate and demo ------------------------------------------------------------------------
-
-
-def test_animate_writes_a_gif(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
     ok(capsys, "animate", "four-way", "-o", str(file), "--start", "60", "--seconds", "2",
        "--fps", "5", "--density", "400")  # fmt: skip
@@ -311,7 +297,7 @@ def test_animate_writes_a_gif(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 
 def test_animate_checks_before_it_simulates(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -330,7 +316,7 @@ def test_animate_checks_before_it_simulates(
     assert recorded.read_text().startswith("demand_time_s")
 
 
-def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "out"
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
@@ -347,7 +333,7 @@ def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
 
 
 def test_demo_takes_the_seeds_it_is_given(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop(tour: Tour) -> None:
         raise InputError(f"{tour.seeds} seeds")
@@ -358,8 +344,6 @@ def test_demo_takes_the_seeds_it_is_given(
     assert "2 seeds" in fails(capsys, "demo", "--quick", "--out", here)
     assert "5 seeds" in fails(capsys, "demo", "--out", here)
 
-
-# --- errors ----------------------------------------------------------------------------------
 
 BAD = [
     (("rum",), "rum"),
@@ -458,7 +442,7 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a)[:50] for a, _ in BAD])
 def test_bad_input_is_one_line_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     arguments: tuple[str, ...], named: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
@@ -466,7 +450,7 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_broken_arrivals_name_the_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_broken_arrivals_name_the_line(capsys: Captured, tmp_path: Path) -> None:
     arrivals = tmp_path / "arrivals.csv"
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
     assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
@@ -477,7 +461,7 @@ def test_broken_arrivals_name_the_line(capsys: pytest.CaptureFixture[str], tmp_p
     [("--trips", "--trajectories"), ("--trips", "--fcd"), ("--arrivals", "--trips")],
 )
 def test_no_file_is_written_twice_or_over_an_input(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     first: str, second: str,
 ) -> None:  # fmt: skip
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
@@ -492,7 +476,7 @@ def test_no_file_is_written_twice_or_over_an_input(
     assert file.read_text() == before
 
 
-def test_ctrl_c_is_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_is_130(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -542,17 +526,14 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     assert "a1-b2" in decision.stdout
 
 
-# --- verify and protocol ---------------------------------------------------------------------
-
-
-def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_tells_what_all_cases_showed(capsys: Captured) -> None:
     text = ok(capsys, "verify", "four-way")
     assert "four-way, 4 arms: all 255 cases, order size" in text
     assert "130 (51%)" in text
     assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
 
 
-def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_as_json(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
     assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
     assert all(claim["holds"] for claim in printed["claims"])
@@ -560,7 +541,7 @@ def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
 
 
-def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
     assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
     (false,) = [claim for claim in printed["claims"] if not claim["holds"]]
@@ -568,14 +549,14 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[st
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
 
 
-def test_verify_draws(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_verify_draws(capsys: Captured, tmp_path: Path) -> None:
     picture = tmp_path / "cases.png"
     assert f"wrote {picture}" in ok(capsys, "verify", "four-way", "--plot", str(picture))
     with Image.open(picture) as image:
         assert image.width > 2 * image.height
 
 
-def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> None:
+def test_protocol_of_the_default_rules(capsys: Captured) -> None:
     text = ok(capsys, "protocol", "three-way", "--order", "lanes")
     assert "872, with 3259 transitions\n" in text
     assert "safe         yes" in text
@@ -584,7 +565,7 @@ def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> No
     assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
 
 
-def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_protocol_as_json(capsys: Captured) -> None:
     rules = ("--order", "lanes", "--priorities", "waiting")
     printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
     assert printed["all_states"] is True
@@ -592,9 +573,7 @@ def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["starving"] == {"a": None, "b": None, "c": None}
 
 
-def test_protocol_writes_a_counterexample_that_collides(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_protocol_writes_a_counterexample_that_collides(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "two.csv"
     assert main(["protocol", "three-way", "--commit", "paper", "--counterexample", str(file)]) == 1
     text = capsys.readouterr().out
@@ -605,9 +584,7 @@ def test_protocol_writes_a_counterexample_that_collides(
     assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
 
 
-def test_arrivals_of_a_smaller_junction_are_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_arrivals_of_a_smaller_junction_are_refused(capsys: Captured, tmp_path: Path) -> None:
     """They fit, but a 3-arm manoeuvre 2 would be read as straight on."""
     table = tmp_path / "three.csv"
     rows = [f"{k},{'abc'[k % 3]},{k % 2 + 1}" for k in range(40)]

@@ -20,6 +20,8 @@ from scenarios.studies.shared.effort import Effort
 from scenarios.sweep.store import Store
 from tests import ROOT
 
+Captured = pytest.CaptureFixture[str]
+
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
 
 
@@ -30,9 +32,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sweep_and_the_same_again(
-    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_and_the_same_again(file: Path, tmp_path: Path, capsys: Captured) -> None:
     store, table = tmp_path / "s.db", tmp_path / "rows.csv"
     arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
     assert main(arguments) == 0
@@ -60,9 +60,7 @@ def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
     assert rows["error"].isna().all()
 
 
-def test_failures_are_rows_and_exit_code_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text('horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n')
     assert main(["sweep", str(file), "--jobs", "1", "--out", str(store)]) == 1
@@ -73,16 +71,14 @@ def test_failures_are_rows_and_exit_code_1(
         assert len(kept) == 4
 
 
-def test_a_capped_signal_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_capped_signal_is_told(tmp_path: Path, capsys: Captured) -> None:
     file = tmp_path / "e.toml"
     file.write_text('horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n')
     assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db")]) == 0
     assert "over Webster's capacity; the cycle is capped at 180 s" in capsys.readouterr().out
 
 
-def test_the_papers_grid(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     """The study `text`: what `minisim reproduce` needs of it is then in the store."""
     points = tuple(point for point in text.STUDY.points if point.density == 300)
     some = replace(text.STUDY, points=points)
@@ -98,9 +94,7 @@ def test_the_papers_grid(
         assert some.collect(effort, find_in(kept)).missing == ()
 
 
-def test_results_do_not_go_over_the_experiments(
-    file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_do_not_go_over_the_experiments(file: Path, capsys: Captured) -> None:
     assert main(["sweep", str(file), "--out", str(file)]) == 2
     assert "FILE.toml and --out name the same file" in capsys.readouterr().err
     assert file.read_text() == SMALL
@@ -109,7 +103,7 @@ def test_results_do_not_go_over_the_experiments(
 def test_the_extra_is_named_where_it_is_missing(
     file: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    capsys: Captured,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import

@@ -81,9 +81,6 @@ def pair(seed: int = 1, waiting_sumo: Sequence[float] = (0, 1, 2, 3.5)) -> Pair:
     return Pair(seed, ours, theirs)
 
 
-# --- statistics ------------------------------------------------------------------------------
-
-
 @given(
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
@@ -192,9 +189,6 @@ def test_tolerances(tolerance: Tolerance, value: float, difference: float, holds
     assert tolerance.holds(value, difference) is holds
 
 
-# --- cells -----------------------------------------------------------------------------------
-
-
 def test_replays_are_the_published_grid_and_its_numbers() -> None:
     cases = replayed_cases([], ["dim"], [], [], "as_run", 3600.0)
     assert [case.published for case in cases] == list(GRID)
@@ -260,9 +254,6 @@ def test_own_arrivals_stand_beside_comparable_numbers_only() -> None:
     assert fts.reference_tolerance("waiting_time_s") is None, "not the same arrivals"
     unbalanced = Case(four_way(350, split=(4, 3, 2, 1), profile="as_run"), "fixed-time")
     assert unbalanced.reference("waiting_time_s", "all") is None, "5 s of green: not comparable"
-
-
-# --- verdicts and report ---------------------------------------------------------------------
 
 
 @pytest.fixture(autouse=True)
@@ -425,9 +416,6 @@ def test_means_are_drawn_over_density() -> None:
     assert list(lines) == ["minisim", "SUMO"]
     assert lines["minisim"][:, 0].tolist() == [150 - DODGE / 2, 350 - DODGE / 2]
     assert lines["minisim"][:, 1].tolist() == [1.5, 1.5]
-
-
-# --- command line ----------------------------------------------------------------------------
 
 
 def test_without_sumo_the_install_command_is_told(

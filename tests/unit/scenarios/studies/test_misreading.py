@@ -17,9 +17,6 @@ from scenarios.statistics import poisson_interval
 WRONG = NoisyPerception(0.15)
 
 
-# --- rates -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("count", "low", "high"),
     [(0, 0.0, 3.6889), (1, 0.0253, 5.5716), (5, 1.6235, 11.6683), (10, 4.7954, 18.3904),
@@ -56,8 +53,6 @@ def test_the_collision_that_docs_explain() -> None:
     assert [str(m) for m in table.decide(["b3", "c3", "d1"])] == ["c3", "d1"]
     assert [str(m) for m in table.decide(["b3", "c2", "d1"])] == ["b3"]
 
-
-# --- the command line ------------------------------------------------------------------------
 
 Captured = pytest.CaptureFixture[str]
 RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", "300",
