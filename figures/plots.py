@@ -73,11 +73,7 @@ def draw_line(
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
     """One line a series over demand: mean over seeds, interval, arrows at growing queues.
 
-    Args:
-        axes: to draw on.
-        rows: of a study (`Results.good`).
-        metric: a column.
-        series: in the order of the legend; one without rows is left out.
+    `rows` are of a study (`Results.good`); a series without rows is left out.
     """
     if rows.empty:
         axes.text(
@@ -110,11 +106,7 @@ def draw_published(
 ) -> None:
     """The paper's values as hollow markers; those that are not comparable are crossed out.
 
-    Args:
-        axes: to draw on.
-        table: columns `series`, `density`, `paper`, `comparable`.
-        rows: ours, for the same sideways shift.
-        series: in the order of the legend.
+    The table has columns `series`, `density`, `paper`, `comparable`; our `rows` give the shift.
     """
     for place, name in enumerate(series):
         look = style.look(name)

@@ -26,21 +26,10 @@ def write_report(
     archive: Archive, made: Sequence[Made], jobs: int, folder: Path,
     progress: Callable[[int, int], None], *, parts: Collection[str] = NAMES,
 ) -> int:  # fmt: skip
-    """Draw into `folder`/figures, then write `folder`/report.md.
+    """Draw into `folder`/figures, then write `folder`/report.md; returns the number of drawings.
 
-    Args:
-        archive: of the runs.
-        made: the studies that were run.
-        jobs: processes used.
-        folder: of the report.
-        progress: called with the figures drawn and their number.
-        parts: studies; unless they are all, the report has only figures that need one of them.
-
-    Returns:
-        The number of figures and tables.
-
-    Raises:
-        FileError: something cannot be written.
+    `parts` are studies; unless they are all, the report has only figures that need one of them.
+    `progress` is called with the figures drawn and their number. Raises `FileError`.
     """
     pictures = make_folder(folder / "figures")
     drawn: dict[str, Drawing] = {}

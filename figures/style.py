@@ -94,12 +94,7 @@ def figure_format(path: str | os.PathLike[str]) -> str:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure in the format of its suffix, with the same bytes every time.
-
-    Raises:
-        InputError: a suffix other than `FORMATS`.
-        FileError: the file cannot be written.
-    """
+    """Write a figure in the format of its suffix, with the same bytes every time."""
     kind = figure_format(path)
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
     with replacing(path) as part, mpl.rc_context({"svg.hashsalt": "minisim", "pdf.fonttype": 42}):

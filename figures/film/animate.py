@@ -42,12 +42,8 @@ def write_animation(
 ) -> None:  # fmt: skip
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
-    Args:
-        run: recorded with `record="all"` over the time shown.
-        path: of the file; it is written whole or not at all.
-        start, seconds: the time shown [s].
-        fps: frames a second, at most one a simulation step.
-        progress: called with the frames done and their number.
+    The run was recorded with `record="all"` over the time shown. There are `fps` frames a second,
+    at most one a step; `progress` is called with the frames done and their number.
 
     Raises:
         InputError: an unknown suffix, nothing recorded, or a number out of range.
@@ -83,12 +79,7 @@ def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
 
 
 class Picture:
-    """The junction of one run at any recorded time.
-
-    Args:
-        run: recorded with `record="all"`.
-        start: served vehicles are counted from this time on [s].
-    """
+    """The junction of one run at any recorded time; served vehicles count from `start` [s] on."""
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run

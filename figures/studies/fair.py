@@ -40,11 +40,7 @@ def fair_figure(results: Results) -> Figure:
 
 
 def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
-    """From which demand on DIM does worse; see `losses`.
-
-    Raises:
-        MissingRunsError: no pair has two demands in common.
-    """
+    """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
     known = {} if results.good.empty else losses(results.good)
     if not known:
         raise MissingRunsError(

@@ -45,11 +45,7 @@ HOUR: Final = 3600.0
 
 @declared
 class Case:
-    """One cell.
-
-    Raises:
-        InputError: an unknown controller, or the published one cannot be made.
-    """
+    """One cell; `InputError` for a controller that is unknown or cannot be made."""
 
     scenario: Scenario = part("junction, demand and profile", Scenario)
     controller: str = text("its command-line name")
@@ -134,15 +130,9 @@ def replayed_cases(
 ) -> list[Case]:
     """The published runs of these controllers, junctions, densities and splits; all where empty.
 
-    Args:
-        names, controllers: of junctions and controllers on the command line.
-        densities, splits: as the runs are labelled; densities are mean inflows a lane [veh/h].
-        profile: None is each run's own vehicle, with the controller of the run; any other vehicle
-            goes with the controller of that profile.
-        horizon: simulated time [s].
-
-    Raises:
-        InputError: an unknown name, or no published run is left.
+    Densities [veh/h] and splits are those of the runs' labels. The profile None is each run's own
+    vehicle, with the controller of the run; any other vehicle goes with the controller of that
+    profile. `InputError` for an unknown name, or if no published run is left.
     """
     for split in splits:
         choice("split of a published run", split, SPLITS)

@@ -60,12 +60,8 @@ def crossvalidate(
     """Run every case with every seed in both hosts, and compare.
 
     A run that fails becomes a `Failure` of its case; one whose process dies is tried once more.
-    Replays have one run: their arrivals are not drawn.
-
-    Args:
-        cases, seeds, jobs: what to run, and in how many processes.
-        progress: called with the number of runs done and of all.
-        folder: where SUMO's runs are kept and looked for; None runs them all.
+    Replays have one run: their arrivals are not drawn. There are `jobs` processes; `progress` is
+    called with the number of runs done and of all. SUMO's runs are kept and looked for in `folder`.
     """
     runs = [
         (

@@ -83,10 +83,7 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
     confidence set by inversion of the test, Fieller 1954).
 
     Args:
-        differences: demand [veh/h/lane] -> one difference a seed, at least two.
-
-    Raises:
-        InputError: fewer than two demands, or a demand with fewer than two differences.
+        differences: two or more demands [veh/h/lane] -> one difference a seed, at least two.
     """
     densities = sorted(numbers("demands", list(differences)))
     if len(densities) < 2:
@@ -114,8 +111,7 @@ def paired_differences(
 ) -> dict[float, list[float]]:
     """Differences of a column between two series, ours minus theirs: density -> one a common seed.
 
-    Raises:
-        InputError: two runs of one seed with other arrivals.
+    `InputError` if two runs of one seed had other arrivals.
     """
     by_density = pairs(rows, metric, "series", (ours, theirs), ["density"])
     return {float(density): values for (density,), values in by_density.items() if len(values) > 1}

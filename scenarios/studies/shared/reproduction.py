@@ -33,10 +33,7 @@ def reproduce(
 ) -> Made:
     """Run a study in `jobs` processes. Rows go to the store; what it has is not run again.
 
-    `progress` is called with the runs done and the most that there can be.
-
-    Raises:
-        FileError: the store cannot be written.
+    `progress` is called with the runs done and the most that there can be. Raises `FileError`.
     """
     study = study_named(name)
     total = study.most_runs(effort)
