@@ -146,11 +146,6 @@ def paper_densities(axes: Axes) -> None:
     axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
 
 
-def ylabel(axes: Axes, text: str) -> None:
-    """Label the vertical axis."""
-    axes.set_ylabel(text, fontsize=9.5, color=style.INK)
-
-
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
     """A logarithmic time axis from `low` to `high` [s] with plain numbers.
 
@@ -202,13 +197,6 @@ def looks_legend(
         for k in shown
     ]  # fmt: skip
     legend(figure, handles, [k.label for k in shown], top, ncols, **changes)
-
-
-def series_legend(
-    figure: Figure, series: Iterable[str], top: float, ncols: int | None = None
-) -> None:
-    """A legend of lines and markers by series."""
-    looks_legend(figure, map(style.look, series), top, ncols)
 
 
 def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:

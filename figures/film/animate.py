@@ -24,7 +24,6 @@ from figures.film.frames import Frames
 from figures.junction import drawing
 from minisim.errors import number
 from minisim.files import replacing
-from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats
 from minisim.results.run import Run
 
@@ -87,8 +86,9 @@ class Picture:
         self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection
-        reach = view_reach(intersection, max((m.start for m in plan.markings), default=0.0))
-        self._reach = reach
+        # All markings and a little more [m].
+        zone = max((marking.start for marking in plan.markings), default=0.0)
+        self._reach = reach = max(40.0, intersection.junction_radius + zone + 4.0)
         self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
         self._axes.add_patch(Rectangle((-2e3, -2e3), 4e3, 4e3, facecolor=style.GRASS, zorder=0))
         drawing.draw_junction(self._axes, intersection, plan, reach)
@@ -216,8 +216,3 @@ class Picture:
         self._figure.draw_artist(self._clock)
         self._figure.draw_artist(self._counts)
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
-
-
-def view_reach(intersection: Intersection, zone: float) -> float:
-    """Distance from the centre that a picture shows [m]: all markings and a little more."""
-    return max(40.0, intersection.junction_radius + zone + 4.0)

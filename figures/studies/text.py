@@ -89,9 +89,9 @@ def _grid_figure(
         plots.log_time(axes, measure.low, measure.high, linear=measure.linear)
         plots.paper_densities(axes)
     scale = plots.scale_words(measure.linear)
-    plots.ylabel(panels[0], f"mean {measure.name} time [s], {scale}")
+    panels[0].set_ylabel(f"mean {measure.name} time [s], {scale}", **style.LABEL)
     plots.heading(figure, f"Mean {measure.name} time{what}")
-    plots.series_legend(figure, series, 0.925)
+    plots.looks_legend(figure, map(style.look, series), 0.925)
     plots.marks_legend(figure, 0.868, paper=True)
     plots.footnote(figure, missing_note(*both, wanted=wanted))
     return figure

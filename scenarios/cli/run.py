@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -78,10 +77,13 @@ def run(
     asked = asked_metrics([] if metrics is None else [name.strip() for name in metrics.split(",")])
     choice("--by", by, GROUPS)
     if choice("host", host, ("minisim", "sumo")) == "minisim":
-        _refuse_sumo_options({
+        only_sumo = {
             "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
             "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",
-        })  # fmt: skip
+        }  # fmt: skip
+        if refused := [name for name, value in only_sumo.items() if value]:
+            need = "needs" if len(refused) == 1 else "need"
+            raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
@@ -120,11 +122,3 @@ def run(
         typer.echo(f"  wrote {path}")
     if keep_files is not None:
         typer.echo(f"  SUMO's files are in {keep_files}")
-
-
-def _refuse_sumo_options(given: Mapping[str, object]) -> None:
-    """Raise `InputError` where an option asks for what only SUMO can do."""
-    asked = [name for name, value in given.items() if value]
-    if asked:
-        need = "needs" if len(asked) == 1 else "need"
-        raise InputError(f"{' and '.join(asked)} {need} --host sumo")

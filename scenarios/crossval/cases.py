@@ -114,10 +114,9 @@ class Case:
             return None
         who, busiest = self.published.controller, self.published.density == max(DENSITIES)
         travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
-        return {
-            "waiting_time_s": Tolerance(0.10),
-            "travel_time_s": Tolerance(0.0, travel),
-        }.get(metric)
+        return {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}.get(
+            metric
+        )
 
 
 def replayed_cases(

@@ -101,10 +101,7 @@ def test_results_do_not_go_over_the_experiments(file: Path, capsys: Captured) ->
 
 
 def test_the_extra_is_named_where_it_is_missing(
-    file: Path,
-    tmp_path: Path,
-    capsys: Captured,
-    monkeypatch: pytest.MonkeyPatch,
+    file: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import
     store = tmp_path / "s.db"

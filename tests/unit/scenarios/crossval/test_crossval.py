@@ -31,15 +31,7 @@ from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.crossval import (
-    Case,
-    Result,
-    crossvalidate,
-    film,
-    replayed_cases,
-    runs,
-    write_report,
-)
+from scenarios.crossval import Case, Result, crossvalidate, film, replayed_cases, runs, write_report
 from scenarios.crossval.comparison import (
     CLOSE,
     Pair,
