@@ -21,13 +21,13 @@ from PIL import Image
 
 import minisim
 from dim import Dim, HarmonyMatrix, explain
-from figures import decision_figure, performance_figure, save, style, write_animation
+from figures import decision_figure, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif, write_html
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from minisim.control import Plan, Unregulated
-from minisim.errors import FileError, InputError
+from minisim.errors import InputError
 from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
@@ -306,15 +306,6 @@ def test_animation_is_written_whole_or_not(run: Run, tmp_path: Path) -> None:
     first = file.read_bytes()
     write_animation(run, file, start=110, seconds=2)
     assert file.read_bytes() == first
-
-
-def test_save_refuses(tmp_path: Path) -> None:
-    figure = style.new_figure(1, 1)
-    with pytest.raises(InputError, match=r"\.bmp"):
-        save(figure, tmp_path / "x.bmp")
-    with pytest.raises(FileError):
-        save(figure, tmp_path / "no" / "x.png")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> None:

@@ -68,6 +68,7 @@ def test_help_lists_every_command(capsys: Captured) -> None:
     text = ok(capsys, "--help")
     assert ok(capsys) == text
     assert all(f" {name} " in text for name in COMMANDS)
+    assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
     assert {c.name or c.callback.__name__ for c in app.registered_commands} == set(COMMANDS)
 
 
@@ -89,10 +90,6 @@ def test_run_help_fits_on_two_screens() -> None:
     lines = shell("minisim run --help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
     assert len(lines) <= 2 * 25
     assert max(map(len, lines)) <= 80
-
-
-def test_version(capsys: Captured) -> None:
-    assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
 
 
 def test_help_loads_nothing_heavy() -> None:
@@ -171,6 +168,8 @@ def test_run_replays_recorded_arrivals(capsys: Captured, tmp_path: Path) -> None
     )
     assert (printed["trips"], printed["unfinished"]) == (2, 0)
     assert printed["lanes"]["c"]["trips"] == 1
+    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
+    assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
 
 
 def test_split_turns_and_side_reach_the_scenario(capsys: Captured) -> None:
@@ -279,10 +278,11 @@ def test_decide_answers_as_the_paper(capsys: Captured) -> None:
     assert printed["reason"] in text
 
 
-def test_decide_plots(capsys: Captured, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["decide three-way a1 c2", "verify three-way"])
+def test_answers_are_drawn(capsys: Captured, tmp_path: Path, command: str) -> None:
     for suffix, magic in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
         file = tmp_path / f"decision.{suffix}"
-        ok(capsys, "decide", "three-way", "a1", "c2", "--plot", str(file))
+        assert f"wrote {file}" in ok(capsys, *command.split(), "--plot", str(file))
         assert file.read_bytes().startswith(magic)
 
 
@@ -363,7 +363,6 @@ BAD = [
     (("run", "four-way", "-p", "pape"), "did you mean 'paper'"),
     (("run", "four-way", "-d", "-1"), "-1"),
     (("run", "four-way", "-d", "many"), "many"),
-    (("run", "four-way", "--humans", "1.5"), "at least 0 and at most 1, got 1.5"),
     (("run", "four-way", "-c", "adaptive", "--humans", "0.1"), "not with 'adaptive'"),
     (("run", "four-way", "-p", "as_run", "--humans", "0.1"), "among vehicles of DIM"),
     (("run", "four-way", "--split", "4;3"), "4;3"),
@@ -375,8 +374,6 @@ BAD = [
     (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
     (("run", "four-way", "--trips", "t.xlsx"), ".csv, .parquet"),
-    (("run", "four-way", "--trips", str(ROOT)), "allowed"),
-    (("run", "four-way", "--fcd", str(ROOT)), "allowed"),
     (("run", "four-way", "--fcd", "fcd.csv"), "allowed: .xml"),
     (("run", "four-way", "--trips", "trips.csv", "--fcd", "none/fcd.xml"), "no folder"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
@@ -393,23 +390,18 @@ BAD = [
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
     (("controllers", "own_none:X"), "no module 'own_none'"),
-    (("demo", "--seeds", "1001"), "--seeds"),
     (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
     (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
     (("verify", "four-way", "--order", "sise"), "unknown order 'sise'"),
-    (("verify", "four-way", "--plot", "x.txt"), "a figure file ends in .png, .pdf, .svg"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
     (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
-    (("protocol", "three-way", "--commit", "shut"), "unknown commit rule 'shut'"),
     (("protocol", "three-way", "--priorities", "inflow"), "unknown priorities 'inflow'"),
     (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
-    (("protocol", "three-way", "--counterexample", "/nowhere/x.csv"), "there is no folder"),
     (("protocol", "three-way", "--counterexample", "x.csv"), "there is no counterexample"),
     (("sweep", "paper", "--jobs", "0"), "--jobs must be an integer 1"),
     (("sweep", "paper", "--seeds", "0"), "--seeds must be an integer 1"),
-    (("sweep", "paper", "--horizon", "-5"), "--horizon [s] must be above 0"),
     (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
@@ -421,20 +413,17 @@ BAD = [
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),
     (("figures", "webster", "--store", "runs.sqlite"), "there is no store"),
-    (("figures", "--seeds", "1"), "seeds must be an integer 2 … 10000, got 1"),
     (("reproduce", "--seeds", "1"), "seeds must be an integer"),
-    (("reproduce", "--jobs", "0"), "--jobs must be an integer 1 … 1024, got 0"),
     (("reproduce", "--only", "fare"), "did you mean 'fair'"),
     (("crossval", "four-wy"), "unknown scenario"),
-    (("crossval", "-c", "dm"), "did you mean 'dim'"),
-    (("crossval", "--split", "4:x"), "4:x"),
     (("crossval", "--seeds", "0"), "--seeds"),
     (("crossval", "--horizon", "0"), "horizon"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
-    (("crossval", "--replay", "-d", "400"), "no dim run of 400"),
+    (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
+    (("crossval", "--replay", "--split", "1:1:1:1"), "unknown split of a published run"),
     (("crossval", "--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("crossval", "--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
+    (("crossval", "--replay", "five-way", "-c", "v2ic"), "3 and 5 arms balanced only, with dim"),
     (("crossval", "three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
     (("crossval", "-p", "as_run", "-c", "reservation"), "reservation cannot serve four-way at 150"),
 ]
@@ -448,12 +437,6 @@ def test_bad_input_is_one_line_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     assert named in fails(capsys, *arguments)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_broken_arrivals_name_the_line(capsys: Captured, tmp_path: Path) -> None:
-    arrivals = tmp_path / "arrivals.csv"
-    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
-    assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
 
 
 @pytest.mark.parametrize(
@@ -547,13 +530,6 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
     (false,) = [claim for claim in printed["claims"] if not claim["holds"]]
     assert (false["name"], false["failures"]) == ("largest", 1)
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
-
-
-def test_verify_draws(capsys: Captured, tmp_path: Path) -> None:
-    picture = tmp_path / "cases.png"
-    assert f"wrote {picture}" in ok(capsys, "verify", "four-way", "--plot", str(picture))
-    with Image.open(picture) as image:
-        assert image.width > 2 * image.height
 
 
 def test_protocol_of_the_default_rules(capsys: Captured) -> None:

@@ -221,25 +221,6 @@ def test_published_arrivals_with_another_vehicle() -> None:
     assert np.array_equal(recorded.time, published_arrivals("4:1:4:1", 200, 4).time)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (([], [400], []), "no dim run of 400 veh/h; it has 150, 200, 250, 300, 350"),
-        (
-            (["five-way"], [], ["4:3:2:1"]),
-            "no dim run of five-way, 4:3:2:1; .* 5 arms balanced only",
-        ),
-        (([], [], ["1:1:1:1"]), "unknown split of a published run"),
-    ],
-)
-def test_replays_that_were_not_published(
-    arguments: tuple[list[str], list[float], list[str]], message: str
-) -> None:
-    names, densities, splits = arguments
-    with pytest.raises(InputError, match=message):
-        replayed_cases(names, ["dim"], densities, splits, "as_run", 3600.0)
-
-
 def test_own_arrivals_stand_beside_comparable_numbers_only() -> None:
     fts = Case(four_way(350, profile="as_run"), "fixed-time")
     assert fts.reference("waiting_time_s", "all") == 73.9598
