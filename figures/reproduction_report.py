@@ -132,7 +132,6 @@ def _made_table(made: Sequence[Made]) -> Table:
 
 
 def _cost_table(studies: Iterable[Results]) -> Table:
-    """CPU seconds a simulated hour by controller and study."""
     run = [results for results in studies if not results.good.empty]
     series = dict.fromkeys(point.series for results in run for point in results.study.points)
     rows = [
@@ -160,7 +159,6 @@ def _shown(item: Item, drawing: Drawing) -> str:
 
 
 def _cells(results: Results) -> Iterator[tuple[Point, pd.DataFrame]]:
-    """Each point that has rows, with its rows."""
     if not results.good.empty:
         groups = results.good.groupby(list(results.study.points[0]._asdict()))
         for point in results.study.chosen(results.effort):

@@ -76,7 +76,6 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
 
 
 def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
-    """Draw the nodes where their lanes are around the junction."""
     places = {
         m.origin: np.array(intersection.arms[m.origin].outward) for m in explanation.participants
     }

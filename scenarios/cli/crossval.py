@@ -143,7 +143,6 @@ def crossval(
 
 
 def _command(context: typer.Context) -> str:
-    """The command line that makes the same report."""
     words = ["minisim", "crossval"]
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")

@@ -39,9 +39,6 @@ TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 #: the order of vehicles that came in the same second decides more.
 TRAVEL_350: Final = 3.0
 
-#: Horizon of the published runs [s].
-HOUR: Final = 3600.0
-
 
 @declared
 class Case:
@@ -94,7 +91,7 @@ class Case:
 
     def reference(self, metric: str, lane: str) -> float | None:
         """The paper's mean [s]; None where it has none that this cell should reproduce."""
-        if not self.same_law or self.scenario.horizon != HOUR:
+        if not self.same_law or self.scenario.horizon != 3600.0:  # that of the published runs
             return None
         who = PUBLISHED.get(self.controller)
         if who is None or not float(self.density).is_integer():

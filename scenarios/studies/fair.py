@@ -145,6 +145,5 @@ def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 
 def _zero(x: Sequence[float], y: Sequence[float], k: int) -> float:
-    """Where the line from point k − 1 to point k is 0."""
     share = y[k - 1] / (y[k - 1] - y[k])
     return x[k - 1] + share * (x[k] - x[k - 1])

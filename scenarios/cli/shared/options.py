@@ -14,7 +14,6 @@ from minisim.errors import InputError, integer
 from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals as ArrivalTable
     from scenarios.scenario import Scenario
 
 #: A group of options in the help.
@@ -90,26 +89,22 @@ def build_scenario(
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made
-    recorded = read_arrivals(arrivals, made.intersection.n)
-    _check_arms(arrivals, recorded, made.intersection.n)
+    n = made.intersection.n
+    recorded = read_arrivals(arrivals, n)
+    if len(recorded) >= ENOUGH:
+        # A table from a junction with fewer arms is refused: its manoeuvres would mean other exits.
+        arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
+        if arms < n:
+            raise InputError(
+                f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from "
+                f"lane {ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+            )
     return replace(made, recorded=recorded)
 
 
 #: So many arrivals use the last lane or the last manoeuvre. With equal shares on 4 arms, the chance
 #: that they use neither is (1/2)^30, one in 10^9.
 ENOUGH = 30
-
-
-def _check_arms(path: Path, recorded: ArrivalTable, n: int) -> None:
-    """Refuse a table from a junction with fewer arms: its manoeuvres would mean other exits."""
-    if len(recorded) < ENOUGH:
-        return
-    arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
-    if arms < n:
-        raise InputError(
-            f"{path} looks like arrivals of a junction with {arms} arms: none comes from lane "
-            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-        )
 
 
 def _bearings(text: str) -> tuple[float, ...]:

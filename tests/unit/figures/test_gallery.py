@@ -59,16 +59,8 @@ def having(wanted: Callable[[Recipe], bool], effort: Effort = EFFORT, **columns:
 PARTIAL, EMPTY = having(lambda e: e.label != "adaptive"), having(lambda _: False)
 
 
-def figure_of(name: str, archive: Archive) -> Figure:
-    drawing = GALLERY[name].build(archive)
-    assert isinstance(drawing, Figure)
-    return drawing
-
-
-def table_of(name: str, archive: Archive) -> Table:
-    drawing = GALLERY[name].build(archive)
-    assert isinstance(drawing, Table)
-    return drawing
+def drawn(name: str, archive: Archive) -> Any:
+    return GALLERY[name].build(archive)
 
 
 def texts_of(figure: Figure) -> list[str]:
@@ -144,7 +136,7 @@ def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
 
 
 def test_what_is_missing_is_said_in_the_picture() -> None:
-    figure = figure_of("fair", PARTIAL)
+    figure = drawn("fair", PARTIAL)
     (note,) = [text for text in texts_of(figure) if "no run" in text]
     assert "adaptive (fair, 4 arms, balanced, 50)" in note
     assert "9 more" in note
@@ -153,7 +145,7 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
 def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
     some = having(lambda e: (e.label, e.seed) != ("all-way-stop", 2))
-    (note,) = [t for t in texts_of(figure_of("fair", some)) if "s each" in t]
+    (note,) = [t for t in texts_of(drawn("fair", some)) if "s each" in t]
     assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
@@ -163,8 +155,8 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
 
 def test_losses_end_where_the_runs_do() -> None:
     archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)))
-    assert "demands tried, 150 to 350." in table_of("losses-table", archive).notes[0]
-    for axes in figure_of("losses", archive).axes:
+    assert "demands tried, 150 to 350." in drawn("losses-table", archive).notes[0]
+    for axes in drawn("losses", archive).axes:
         assert axes.get_xticks().tolist() == [150.0, 350.0]
         bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
         assert bars
@@ -174,7 +166,7 @@ def test_losses_end_where_the_runs_do() -> None:
 
 
 def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = figure_of("waiting-4321", archive)
+    figure = drawn("waiting-4321", archive)
     for axes in figure.axes:
         hollow = [line for line in axes.lines if line.get_markerfacecolor() == "none"]
         for line, (published, series) in zip(hollow, SERIES.items(), strict=True):
@@ -189,7 +181,7 @@ def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
 
 
 def test_our_means_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = figure_of("fair", archive)
+    figure = drawn("fair", archive)
     (results,) = archive.need("fair")
     handles = figure.axes[0].get_legend_handles_labels()[0]
     for handle, series in zip(handles, RIVALS, strict=True):
@@ -236,14 +228,14 @@ def test_harmony_table_is_the_published_matrix(arms: int) -> None:
 
 
 def test_lane_table_has_the_paper_s_numbers(archive: Archive) -> None:
-    printed = {row[:2]: row[2] for row in table_of("lanes", archive).rows}
+    printed = {row[:2]: row[2] for row in drawn("lanes", archive).rows}
     assert printed["4-way", "d"] == "10.21"
     assert printed["5-way", "e"] == "146.11"
     assert printed["3-way", "a"] == "0.46 †", "its run stopped early"
 
 
 def test_capacity_table_has_what_the_rows_hold(archive: Archive) -> None:
-    table = table_of("capacity-table", archive)
+    table = drawn("capacity-table", archive)
     first = dict(zip(table.headings, table.rows[0], strict=True))
     assert first["controller"] == "DIM"
     for arms in (3, 4, 5, 6):
@@ -278,9 +270,9 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     pictures = tmp_path / "figures"
     failed = {"controller": "x", "scenario": "four-way", "density": 1.0, "seed": 3, "error": "no"}
     made = [Made("text", 700, 700.0, 699, 12.3, 45.6, (failed,))]
-    drawn: list[int] = []
-    count = report.write_report(PARTIAL, made, 2, tmp_path, lambda done, total: drawn.append(done))
-    assert count == len(FEW) == len(drawn)
+    done: list[int] = []
+    count = report.write_report(PARTIAL, made, 2, tmp_path, lambda k, total: done.append(k))
+    assert count == len(FEW) == len(done)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "![clear against harmonious gate](figures/gate.png)" in text
     assert (pictures / "gate.png").is_file()
@@ -333,5 +325,5 @@ def test_the_report_keeps_its_appendix_for_the_end() -> None:
 
 
 def test_causes_that_share_a_number_are_named_once(archive: Archive) -> None:
-    for row in table_of("comparison-as-run", archive).rows:
+    for row in drawn("comparison-as-run", archive).rows:
         assert len(row[-1].split()) == len(set(row[-1].split()))

@@ -68,13 +68,9 @@ def test_help_lists_every_command(capsys: Captured) -> None:
     text = ok(capsys, "--help")
     assert ok(capsys) == text
     assert all(f" {name} " in text for name in COMMANDS)
+    assert all(f"minisim {name}" in ok(capsys, name, "--help") for name in COMMANDS)
     assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
     assert {c.name or c.callback.__name__ for c in app.registered_commands} == set(COMMANDS)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help(capsys: Captured, command: str) -> None:
-    assert f"minisim {command}" in ok(capsys, command, "--help")
 
 
 def test_run_help_has_examples_that_work(capsys: Captured) -> None:
@@ -351,22 +347,14 @@ BAD = [
     (("run", "four-way", "--fo"), "--fo"),
     (("run", "for-way"), "did you mean 'four-way'"),
     (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
-    (("run", "2-way"), "3 … 12"),
-    (("run", "custom"), "needs bearings"),
-    (("run", "custom", "--bearings", "0,10,90"), "at least 30°"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
-    (("run", "four-way", "--split", "1:1:inf:1"), "must be a finite number, got inf"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
-    (("run", "four-way", "-p", "pape"), "did you mean 'paper'"),
     (("run", "four-way", "-d", "-1"), "-1"),
     (("run", "four-way", "-d", "many"), "many"),
-    (("run", "four-way", "-c", "adaptive", "--humans", "0.1"), "not with 'adaptive'"),
-    (("run", "four-way", "-p", "as_run", "--humans", "0.1"), "among vehicles of DIM"),
     (("run", "four-way", "--split", "4;3"), "4;3"),
-    (("run", "four-way", "--turns", "1:1"), "2 shares for 3 manoeuvres"),
     (("run", "four-way", "--side", "up"), "left, right"),
     (("run", "four-way", "--horizon", "0"), "horizon"),
     (("run", "four-way", "--on-collision", "ignore"), "stop, record"),
@@ -379,9 +367,6 @@ BAD = [
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
     (("decide", "four-way"), "MOVEMENTS"),
-    (("decide", "four-way", "a1", "a2"), "a1 and a2"),
-    (("decide", "four-way", "a4"), "1 … 3"),
-    (("decide", "four-way", "e1"), "a … d"),
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
@@ -389,11 +374,9 @@ BAD = [
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
-    (("controllers", "own_none:X"), "no module 'own_none'"),
     (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
     (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
-    (("verify", "four-way", "--order", "sise"), "unknown order 'sise'"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
     (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
@@ -405,7 +388,6 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "paper", "--export", "missing/rows.csv"), "there is no folder"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("sweep", "papers"), "did you mean 'paper'"),
     (("sweep", "missing.toml"), "cannot read experiments from missing.toml"),
@@ -415,9 +397,7 @@ BAD = [
     (("figures", "webster", "--store", "runs.sqlite"), "there is no store"),
     (("reproduce", "--seeds", "1"), "seeds must be an integer"),
     (("reproduce", "--only", "fare"), "did you mean 'fair'"),
-    (("crossval", "four-wy"), "unknown scenario"),
     (("crossval", "--seeds", "0"), "--seeds"),
-    (("crossval", "--horizon", "0"), "horizon"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
     (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
@@ -509,14 +489,11 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     assert "a1-b2" in decision.stdout
 
 
-def test_verify_tells_what_all_cases_showed(capsys: Captured) -> None:
+def test_verify_tells_what_all_cases_showed_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "verify", "four-way")
     assert "four-way, 4 arms: all 255 cases, order size" in text
     assert "130 (51%)" in text
     assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
-
-
-def test_verify_as_json(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
     assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
     assert all(claim["holds"] for claim in printed["claims"])
@@ -532,16 +509,13 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
 
 
-def test_protocol_of_the_default_rules(capsys: Captured) -> None:
+def test_protocol_tells_what_it_visited_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "protocol", "three-way", "--order", "lanes")
     assert "872, with 3259 transitions\n" in text
     assert "safe         yes" in text
     assert "live         yes" in text
     assert "lane a       never starves" in text
     assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
-
-
-def test_protocol_as_json(capsys: Captured) -> None:
     rules = ("--order", "lanes", "--priorities", "waiting")
     printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
     assert printed["all_states"] is True

@@ -9,9 +9,7 @@ import pytest
 
 from minisim.parameters import parameters
 from scenarios.controllers import CONTROLLERS
-from tests.unit.scenarios.cli.test_cli import ok
-
-Captured = pytest.CaptureFixture[str]
+from tests.unit.scenarios.cli.test_cli import Captured, ok
 
 
 def test_it_lists_all_of_them(capsys: Captured) -> None:

@@ -18,13 +18,11 @@ from scenarios.studies.shared.archive import Archive, MissingRunsError, find_in
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import reproduce
 from scenarios.sweep.store import Store
-
-Captured = pytest.CaptureFixture[str]
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 
 def test_list_names_everything(capsys: Captured) -> None:
-    assert main(["figures", "--list"]) == 0
-    printed = capsys.readouterr().out
+    printed = ok(capsys, "figures", "--list")
     assert all(name in printed for name in GALLERY)
 
 
@@ -48,18 +46,17 @@ def test_without_a_store_what_needs_runs_is_left_out(
 def test_a_wrong_store_is_refused_before_a_folder_is_made(tmp_path: Path, capsys: Captured) -> None:
     notes, folder = tmp_path / "notes.txt", tmp_path / "out"
     notes.write_text("mine")
-    assert main(["reproduce", "--store", str(notes), "--out", str(folder)]) == 2
-    assert "is not a store of minisim" in capsys.readouterr().err
+    said = fails(capsys, "reproduce", "--store", str(notes), "--out", str(folder))
+    assert "is not a store of minisim" in said
     assert not folder.exists()
-    assert main(["figures", "webster", "--out", str(notes)]) == 2
-    assert "it is a file" in capsys.readouterr().err
+    assert "it is a file" in fails(capsys, "figures", "webster", "--out", str(notes))
 
 
 def test_an_empty_store_says_what_makes_its_runs(tmp_path: Path, capsys: Captured) -> None:
     store = tmp_path / "runs.sqlite"
     Store(store).close()
-    assert main(["figures", "gate", "--store", str(store), "--out", str(tmp_path)]) == 2
-    assert "minisim reproduce --only gate --seeds 10" in capsys.readouterr().err
+    said = fails(capsys, "figures", "gate", "--store", str(store), "--out", str(tmp_path))
+    assert "minisim reproduce --only gate --seeds 10" in said
 
 
 TINY = Effort(
@@ -131,8 +128,9 @@ def test_reproduce_says_what_each_study_took(
 
 @pytest.mark.parametrize("command", ["reproduce", "sweep"])
 def test_help_names_every_study(command: str, capsys: Captured) -> None:
-    assert main([command, "--help"]) == 0
-    words = capsys.readouterr().out.replace("│", " ").replace(",", " ").replace(".", " ").split()
+    words = (
+        ok(capsys, command, "--help").replace("│", " ").replace(",", " ").replace(".", " ").split()
+    )
     assert {*NAMES} - {"capacity"} <= {*words}
 
 

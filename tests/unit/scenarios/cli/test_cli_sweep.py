@@ -19,8 +19,7 @@ from scenarios.studies.shared.archive import find_in
 from scenarios.studies.shared.effort import Effort
 from scenarios.sweep.store import Store
 from tests import ROOT
-
-Captured = pytest.CaptureFixture[str]
+from tests.unit.scenarios.cli.test_cli import Captured, fails
 
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
 
@@ -95,8 +94,8 @@ def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.M
 
 
 def test_results_do_not_go_over_the_experiments(file: Path, capsys: Captured) -> None:
-    assert main(["sweep", str(file), "--out", str(file)]) == 2
-    assert "FILE.toml and --out name the same file" in capsys.readouterr().err
+    said = fails(capsys, "sweep", str(file), "--out", str(file))
+    assert "FILE.toml and --out name the same file" in said
     assert file.read_text() == SMALL
 
 
@@ -105,8 +104,8 @@ def test_the_extra_is_named_where_it_is_missing(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import
     store = tmp_path / "s.db"
-    assert main(["sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store)]) == 2
-    assert "pip install 'minisim[dask]'" in capsys.readouterr().err
+    said = fails(capsys, "sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store))
+    assert "pip install 'minisim[dask]'" in said
     assert not store.exists()
 
 

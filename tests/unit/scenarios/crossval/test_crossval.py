@@ -22,7 +22,7 @@ from baselines import FixedTime, V2ICAsRun
 from dim import AsRunDim, Dim
 from figures import save
 from figures.crossval import DODGE, crossval_figures
-from minisim.errors import InputError, SumoError
+from minisim.errors import SumoError
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
 from minisim.results.run import Run
@@ -84,12 +84,6 @@ def test_ks_distance_is_the_largest_gap_of_scipys_ecdfs(
     expected = max(abs(one.evaluate(x) - other.evaluate(x)) for x in range(21))
     assert ks_distance(first, second) == pytest.approx(expected, abs=1e-12)
     assert ks_distance(second, first) == ks_distance(first, second)
-
-
-@pytest.mark.parametrize("bad", [[], [math.nan], "12"])
-def test_ks_distance_needs_numbers(bad: object) -> None:
-    with pytest.raises(InputError):
-        ks_distance([1.0], bad)  # type: ignore[arg-type]
 
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
@@ -167,18 +161,11 @@ def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
     assert found.movement == "a2"
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "value", "difference", "holds"),
-    [
-        (Tolerance(0.03), 100.0, -3.0, True),
-        (Tolerance(0.03), 100.0, 3.01, False),
-        (Tolerance(0.1, 0.3), 1.0, 0.29, True),
-        (Tolerance(0.1, 0.3), 10.0, 0.9, True),
-        (Tolerance(0.1, 0.3), 10.0, math.nan, False),
-    ],
-)
-def test_tolerances(tolerance: Tolerance, value: float, difference: float, holds: bool) -> None:
-    assert tolerance.holds(value, difference) is holds
+def test_tolerances() -> None:
+    share, either = Tolerance(0.03), Tolerance(0.1, 0.3)
+    assert [share.holds(100.0, difference) for difference in (-3.0, 3.01)] == [True, False]
+    assert either.holds(1.0, 0.29)
+    assert [either.holds(10.0, difference) for difference in (0.9, math.nan)] == [True, False]
 
 
 def test_replays_are_the_published_grid_and_its_numbers() -> None:
