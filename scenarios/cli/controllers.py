@@ -40,9 +40,9 @@ def controllers(
         for known, meaning in meanings.items():
             typer.echo(_wrapped(f"{known:{width}}{meaning}", width))
         return
-    from scenarios.controllers import described
+    from scenarios.controllers import maker_of
 
-    make = described(name).make
+    make = maker_of(name)
     meaning, parameters = _meaning(make), list(_parameters(make))
     if as_json:
         show_json({"name": name, "meaning": meaning, "parameters": parameters})
