@@ -86,10 +86,10 @@ class Recipe:
                 serve.
             CollisionError: a collision, where `on_collision` is "stop".
         """
-        if host is None:
-            from minisim.simulation import simulate as host
+        from minisim.simulation import simulate
+
         if options.get("record") is None and (record := recording(self.metrics)):
             options["record"] = record
-        return host(
+        return (host or simulate)(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

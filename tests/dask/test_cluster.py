@@ -22,9 +22,9 @@ from scenarios.cli import main
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
 from scenarios.sweep.cluster import cluster
-from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
+from tests.builders import repeatable
 
 pytest.importorskip("distributed", reason="needs the extra `dask`")
 
@@ -82,10 +82,6 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
 
 def experiments(count: int, horizon: float = 120.0) -> list[Recipe]:
     return [Recipe(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
-
-
-def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.drop(columns=list(MEASURED))
 
 
 def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:

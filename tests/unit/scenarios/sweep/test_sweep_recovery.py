@@ -22,10 +22,9 @@ from scenarios.sweep import sweep
 from scenarios.sweep.file import read_experiments
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
-from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
-from tests.builders import Deadly, killing
+from tests.builders import Deadly, killing, repeatable
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
 
@@ -34,10 +33,6 @@ EMPTY = three_way(0, horizon=1)
 
 def quick(count: int) -> list[Recipe]:
     return [Recipe(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
-
-
-def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.drop(columns=list(MEASURED))
 
 
 def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
