@@ -1,4 +1,4 @@
-"""Averages over seeds, paired differences, prediction intervals and growing queues."""
+"""Averages over seeds, paired differences, metrics of a caller and keys of recipes."""
 
 from __future__ import annotations
 
@@ -236,13 +236,10 @@ def test_what_has_no_canonical_form(odd: object) -> None:
         (four_way(250, horizon=300, profile="as_run"), "dim", (73, 5, 1.79, 68.88, -8.59)),
     ],
 )
-def test_whoever_changes_results_raises_their_version(
+def test_changed_results_need_another_version(
     scenario: Scenario, controller: str, expected: tuple[float, ...]
 ) -> None:
-    """Stores keep rows by version: one that gives other rows needs another `RESULTS`.
-
-    The numbers are what these runs gave under `RESULTS` = 3, no more; put in what they give now.
-    """
+    """Stores keep rows by version. When rows change, raise `RESULTS` and update these numbers."""
     recipe = controller_named(controller, scenario.profile)
     row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
     columns = (
