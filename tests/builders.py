@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from hypothesis import settings
 
 from dim import Dim, NoisyPerception
@@ -33,9 +34,10 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
+from scenarios.paper import Cell, reference_rows
 from scenarios.recipe import Recipe
 from scenarios.scenario import AS_RUN
-from scenarios.sweep.rows import identity_of
+from scenarios.sweep.rows import MEASURED, identity_of
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -107,6 +109,11 @@ class Deadly:
                 Path(self.once).touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return Unregulated().start(site)
+
+
+def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows without the columns that differ when a run is repeated."""
+    return rows.drop(columns=list(MEASURED))
 
 
 def as_run(scenario: SmallScenario) -> SmallScenario:
@@ -273,3 +280,8 @@ def free_flow(seconds: float) -> dict[str, float | None]:
 def share(part: float) -> settings:
     """Decorator: only this share of the profile's examples, for costly properties."""
     return settings(max_examples=max(1, round(part * settings().max_examples)))
+
+
+def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
+    """One published mean [s]."""
+    return float(reference_rows(cell, metric, lane)["value"].item())
