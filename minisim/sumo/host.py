@@ -21,35 +21,11 @@ from typing import IO, Any
 from minisim.control import Command, Controller, View
 from minisim.engine.kernel import build_motion
 from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
-from minisim.errors import (
-    FileError,
-    InputError,
-    MissingExtraError,
-    SumoError,
-    choice,
-    instance,
-)
+from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
-from minisim.hosting import (
-    AFTERMATH,
-    ON_COLLISION,
-    RECORDS,
-    Beginning,
-    ask,
-    begin,
-    checked_window,
-    collision_error,
-    counts_of,
-    kinds_of,
-)
+from minisim.hosting import AFTERMATH, ON_COLLISION, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
-from minisim.sumo.files import (
-    CONFIGURATION,
-    FCD,
-    read_trips,
-    write_configuration,
-    write_routes,
-)
+from minisim.sumo.files import CONFIGURATION, FCD, read_trips, write_configuration, write_routes
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
 from minisim.vehicle import MODELS as CAR_FOLLOWING
@@ -160,38 +136,28 @@ def _run(request: _Request) -> Run:
     home = sumo_home()
     if request.model is not None:
         choice("SUMO model", request.model, MODELS)
-    if request.record is not None:
-        choice("record", request.record, RECORDS)
-    choice("on_collision", request.on_collision, REACTIONS)
     if request.gui:
         _check_display()
-    beginning = begin(request.scenario, request.controller, request.seed)
+    hosted = begin(
+        request.scenario, request.controller, request.seed, record=request.record,
+        record_window=request.record_window, on_collision=request.on_collision, reactions=REACTIONS,
+    )  # fmt: skip
     with _folder(request.keep_files) as folder:
-        job = _prepare(request, beginning, folder, home)
-        version, ended = _host(job, home, _session(request, beginning, job))
+        job = _prepare(request, hosted, folder, home)
+        version, ended = _host(job, home, _session(request, hosted, job))
         if ended.collisions and job.stop_on_collision:
-            raise collision_error(
-                ended.collisions, request.scenario, request.controller, int(request.seed),
-                partial(request.replay, ended.collisions[0].time),
-            )  # fmt: skip
+            replay = partial(request.replay, ended.collisions[0].time)
+            raise hosted.collided(ended.collisions, replay)
         end = (job.horizon if ended.done else ended.tick) * job.law.dt
-        columns = read_trips(folder, beginning.arrivals, job, ended, end)
+        columns = read_trips(folder, hosted.arrivals, job, ended, end)
         if request.fcd is not None:
             with replacing(request.fcd) as target:
                 shutil.copyfile(folder / FCD, target)
-    return Run(
-        scenario=request.scenario,
-        controller=request.controller,
-        seed=int(request.seed),
-        site=beginning.site,
-        plan=beginning.plan,
+    return hosted.result(
         collisions=ended.collisions,
         columns=columns,
-        record=request.record,
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
-        counts=counts_of(beginning.session),
-        kinds=kinds_of(beginning.session, len(beginning.arrivals)),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 
@@ -242,9 +208,9 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         raise
 
 
-def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) -> Job:
+def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job:
     """Write all of SUMO's files, and put together what its process needs."""
-    site, arrivals, _, plan = beginning
+    site, plan = hosted.site, hosted.plan
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
     model = _model(request.model, site.vehicle)
@@ -254,9 +220,9 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         plan,
         depart_speed=depart_speed,
         record=request.record,
-        record_window=checked_window(request.record_window),
+        record_window=hosted.record_window,
     )
-    vehicles = build_vehicles(site, arrivals)
+    vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
     network = build_network(site.intersection, site.speed_limit, folder, home)
     job = Job(
@@ -277,7 +243,7 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         stop_on_collision=request.on_collision == "stop",
         teleport=request.on_collision == "teleport",
     )
-    write_configuration(folder, job, int(request.seed), request.fcd is not None)
+    write_configuration(folder, job, hosted.seed, request.fcd is not None)
     return job
 
 
@@ -311,18 +277,13 @@ def _command(gui: bool) -> tuple[str, ...]:
     return ("sumo", "-c", CONFIGURATION)
 
 
-def _session(request: _Request, beginning: Beginning, job: Job) -> Callable[[Asked], list[Command]]:
-    """What answers the worker: the controller's session."""
-    dt = beginning.site.dt
+def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], list[Command]]:
+    """The function that answers the worker with the session's commands."""
 
     def answer(asked: Asked) -> list[Command]:
         if request.progress is not None:
             request.progress(asked.tick, job.horizon)
-        view = View(time_of(asked.tick, dt), asked.vehicles)
-        return ask(
-            beginning.session, view, asked.tick,
-            controller=request.controller, site=beginning.site, vehicles=len(job.vehicles),
-        )  # fmt: skip
+        return hosted.ask(View(time_of(asked.tick, job.law.dt), asked.vehicles), asked.tick)
 
     return answer
 

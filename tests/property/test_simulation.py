@@ -12,7 +12,7 @@ import minisim
 from baselines import FixedTime
 from dim import Dim
 from minisim.control import Controller, Plan, Unregulated
-from minisim.engine.collision import touching
+from minisim.engine.collision import near_bodies, touching
 from minisim.results.run import Run
 from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
@@ -103,7 +103,7 @@ def test_broad_phase_never_misses_a_touch(scenario: Scenario, seed: int) -> None
     dt = scenario.profile.dt
     while not sim.finished:
         sim.advance(sim.time + dt)
-        rows, bodies = sim._near_bodies()
+        rows, bodies = near_bodies(sim._vehicles, sim.site)
         found = {tuple(sorted((_id(sim, rows[i]), _id(sim, rows[j])))) for i, j in touching(bodies)}
         assert found <= {c.vehicles for c in sim.collisions}
 
