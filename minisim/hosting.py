@@ -24,7 +24,7 @@ from minisim.control import (
     Site,
     View,
     Wake,
-)  # fmt: skip
+)
 from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, first_tick, time_of
 from minisim.errors import (

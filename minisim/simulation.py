@@ -20,7 +20,7 @@ from minisim.control import (
     Open,
     View,
     Wake,
-)  # fmt: skip
+)
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.state import (
@@ -33,7 +33,7 @@ from minisim.engine.state import (
     build_vehicles,
     first_tick,
     time_of,
-)  # fmt: skip
+)
 from minisim.errors import number
 from minisim.hosting import AFTERMATH, Alarm, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
