@@ -166,8 +166,6 @@ def test_cruise_control_and_model_go_together() -> None:
         VehicleType(model="cc")
     with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
         CruiseVehicle(model="idm")
-    with pytest.raises(InputError, match=r"lag \[s\]"):
-        CruiseVehicle(lag=-1.0)
 
 
 # --- which vehicle is followed -------------------------------------------------------------------
