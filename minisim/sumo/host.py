@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from minisim.control import Command, Controller, View
 from minisim.engine.kernel import build_motion
@@ -26,7 +26,7 @@ from minisim.files import replacing
 from minisim.hosting import AFTERMATH, ON_COLLISION, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
 from minisim.sumo.files import CONFIGURATION, FCD, read_trips, write_configuration, write_routes
-from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
+from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
 from minisim.vehicle import MODELS as CAR_FOLLOWING
 from minisim.vehicle import VehicleType
@@ -65,8 +65,8 @@ def simulate(
 ) -> Run:
     """Run a scenario under a controller in SUMO, as `minisim.simulate` does in minisim.
 
-    The same arrivals, vehicles, geometry, limits and commands; SUMO follows leaders, integrates,
-    inserts, measures the trips and finds collisions. libsumo runs in a process of its own.
+    Arrivals, vehicles, geometry, limits and commands are the same. SUMO follows leaders,
+    integrates, inserts, measures the trips and finds collisions, in a process of its own.
 
     Args:
         scenario: what to simulate.
@@ -78,9 +78,9 @@ def simulate(
             minisim's paths, which SUMO's network repeats.
         record_window: from and to [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
-            "teleport" is what SUMO does by default, and did in the published runs: a vehicle that
-            runs into the one ahead, or waits for 300 s, is put on the next road, or has arrived
-            where there is none; touching inside the junction does not count.
+            "teleport" is SUMO's default, as in the published runs: a vehicle that runs into the one
+            ahead or waits for 300 s is put on the next road, or has arrived where there is none.
+            Touching inside the junction does not count.
         keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
             and its trips; by default they are temporary. They also stay when the run fails, and
             the exception has a note that names the folder.
@@ -163,11 +163,7 @@ def _run(request: _Request) -> Run:
 
 
 def sumo_home() -> Path:
-    """SUMO's folder.
-
-    Raises:
-        MissingExtraError: SUMO is not installed, with the command that installs it.
-    """
+    """SUMO's folder; raises `MissingExtraError` with the command that installs SUMO."""
     for package in ("sumo", "libsumo"):
         if importlib.util.find_spec(package) is None:
             raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
@@ -185,7 +181,7 @@ def _check_display() -> None:
 
 @contextmanager
 def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """Where SUMO's files go: a folder to keep, made where it is missing, or one that vanishes."""
+    """The folder for SUMO's files: the one to keep, made if it is missing, or a temporary one."""
     if keep is None:
         with tempfile.TemporaryDirectory(prefix="minisim-sumo-") as name:
             yield Path(name)
@@ -248,7 +244,7 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
-    """SUMO's model that is to drive the vehicles; raises `InputError` where it cannot."""
+    """The model of SUMO that drives the vehicles; raises `InputError` where none can."""
     own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
     fitting = [model for model in MODELS if model == own or model in stand_ins]
     model = own if asked is None else asked
@@ -264,7 +260,7 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
 
 
 def _vehicle_for(asked: str) -> str:
-    """What to change about the vehicle for one of SUMO's models to drive it."""
+    """The vehicle that one of SUMO's models can drive."""
     if asked == "CC":
         return "a CruiseVehicle: use --profile as_run"
     models = [name for name, it in CAR_FOLLOWING.items() if asked in (it.sumo, *it.stand_ins)]
@@ -304,15 +300,18 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
             [sys.executable, "-P", "-c", CHILD], env=environment,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints,
         )  # fmt: skip
+        assert child.stdin is not None
+        assert child.stdout is not None
+        channel = Channel(child.stdout, child.stdin)
         try:
-            _send(child, job)
+            channel.send(job)
             while True:
-                match _receive(child):
+                match channel.receive():
                     case Started(version):
                         pass
                     case Asked(tick) as asked:
                         time = tick * job.law.dt
-                        _send(child, answer(asked))
+                        channel.send(answer(asked))
                     case Failed(reason):
                         said = _last_words(complaints)
                         raise SumoError(f"SUMO failed{_when(version, time)}: {reason}{said}")
@@ -330,19 +329,6 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
             child.communicate()
 
 
-def _send(child: subprocess.Popen[bytes], message: object) -> None:
-    if child.stdin is None:
-        raise EOFError
-    pickle.dump(message, child.stdin)
-    child.stdin.flush()
-
-
-def _receive(child: subprocess.Popen[bytes]) -> Any:
-    if child.stdout is None:
-        raise EOFError
-    return pickle.load(child.stdout)
-
-
 def _when(version: str, time: float) -> str:
     return f" after {time:.1f} s of simulated time" if version else " before the first step"
 
@@ -357,7 +343,7 @@ def _cause(code: int) -> str:
 
 
 def _last_words(complaints: IO[bytes]) -> str:
-    """The last lines that it wrote, as one line."""
+    """The last lines that the process wrote, as one line."""
     complaints.seek(0)
     lines = complaints.read().decode(errors="replace").split("\n")
     words = "; ".join(line.strip() for line in lines[-8:] if line.strip())
