@@ -31,9 +31,9 @@ from minisim.vehicle import VehicleType
 #: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
 LATERAL_ACCELERATION = 5.5
 
-#: Margin before a vehicle counts as unable to stop [m]. It is less than a held vehicle leaves before
-#: its line (`minisim.engine.state.STOP_MARGIN`), so a vehicle that brakes for the junction entry
-#: never counts as committed. It is more than rounding, so a vehicle that can stop always does.
+#: Margin before a vehicle counts as unable to stop [m]. A held vehicle leaves more before its line
+#: (`minisim.engine.state.STOP_MARGIN`), so a vehicle that brakes for the junction entry is never
+#: committed. The margin is more than rounding, so a vehicle that can stop always does.
 COMMIT_MARGIN = 0.1
 
 

@@ -1,7 +1,7 @@
 """The car-following models of a run, and the bounds that limits and hold lines set.
 
-All that depends on `Law.model` is in this module. The equations are in `minisim.carfollowing`, and the table
-of models in `minisim.vehicle`.
+All that depends on `Law.model` is in this module. The equations are in `minisim.carfollowing`, the
+table of models in `minisim.vehicle`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Traffic that is made up as it goes: vehicles come when it hurts, with the model as oracle.
+"""Traffic that hypothesis makes up step by step, with the model as oracle.
 
 A run's arrivals are fixed when it starts, so each rule adds to the list and runs again from the
 beginning up to now. That costs little, and shows one thing more: what comes later changes nothing
@@ -62,7 +62,7 @@ class Traffic(RuleBasedStateMachine):
 
     @rule(lane=LANES, manoeuvre=TURNS)
     def comes_now(self, lane: int, manoeuvre: int) -> None:
-        """Somebody wants to enter the road."""
+        """A vehicle wants to enter the road."""
         self._add(self.time, lane, manoeuvre)
 
     @rule(tenths=st.integers(1, 100))
@@ -86,7 +86,7 @@ class Traffic(RuleBasedStateMachine):
         self._run_to(self.time + self.lead + 3.0)
 
     def teardown(self) -> None:
-        """In the end everybody has been served."""
+        """In the end all have been served."""
         if self.trips:
             run = self._simulation().run()
             assert run.columns.arrived.all()
@@ -105,7 +105,7 @@ class Traffic(RuleBasedStateMachine):
             self._obeys(vehicle)
 
     def _obeys(self, vehicle: Observed) -> None:
-        """Who cannot stop any more before the junction has the right of way."""
+        """A vehicle that can no longer stop before the junction has the right of way."""
         b = self.road.profile.vehicle.deceleration
         if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
             assert vehicle.id in self.going
@@ -154,7 +154,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Indicators:
-    """Everybody, the vehicle too, goes by what the indicators show at the time."""
+    """All vehicles, the turning one too, go by what the indicators show at the time."""
 
     changes: tuple[Change, ...]
     name = "indicators"
@@ -202,8 +202,8 @@ class StallingSession:
 class DisturbedTraffic(Traffic):
     """The same where vehicles stall, anywhere, and change their minds while they still may.
 
-    The model knows neither; what has to hold is that nobody collides, that who cannot stop has
-    the right of way, and that in the end everybody has been served.
+    The model knows neither. Still no vehicles may collide, a vehicle that cannot stop must have the
+    right of way, and in the end all must have been served.
     """
 
     stalls: tuple[Stall, ...] = ()
@@ -212,7 +212,7 @@ class DisturbedTraffic(Traffic):
     @rule(which=st.integers(0, 20), tenths=st.integers(5, 150))
     @precondition(lambda self: self.trips)
     def stalls_now(self, which: int, tenths: int) -> None:
-        """Somebody in sight, before the junction or inside, comes to a stand for a while."""
+        """A vehicle in sight, before the junction or inside, stands for a while."""
         here = self._view().vehicles
         free = [v.id for v in here if all(s.vehicle != v.id for s in self.stalls)]
         if free:
@@ -222,7 +222,7 @@ class DisturbedTraffic(Traffic):
     @rule(which=st.integers(0, 20), manoeuvre=TURNS)
     @precondition(lambda self: self.trips)
     def changes_indicator(self, which: int, manoeuvre: int) -> None:
-        """Somebody who can still stop wants to go elsewhere, and says so from now on."""
+        """A vehicle that can still stop wants to go elsewhere, and signals so from now on."""
         b = self.road.profile.vehicle.deceleration
         here = [v for v in self._view().vehicles if v.distance >= 0.0 and can_stop(v, b)]
         free = [v for v in here if all(c.vehicle != v.id for c in self.changes)]

@@ -56,7 +56,7 @@ def test_a_quarter_of_an_hour_agrees(name: str) -> None:
 def test_hours_agree_at_every_density() -> None:
     outside = []
     for name, density in itertools.product(CONTROLLERS, DENSITIES):
-        # Seeds that nobody had looked at when the host's rules were chosen.
+        # Seeds that were not looked at when the host's rules were chosen.
         ours, theirs = means(name, density, range(101, 104), 3600.0)
         cells = (f"{ours[m]:8.2f} {theirs[m]:8.2f}" for m in MEASURES)
         print(f"{name:<15} {density:4.0f} {'  '.join(cells)}")  # noqa: T201  (for pytest -s)

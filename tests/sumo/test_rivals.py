@@ -170,7 +170,7 @@ def alike(ours: Means, theirs: Means) -> bool:
 
 
 def enter_as_sumo_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let whoever is in the junction no longer be in the way of those at the line."""
+    """Let vehicles in the junction no longer be in the way of those at the line."""
 
     def at_entry(site: Site) -> Floats:
         return np.where(site.conflicts, 0.01, -np.inf)
