@@ -10,7 +10,7 @@ import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -77,17 +77,24 @@ class Fixed:
     name: str = "fixed"
 
     def start(self, site: Site) -> Session:
-        return _FixedSession(self.plan, self.first)
+        return ScriptedSession(self.plan, lambda view: () if view.time else self.first)
 
 
-class _FixedSession:
-    def __init__(self, plan: Plan, first: tuple[Command, ...]) -> None:
-        self.plan = plan
-        self.first = first
+@dataclass(frozen=True)
+class Scripted:
+    """A controller whose sessions answer a view by calling `answer`."""
 
-    def decide(self, view: View) -> Iterable[Command]:
-        commands, self.first = self.first, ()
-        return commands
+    answer: Callable[[View], Iterable[Command]]
+    plan: Plan = field(default_factory=Plan)
+    name: str = "scripted"
+
+    def start(self, site: Site) -> Session:
+        return ScriptedSession(self.plan, self.answer)
+
+
+class ScriptedSession(NamedTuple):
+    plan: Plan
+    decide: Callable[[View], Iterable[Command]]
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def test_another_model_of_sumo_does_not_drive_them() -> None:
 
 
 @pytest.mark.slow
-def test_the_published_vehicle_agrees_but_for_those_who_follow_a_turning_one() -> None:
+def test_the_published_vehicle_agrees_except_behind_a_turning_one() -> None:
     """The replay of FTS at 350: where they differ, minisim follows a vehicle that turns off until
     the bodies are clear of each other, SUMO until its rear has left the lane.
     """
