@@ -18,8 +18,9 @@ from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS, Profile
 from scenarios.published import PUBLISHED_ARMS, RENAMED, RENAMED_ARMS, published_arrivals
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario
+from scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd

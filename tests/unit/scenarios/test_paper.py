@@ -28,8 +28,8 @@ from scenarios.paper import (
     replay,
     scenario,
 )
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from tests.builders import reference_value
 
 #: Means of SUMO 1.28 (CC model, same arrivals in the same order, step 0.01 s): wait and travel [s].
