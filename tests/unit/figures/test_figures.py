@@ -149,11 +149,6 @@ def test_ways_end_at_the_exit(run: Run, film: Frames) -> None:
         assert np.min(np.linalg.norm(exits - way[-1], axis=1)) < 1e-6
 
 
-def test_indicators_follow_the_turn(film: Frames) -> None:
-    """Manoeuvre 1 is left, 2 straight, 3 right with left-hand traffic on four arms (paper)."""
-    assert film.turn.tolist() == [-1, 0, 1] * 4
-
-
 def test_collisions_are_ringed(crash: Run) -> None:
     film, first = Frames(crash, 0.0), crash.collisions[0]
     assert film.collided(first.time - 0.1) == 0

@@ -19,7 +19,7 @@ from scenarios.studies.shared.archive import find_in
 from scenarios.studies.shared.effort import Effort
 from scenarios.sweep.store import Store
 from tests import ROOT
-from tests.unit.scenarios.cli.test_cli import Captured, fails
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
 
@@ -34,10 +34,7 @@ def file(tmp_path: Path) -> Path:
 def test_a_sweep_and_the_same_again(file: Path, tmp_path: Path, capsys: Captured) -> None:
     store, table = tmp_path / "s.db", tmp_path / "rows.csv"
     arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
-    assert main(arguments) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    lines = captured.out.splitlines()
+    lines = ok(capsys, *arguments).splitlines()
     for name in ("dim", "fixed-time"):
         assert any(f" {name} " in line and "too short" in line for line in lines)
     assert any("4 runs in" in line for line in lines)
@@ -73,8 +70,8 @@ def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> 
 def test_a_capped_signal_is_told(tmp_path: Path, capsys: Captured) -> None:
     file = tmp_path / "e.toml"
     file.write_text('horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n')
-    assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db")]) == 0
-    assert "over Webster's capacity; the cycle is capped at 180 s" in capsys.readouterr().out
+    said = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db"))
+    assert "over Webster's capacity; the cycle is capped at 180 s" in said
 
 
 def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,8 +81,7 @@ def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.M
     monkeypatch.setattr(text, "STUDY", some)
     store = tmp_path / "s.db"
     few = ["--seeds", "2", "--horizon", "5", "--jobs", "1", "--out", str(store)]
-    assert main(["sweep", "paper", *few]) == 0
-    assert "28 runs in" in capsys.readouterr().out
+    assert "28 runs in" in ok(capsys, "sweep", "paper", *few)
     with Store(store) as kept:
         assert len(kept) == 28
         assert set(kept.frame()["profile"]) == {"paper"}

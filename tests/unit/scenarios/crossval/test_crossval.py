@@ -30,7 +30,6 @@ from minisim.results.trajectories import LANE, MANOEUVRE
 from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
-from scenarios.cli import main
 from scenarios.crossval import Case, Result, crossvalidate, film, replayed_cases, runs, write_report
 from scenarios.crossval.comparison import (
     CLOSE,
@@ -43,10 +42,12 @@ from scenarios.crossval.comparison import (
     times,
 )
 from scenarios.crossval.report import markdown, summary, table
-from scenarios.paper import GREENS, GRID, PHASES, Cell, reference_value, replay
+from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from scenarios.statistics import ks_distance, mean_interval
+from tests.builders import reference_value
+from tests.unit.scenarios.cli.test_cli import fails
 
 END = 100.0
 LANES = (0, 1, 0, 1)
@@ -382,6 +383,6 @@ def test_without_sumo_the_install_command_is_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "libsumo", None)
-    assert main(["crossval", "--out", str(tmp_path / "new")]) == 2
-    assert "pip install 'minisim[sumo]'" in capsys.readouterr().err
+    said = fails(capsys, "crossval", "--out", str(tmp_path / "new"))
+    assert "pip install 'minisim[sumo]'" in said
     assert list(tmp_path.iterdir()) == []
