@@ -10,7 +10,6 @@ from minisim.results.metrics import METRICS
 from scenarios.demo import CONTROLLERS
 
 PANELS = ("waiting_time_s", "travel_time_s")
-
 #: Lines are this far apart, so that their interval bars do not cover each other [veh/h/lane].
 DODGE = 2.5
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 CSV, REPORT = "crossval.csv", "crossval.md"
 
-#: What a table shows where there is nothing to show.
-NOTHING: Final = "–"
+NOTHING: Final = "–"  # in a table
 
 
 def write_report(
