@@ -154,7 +154,6 @@ def parting_figure(result: Result, parting: Parting) -> Figure:
 
 
 def _distributions(axes: Axes, result: Result, metric: str) -> None:
-    """Share of the trips up to a time, in both hosts, and the distance of the two."""
     values = {
         MINISIM: np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
         SUMO: np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
@@ -189,7 +188,6 @@ def _scatter(axes: Axes, result: Result) -> None:
 
 
 def _limits(values: Floats) -> tuple[float, float]:
-    """Of an axis of times [s], with a little room."""
     low, high = map(float, np.quantile(values, (0.0, TAIL)))
     room = 0.03 * max(high - low, 1.0)
     return low - room, high + room
@@ -206,7 +204,6 @@ def _travel_times(result: Result) -> Floats:
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
-    """Write the vehicle and its movement beside the start of its line."""
     first = trip.iloc[0]
     axes.text(
         first[TIME] - 0.25, first[S] - entry + 2.0,
@@ -217,7 +214,6 @@ def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
 
 
 def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
-    """Title, note and legend above the panels."""
     case = result.case
     height = figure.get_figheight()
     left = figure.subplotpars.left
@@ -242,5 +238,4 @@ def _group(result: Result) -> tuple[str, ...]:
 
 
 def _file(*words: str) -> str:
-    """A file name without what is special in links and file systems."""
     return "_".join(words).replace(":", "-").replace(" ", "_")

@@ -10,19 +10,12 @@ from minisim.results.metrics import METRICS
 from scenarios.demo import CONTROLLERS
 
 PANELS = ("waiting_time_s", "travel_time_s")
-
 #: Lines are this far apart, so that their interval bars do not cover each other [veh/h/lane].
 DODGE = 2.5
 
 
 def performance_figure(points: pd.DataFrame, title: str = "") -> Figure:
-    """Draw means with their confidence intervals.
-
-    Args:
-        points: columns `controller`, `density`, and each of `PANELS` with its `…_ci95`
-            (`scenarios.demo.average`).
-        title: above the panels.
-    """
+    """Draw means with their confidence intervals, as `scenarios.demo.average` has them."""
     figure, panels = plots.panels(
         9.2, 4.5, len(PANELS), sharey=False, left=0.075, right=0.985, top=0.745, bottom=0.13,
         wspace=0.2,

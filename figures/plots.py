@@ -73,11 +73,7 @@ def draw_line(
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
     """One line a series over demand: mean over seeds, interval, arrows at growing queues.
 
-    Args:
-        axes: to draw on.
-        rows: of a study (`Results.good`).
-        metric: a column.
-        series: in the order of the legend; one without rows is left out.
+    `rows` are of a study (`Results.good`); a series without rows is left out.
     """
     if rows.empty:
         axes.text(
@@ -110,11 +106,7 @@ def draw_published(
 ) -> None:
     """The paper's values as hollow markers; those that are not comparable are crossed out.
 
-    Args:
-        axes: to draw on.
-        table: columns `series`, `density`, `paper`, `comparable`.
-        rows: ours, for the same sideways shift.
-        series: in the order of the legend.
+    The table has columns `series`, `density`, `paper`, `comparable`; our `rows` give the shift.
     """
     for place, name in enumerate(series):
         look = style.look(name)
@@ -152,11 +144,6 @@ def paper_densities(axes: Axes) -> None:
     """The paper's demands as ticks, with a margin around them."""
     axes.set_xticks(DENSITIES)
     axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
-
-
-def ylabel(axes: Axes, text: str) -> None:
-    """Label the vertical axis."""
-    axes.set_ylabel(text, fontsize=9.5, color=style.INK)
 
 
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
@@ -210,13 +197,6 @@ def looks_legend(
         for k in shown
     ]  # fmt: skip
     legend(figure, handles, [k.label for k in shown], top, ncols, **changes)
-
-
-def series_legend(
-    figure: Figure, series: Iterable[str], top: float, ncols: int | None = None
-) -> None:
-    """A legend of lines and markers by series."""
-    looks_legend(figure, map(style.look, series), top, ncols)
 
 
 def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:

@@ -26,21 +26,10 @@ def write_report(
     archive: Archive, made: Sequence[Made], jobs: int, folder: Path,
     progress: Callable[[int, int], None], *, parts: Collection[str] = NAMES,
 ) -> int:  # fmt: skip
-    """Draw into `folder`/figures, then write `folder`/report.md.
+    """Draw into `folder`/figures, then write `folder`/report.md; returns the number of drawings.
 
-    Args:
-        archive: of the runs.
-        made: the studies that were run.
-        jobs: processes used.
-        folder: of the report.
-        progress: called with the figures drawn and their number.
-        parts: studies; unless they are all, the report has only figures that need one of them.
-
-    Returns:
-        The number of figures and tables.
-
-    Raises:
-        FileError: something cannot be written.
+    `parts` are studies; unless they are all, the report has only figures that need one of them.
+    `progress` is called with the figures drawn and their number. Raises `FileError`.
     """
     pictures = make_folder(folder / "figures")
     drawn: dict[str, Drawing] = {}
@@ -143,7 +132,6 @@ def _made_table(made: Sequence[Made]) -> Table:
 
 
 def _cost_table(studies: Iterable[Results]) -> Table:
-    """CPU seconds a simulated hour by controller and study."""
     run = [results for results in studies if not results.good.empty]
     series = dict.fromkeys(point.series for results in run for point in results.study.points)
     rows = [
@@ -171,7 +159,6 @@ def _shown(item: Item, drawing: Drawing) -> str:
 
 
 def _cells(results: Results) -> Iterator[tuple[Point, pd.DataFrame]]:
-    """Each point that has rows, with its rows."""
     if not results.good.empty:
         groups = results.good.groupby(list(results.study.points[0]._asdict()))
         for point in results.study.chosen(results.effort):

@@ -45,6 +45,8 @@ ARMS = {
     "dim-5": Look("5 arms", "vermillion", "p", "-."),
 }
 
+#: Type of an axis label.
+LABEL: dict[str, Any] = {"fontsize": 9.5, "color": INK}
 #: Formats of a figure file.
 FORMATS = ("png", "pdf", "svg")
 
@@ -75,8 +77,8 @@ def write(
 def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
     """Give a plot its quiet frame: light horizontal grid, no box, title on the left."""
     axes.set_title(title, loc="left", fontsize=11, color=INK, fontweight="bold", pad=10)
-    axes.set_xlabel(xlabel, fontsize=9.5, color=INK)
-    axes.set_ylabel(ylabel, fontsize=9.5, color=INK)
+    axes.set_xlabel(xlabel, **LABEL)
+    axes.set_ylabel(ylabel, **LABEL)
     axes.tick_params(labelsize=9, colors=MUTED, labelcolor=INK, length=3)
     axes.grid(axis="y", color=FAINT, linewidth=0.8)
     axes.set_axisbelow(True)
@@ -94,12 +96,7 @@ def figure_format(path: str | os.PathLike[str]) -> str:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure in the format of its suffix, with the same bytes every time.
-
-    Raises:
-        InputError: a suffix other than `FORMATS`.
-        FileError: the file cannot be written.
-    """
+    """Write a figure in the format of its suffix, with the same bytes every time."""
     kind = figure_format(path)
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
     with replacing(path) as part, mpl.rc_context({"svg.hashsalt": "minisim", "pdf.fonttype": 42}):

@@ -13,21 +13,13 @@ from minisim.files import markdown_table, write_text
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text cells.
+    """A table of text cells."""
 
-    Attributes:
-        title: one line.
-        headings: of the columns; those after the first `labels` are numbers.
-        rows: cells as they are printed.
-        labels: how many columns from the left are words.
-        notes: small print below.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    labels: int = 1
-    notes: tuple[str, ...] = ()
+    title: str  # one line
+    headings: tuple[str, ...]  # of the columns; those after the first `labels` are numbers
+    rows: tuple[tuple[str, ...], ...]  # cells as they are printed
+    labels: int = 1  # how many columns from the left are words
+    notes: tuple[str, ...] = ()  # small print below
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.headings) for row in self.rows):

@@ -24,7 +24,6 @@ from figures.film.frames import Frames
 from figures.junction import drawing
 from minisim.errors import number
 from minisim.files import replacing
-from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats
 from minisim.results.run import Run
 
@@ -42,12 +41,8 @@ def write_animation(
 ) -> None:  # fmt: skip
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
-    Args:
-        run: recorded with `record="all"` over the time shown.
-        path: of the file; it is written whole or not at all.
-        start, seconds: the time shown [s].
-        fps: frames a second, at most one a simulation step.
-        progress: called with the frames done and their number.
+    The run was recorded with `record="all"` over the time shown. There are `fps` frames a second,
+    at most one a step; `progress` is called with the frames done and their number.
 
     Raises:
         InputError: an unknown suffix, nothing recorded, or a number out of range.
@@ -83,12 +78,7 @@ def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
 
 
 class Picture:
-    """The junction of one run at any recorded time.
-
-    Args:
-        run: recorded with `record="all"`.
-        start: served vehicles are counted from this time on [s].
-    """
+    """The junction of one run at any recorded time; served vehicles count from `start` [s] on."""
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run
@@ -96,8 +86,9 @@ class Picture:
         self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection
-        reach = view_reach(intersection, max((m.start for m in plan.markings), default=0.0))
-        self._reach = reach
+        # All markings and a little more [m].
+        zone = max((marking.start for marking in plan.markings), default=0.0)
+        self._reach = reach = max(40.0, intersection.junction_radius + zone + 4.0)
         self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
         self._axes.add_patch(Rectangle((-2e3, -2e3), 4e3, 4e3, facecolor=style.GRASS, zorder=0))
         drawing.draw_junction(self._axes, intersection, plan, reach)
@@ -225,8 +216,3 @@ class Picture:
         self._figure.draw_artist(self._clock)
         self._figure.draw_artist(self._counts)
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
-
-
-def view_reach(intersection: Intersection, zone: float) -> float:
-    """Distance from the centre that a picture shows [m]: all markings and a little more."""
-    return max(40.0, intersection.junction_radius + zone + 4.0)

@@ -35,12 +35,7 @@ COLOURS = 127
 
 
 def animation_format(path: str | os.PathLike[str]) -> str:
-    """The format of an animation by its suffix.
-
-    Raises:
-        InputError: the suffix is not in `FORMATS`.
-        MissingExtraError: .mp4 without the program ffmpeg.
-    """
+    """The format by its suffix, one of `FORMATS`; .mp4 without ffmpeg is a `MissingExtraError`."""
     suffix = Path(path).suffix.lower().removeprefix(".")
     if suffix not in FORMATS:
         allowed = ", ".join(f".{name}" for name in FORMATS)

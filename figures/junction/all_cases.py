@@ -22,12 +22,7 @@ CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE
 
 
 def verification_figure(analysis: Analysis, intersection: Intersection) -> Figure:
-    """Draw an analysis.
-
-    Args:
-        analysis: of all cases (`dim.proofs.verification.analyse`).
-        intersection: its arms give the nodes their places.
-    """
+    """Draw `dim.proofs.verification.analyse`; the arms give the nodes their places."""
     worst = list(analysis.worst.items())
     figure = style.new_figure(4.2 * (2 + len(worst)), 4.4)
     panels = figure.subplots(1, 2 + len(worst))

@@ -22,13 +22,7 @@ APPROACH = 17.0
 
 
 def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
-    """Draw which vehicles may cross, and why.
-
-    Args:
-        explanation: of the decision (`dim.explain`).
-        site: the junction and the vehicles' type.
-        plan: its markings and hold line are drawn (`Dim().start(site).plan`).
-    """
+    """Draw which vehicles may cross, and why; markings and hold line are those of the plan."""
     figure = style.new_figure(10.0, 6.0)
     left = figure.add_axes((0.02, 0.13, 0.462, 0.77))
     right = figure.add_axes((0.518, 0.13, 0.462, 0.77))
@@ -82,7 +76,6 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
 
 
 def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
-    """Draw the nodes where their lanes are around the junction."""
     places = {
         m.origin: np.array(intersection.arms[m.origin].outward) for m in explanation.participants
     }

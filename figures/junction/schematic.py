@@ -85,12 +85,14 @@ def worst_case() -> Figure:
     """Four participants with the most tied cliques, and with one harmony more.
 
     The paper's figure "worst case" draws an abstract graph; these are two real cases of its
-    four-way junction.
+    four-way junction, the second with five of six pairs in harmony.
     """
     site = four_way().site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     figure = style.new_figure(9.2, 4.9)
-    cases = (("a1", "b2", "c1", "d2"), _one_more(matrix))
+    every = product(*([f"{lane}{manoeuvre}" for manoeuvre in (1, 2, 3)] for lane in "abcd"))
+    one_more = next(case for case in every if len(explain(case, matrix).edges) == 5)
+    cases = (("a1", "b2", "c1", "d2"), one_more)
     for k, (letter, case) in enumerate(zip("AB", cases, strict=True)):
         left = 0.02 + 0.49 * k
         told = explain(case, matrix)
@@ -106,12 +108,6 @@ def worst_case() -> Figure:
         names = " ".join(map(str, told.right_of_way))
         style.write(figure, left, 0.06, f"{names} holds the highest-priority lanes and goes.", 10.5)
     return figure
-
-
-def _one_more(matrix: HarmonyMatrix) -> tuple[str, ...]:
-    """The first case on four arms with five pairs in harmony, as in the paper's second graph."""
-    cases = product(*([f"{lane}{manoeuvre}" for manoeuvre in (1, 2, 3)] for lane in "abcd"))
-    return next(case for case in cases if len(explain(case, matrix).edges) == 5)
 
 
 def _draw_cliques(axes: Axes, told: Explanation) -> None:

@@ -98,7 +98,6 @@ def ending(archive: Archive) -> str:
 
 
 def _where(known: Discrepancy) -> str:
-    """Where a discrepancy holds, in words."""
     words = (
         style.look(known.series).label if known.series else "every controller",
         f"{known.arms} arms" if known.arms else "",

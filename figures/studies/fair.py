@@ -28,9 +28,9 @@ def fair_figure(results: Results) -> Figure:
         style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
         plots.log_time(axes, 0.0, 4000.0, linear=0.1)
         plots.density_axis(axes, rows["density"])
-    plots.ylabel(panels[0], f"mean of all vehicles [s], {plots.scale_words(0.1)}")
+    panels[0].set_ylabel(f"mean of all vehicles [s], {plots.scale_words(0.1)}", **style.LABEL)
     plots.heading(figure, "Every controller on four arms, profile fair")
-    plots.series_legend(figure, RIVALS, 0.93, ncols=4)
+    plots.looks_legend(figure, map(style.look, RIVALS), 0.93, 4)
     plots.marks_legend(figure, 0.842)
     plots.footnote(figure, (
         f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
@@ -40,11 +40,7 @@ def fair_figure(results: Results) -> Figure:
 
 
 def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
-    """From which demand on DIM does worse; see `losses`.
-
-    Raises:
-        MissingRunsError: no pair has two demands in common.
-    """
+    """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
     known = {} if results.good.empty else losses(results.good)
     if not known:
         raise MissingRunsError(
@@ -71,7 +67,7 @@ def crossing_figure(results: Results) -> Figure:
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
     plots.heading(figure, "Demands at which DIM does worse than …")
-    plots.series_legend(figure, GATES, 0.925)
+    plots.looks_legend(figure, map(style.look, GATES), 0.925)
     words = "pale bar: demands at which DIM does worse     marker and line: where that begins, with"
     style.write(figure, plots.LEFT, 0.845, f"{words} its 95 % interval", 8.5)
     plots.footnote(figure, missing_note(results))

@@ -37,7 +37,7 @@ def fairness_figure(results: Results) -> Figure:
     spread.set_ylim(0.0, 0.8)
     by_lane.set_ylim(bottom=0.0)
     plots.heading(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
-    plots.series_legend(figure, PRIORITIES, 0.925)
+    plots.looks_legend(figure, map(style.look, PRIORITIES), 0.925)
     plots.marks_legend(figure, 0.865)
     plots.footnote(figure, missing_note(results))
     return figure

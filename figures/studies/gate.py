@@ -22,9 +22,9 @@ def gate_figure(results: Results) -> Figure:
         style.plot_axes(axes, f"{arms} arms", plots.DENSITY_LABEL, "")
         plots.log_time(axes, 0.0, 500.0, linear=0.1)
         plots.paper_densities(axes)
-    plots.ylabel(panels[0], f"mean waiting [s], {plots.scale_words(0.1)}")
+    panels[0].set_ylabel(f"mean waiting [s], {plots.scale_words(0.1)}", **style.LABEL)
     plots.heading(figure, "Two gates: a clear junction, or harmony with all vehicles that cross")
-    plots.series_legend(figure, GATES, 0.925)
+    plots.looks_legend(figure, map(style.look, GATES), 0.925)
     plots.marks_legend(figure, 0.865)
     plots.footnote(figure, missing_note(results))
     return figure

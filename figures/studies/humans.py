@@ -45,7 +45,7 @@ def human_figure(results: Results) -> Figure:
         style.plot_axes(axes, f"{density:g} veh/h/lane", "human drivers [%]", "")
         axes.set_xticks([100.0 * share for share in SHARES])
         plots.log_time(axes, 1.0, 1000.0)
-    plots.ylabel(panels[0], "mean delay of all vehicles [s], logarithmic")
+    panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
     plots.heading(figure, "Human drivers among vehicles of DIM on four arms, profile fair")
     plots.looks_legend(figure, [*LOOKS.values(), stop], 0.935, 3, fontsize=9.0)
     plots.marks_legend(figure, 0.842)

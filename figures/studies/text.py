@@ -73,16 +73,7 @@ def _grid_figure(
     both: tuple[Results, ...], measure: Measure, what: str, series: tuple[str, ...],
     chosen: Callable[[pd.DataFrame], pd.DataFrame], wanted: Callable[[Point], bool],
 ) -> Figure:  # fmt: skip
-    """One panel a study.
-
-    Args:
-        both: studies.
-        measure: the time over demand.
-        what: the rest of the title.
-        series: the lines.
-        chosen: takes from a table, ours or the paper's, the rows of the figure.
-        wanted: whether a point belongs to the figure.
-    """
+    """One panel a study; `chosen` takes the figure's rows from a table, ours or the paper's."""
     figure, panels = plots.panels(
         9.2, 4.9, len(BOTH), left=0.07, right=0.988, top=0.735, bottom=0.15, wspace=0.07
     )
@@ -98,9 +89,9 @@ def _grid_figure(
         plots.log_time(axes, measure.low, measure.high, linear=measure.linear)
         plots.paper_densities(axes)
     scale = plots.scale_words(measure.linear)
-    plots.ylabel(panels[0], f"mean {measure.name} time [s], {scale}")
+    panels[0].set_ylabel(f"mean {measure.name} time [s], {scale}", **style.LABEL)
     plots.heading(figure, f"Mean {measure.name} time{what}")
-    plots.series_legend(figure, series, 0.925)
+    plots.looks_legend(figure, map(style.look, series), 0.925)
     plots.marks_legend(figure, 0.868, paper=True)
     plots.footnote(figure, missing_note(*both, wanted=wanted))
     return figure

@@ -49,10 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with terminable():
             code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
-    except CollisionError as error:
-        return _fail(_message(error), 1)
     except MinisimError as error:
-        return _fail(_message(error))
+        told = "; ".join([str(error), *getattr(error, "__notes__", ())])
+        return _fail(told, 1 if isinstance(error, CollisionError) else 2)
     except _USAGE_ERROR as error:
         message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
         help_of = [name for name in given[:1] if name in COMMANDS]
@@ -74,11 +73,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == 130:
         typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
-
-
-def _message(error: MinisimError) -> str:
-    """The message and the notes that were added on the way."""
-    return "; ".join([str(error), *getattr(error, "__notes__", ())])
 
 
 def _fail(message: str, code: int = 2) -> int:

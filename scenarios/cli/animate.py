@@ -23,10 +23,8 @@ def animate(
     scenario: options.ScenarioName,
     out: Annotated[
         Path,
-        typer.Option(
-            "--out", "-o", metavar="FILE",
-            help="What to write: .gif, .mp4 (needs ffmpeg) or .html (a page with a player).",
-        ),
+        options.option("What to write: .gif, .mp4 (needs ffmpeg) or .html (a page with a player).",
+                       "FILE", "--out", "-o"),
     ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,

@@ -21,8 +21,7 @@ from scenarios.cli.shared.terminal import show_json
 )
 def controllers(
     name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="List the parameters of this one."),
+        str | None, typer.Argument(metavar="NAME", help="List the parameters of this one.")
     ] = None,
     as_json: options.AsJson = False,
 ) -> None:

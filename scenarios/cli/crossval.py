@@ -13,6 +13,7 @@ import typer
 from minisim.errors import InputError, integer
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar
 
 #: What is compared by default, and with --quick.
@@ -41,59 +42,40 @@ def crossval(
     context: typer.Context,
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[SCENARIO]...",
-            help="Junctions: three-way, four-way, five-way or N-way; four-way by default, with "
-            "--replay all that were published.",
-        ),
+        typer.Argument(metavar="[SCENARIO]...", help="Junctions: three-way, four-way, five-way or "
+                       "N-way; four-way by default, with --replay all that were published."),
     ] = None,
     controller: Annotated[
         list[str] | None,
-        typer.Option(
-            "--controller", "-c", metavar="NAME",
-            help="Who decides, as for minisim run; repeat it for more. dim and fixed-time by "
-            "default. With --replay whose published runs: dim (the default), fixed-time, adaptive "
-            "or v2ic.",
-        ),
+        option("Who decides, as for minisim run; repeat it for more. dim and fixed-time by "
+               "default. With --replay whose published runs: dim (the default), fixed-time, "
+               "adaptive or v2ic.", "NAME", "--controller", "-c"),
     ] = None,
     density: Annotated[
         list[float] | None,
-        typer.Option(
-            "--density", "-d", metavar="VEH/H",
-            help="Mean inflow a lane; repeat it for more. 150, 250 and 350 by default, with "
-            "--replay all that were published.",
-        ),
+        option("Mean inflow a lane; repeat it for more. 150, 250 and 350 by default, with "
+               "--replay all that were published.", "VEH/H", "--density", "-d"),
     ] = None,
     split: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="4:3:2:1",
-            help="Shares of the lanes, or balanced; repeat it for more. balanced by default, with "
-            "--replay all that were published.",
-        ),
+        option("Shares of the lanes, or balanced; repeat it for more. balanced by default, with "
+               "--replay all that were published.", "4:3:2:1"),
     ] = None,
     profile: Annotated[
         str | None,
-        typer.Option(
-            "--profile", "-p", metavar="NAME",
-            help="Vehicle and speeds: fair (the default), paper, as_run or as_run_signals; with "
-            "--replay those of the published runs by default.",
-        ),
+        option("Vehicle and speeds: fair (the default), paper, as_run or as_run_signals; with "
+               "--replay those of the published runs by default.", "NAME", "--profile", "-p"),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(help="Runs a cell, 1 … 1000; 3 by default, 2 with --quick.")
+        int | None, option("Runs a cell, 1 … 1000; 3 by default, 2 with --quick.")
     ] = None,
     horizon: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Simulated time; 3600 by default, 300 with --quick."),
+        float | None, option("Simulated time; 3600 by default, 300 with --quick.", "S")
     ] = None,
     replay: Annotated[
         bool,
-        typer.Option(
-            "--replay",
-            help="Replay published runs: their arrivals, vehicles and controllers; compare with "
-            "the paper too. With another --profile only the arrivals are theirs.",
-        ),
+        option("Replay published runs: their arrivals, vehicles and controllers; compare with the "
+               "paper too. With another --profile only the arrivals are theirs.", None, "--replay"),
     ] = False,
     jobs: options.Jobs = None,
     out: options.Folder = Path("out/crossval"),
@@ -161,7 +143,6 @@ def crossval(
 
 
 def _command(context: typer.Context) -> str:
-    """The command line that makes the same report."""
     words = ["minisim", "crossval"]
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")

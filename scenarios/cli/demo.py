@@ -22,8 +22,7 @@ from scenarios.cli.shared.terminal import bar, show
 def demo(
     out: options.Folder = Path("out"),
     seeds: Annotated[
-        int | None,
-        typer.Option(help="Runs a point, 2 … 1000; 5 by default, 2 with --quick."),
+        int | None, options.option("Runs a point, 2 … 1000; 5 by default, 2 with --quick.")
     ] = None,
     jobs: options.Jobs = None,
     quick: options.Quick = False,

@@ -11,6 +11,7 @@ import typer
 from minisim.errors import InputError
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar, show
 
 
@@ -31,19 +32,16 @@ def figures(
     ] = None,
     out: options.Folder = Path("out/figures"),
     store: Annotated[
-        Path | None,
-        typer.Option(metavar="STORE", help="The runs, as made by minisim reproduce or sweep."),
+        Path | None, option("The runs, as made by minisim reproduce or sweep.", "STORE")
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(
-            help="Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with --quick."
-        ),
+        option("Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with --quick."),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Look for the runs of minisim reproduce --quick.")
+        bool, option("Look for the runs of minisim reproduce --quick.", None, "--quick")
     ] = False,
-    as_list: Annotated[bool, typer.Option("--list", help="List the names and stop.")] = False,
+    as_list: Annotated[bool, option("List the names and stop.", None, "--list")] = False,
 ) -> None:
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write

@@ -61,10 +61,8 @@ def protocol(
     ] = "fixed",
     counterexample: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="If it is unsafe: write arrivals with which simulated vehicles collide.",
-        ),
+        options.option("If it is unsafe: write arrivals with which simulated vehicles collide.",
+                       "FILE.csv"),
     ] = None,
     bearings: options.Bearings = None,
     side: options.Side = "left",

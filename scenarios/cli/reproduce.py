@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar
 from scenarios.studies import NAMES, study_named
-
-if TYPE_CHECKING:
-    pass
 
 
 @app.command(
@@ -32,25 +30,22 @@ if TYPE_CHECKING:
 def reproduce(
     out: options.Folder = Path("out"),
     store: Annotated[
-        Path | None,
-        typer.Option(metavar="STORE", help="Where the runs are kept; DIR/runs.sqlite by default."),
+        Path | None, option("Where the runs are kept; DIR/runs.sqlite by default.", "STORE")
     ] = None,
     seeds: Annotated[
-        int | None,
-        typer.Option(help="Runs a case, at least 2; 10 by default, 2 with --quick."),
+        int | None, option("Runs a case, at least 2; 10 by default, 2 with --quick.")
     ] = None,
     jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="STUDY",
-            help="Only this one, and only what is drawn from it; may be repeated. One of "
+        option(
+            "Only this one, and only what is drawn from it; may be repeated. One of "
             f"{', '.join(NAMES)}.",
+            "STUDY",
         ),
     ] = None,
     quick: Annotated[
-        bool,
-        typer.Option("--quick", help="Two demands, 150 s each: a smoke test."),
+        bool, option("Two demands, 150 s each: a smoke test.", None, "--quick")
     ] = False,
 ) -> None:
     """Run the paper's experiments and ours, draw every figure, and write a report."""

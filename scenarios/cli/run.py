@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,18 +11,12 @@ import typer
 from minisim.errors import CollisionError, InputError, choice
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import option
 from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
 from scenarios.cli.shared.terminal import bar, show, show_json
 
-
-def _file(help: str) -> Any:
-    return typer.Option(metavar="FILE", rich_help_panel=options.FILES, help=help)
-
-
-def _sumo(help: str, metavar: str | None, *flags: str) -> Any:
-    return typer.Option(
-        *flags, metavar=metavar, show_default=False, rich_help_panel="SUMO", help=help
-    )
+_file = partial(option, metavar="FILE", rich_help_panel=options.FILES)
+_sumo = partial(option, rich_help_panel="SUMO")
 
 
 @app.command(
@@ -43,36 +37,21 @@ def run(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
-    horizon: Annotated[
-        float,
-        typer.Option(metavar="S", show_default=False, help="Simulated time; 3600 unless told."),
-    ] = 3600.0,
-    warmup: Annotated[
-        float, typer.Option(metavar="S", show_default=False, help="Earlier trips do not count.")
-    ] = 0.0,
-    on_collision: Annotated[
-        str,
-        typer.Option(metavar="DO", show_default=False, help="stop, record, or teleport (SUMO)."),
-    ] = "stop",
-    no_safety: Annotated[
-        bool, typer.Option("--no-safety", help="Do not measure TTC and PET.")
-    ] = False,
+    horizon: Annotated[float, option("Simulated time; 3600 unless told.", "S")] = 3600.0,
+    warmup: Annotated[float, option("Earlier trips do not count.", "S")] = 0.0,
+    on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
+    no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
     metrics: Annotated[
-        str | None,
-        typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
+        str | None, option("Measure these; minisim metrics lists them.", "A,B")
     ] = None,
-    by: Annotated[
-        str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
-    ] = "lane",
+    by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
     host: Annotated[str, _sumo("What moves vehicles: minisim or sumo.", "NAME")] = "minisim",
-    sumo_model: Annotated[
-        str | None, _sumo("IDM, Krauss or CC, if not its own.", "NAME")
-    ] = None,
+    sumo_model: Annotated[str | None, _sumo("IDM, Krauss or CC, if not its own.", "NAME")] = None,
     gui: Annotated[bool, _sumo("Show the run in sumo-gui.", None, "--gui")] = False,
     keep_files: Annotated[Path | None, _sumo("Keep SUMO's files in a new folder.", "DIR")] = None,
     sumo_fcd: Annotated[Path | None, _sumo("SUMO's own floating-car data (XML).", "FILE")] = None,
@@ -98,10 +77,13 @@ def run(
     asked = asked_metrics([] if metrics is None else [name.strip() for name in metrics.split(",")])
     choice("--by", by, GROUPS)
     if choice("host", host, ("minisim", "sumo")) == "minisim":
-        _refuse_sumo_options({
+        only_sumo = {
             "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
             "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",
-        })  # fmt: skip
+        }  # fmt: skip
+        if refused := [name for name, value in only_sumo.items() if value]:
+            need = "needs" if len(refused) == 1 else "need"
+            raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
@@ -140,11 +122,3 @@ def run(
         typer.echo(f"  wrote {path}")
     if keep_files is not None:
         typer.echo(f"  SUMO's files are in {keep_files}")
-
-
-def _refuse_sumo_options(given: Mapping[str, object]) -> None:
-    """Raise `InputError` where an option asks for what only SUMO can do."""
-    asked = [name for name, value in given.items() if value]
-    if asked:
-        need = "needs" if len(asked) == 1 else "need"
-        raise InputError(f"{' and '.join(asked)} {need} --host sumo")

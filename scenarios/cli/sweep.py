@@ -11,6 +11,7 @@ import typer
 from minisim.errors import InputError, choice, integer, number
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar, show
 from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.termination import Terminated
@@ -74,24 +75,20 @@ def sweep(
         typer.Option("--out", "-o", metavar="STORE", help="Where results are kept; made if new."),
     ] = Path("sweep.db"),
     seeds: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Runs a cell, seeds 1 … N; as the file says, or 10."),
+        int | None, option("Runs a cell, seeds 1 … N; as the file says, or 10.", "N")
     ] = None,
     jobs: options.Jobs = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Run on the Dask cluster of this scheduler (pip install 'minisim\\[dask]').",
+        option(
+            "Run on the Dask cluster of this scheduler (pip install 'minisim\\[dask]').", "ADDRESS"
         ),
     ] = None,
     export: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write one row a run (.csv or .parquet)."),
+        Path | None, option("Write one row a run (.csv or .parquet).", "FILE")
     ] = None,
     horizon: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Simulated time; as the file says, or 3600."),
+        float | None, option("Simulated time; as the file says, or 3600.", "S")
     ] = None,
 ) -> None:
     """Run many experiments over seeds; results are kept, and what is there is not run again."""

@@ -9,11 +9,4 @@ from scenarios.crossval.report import write_report
 from scenarios.crossval.results import Result
 from scenarios.crossval.runs import crossvalidate, film
 
-__all__ = [
-    "Case",
-    "Result",
-    "crossvalidate",
-    "film",
-    "replayed_cases",
-    "write_report",
-]
+__all__ = ["Case", "Result", "crossvalidate", "film", "replayed_cases", "write_report"]

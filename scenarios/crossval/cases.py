@@ -40,17 +40,10 @@ TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 #: the order of vehicles that came in the same second decides more.
 TRAVEL_350: Final = 3.0
 
-#: Horizon of the published runs [s].
-HOUR: Final = 3600.0
-
 
 @declared
 class Case:
-    """One cell.
-
-    Raises:
-        InputError: an unknown controller, or the published one cannot be made.
-    """
+    """One cell; `InputError` for a controller that is unknown or cannot be made."""
 
     scenario: Scenario = part("junction, demand and profile", Scenario)
     controller: str = text("its command-line name")
@@ -99,7 +92,7 @@ class Case:
 
     def reference(self, metric: str, lane: str) -> float | None:
         """The paper's mean [s]; None where it has none that this cell should reproduce."""
-        if not self.same_law or self.scenario.horizon != HOUR:
+        if not self.same_law or self.scenario.horizon != 3600.0:  # that of the published runs
             return None
         who = PUBLISHED.get(self.controller)
         if who is None or not float(self.density).is_integer():
@@ -119,10 +112,9 @@ class Case:
             return None
         who, busiest = self.published.controller, self.published.density == max(DENSITIES)
         travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
-        return {
-            "waiting_time_s": Tolerance(0.10),
-            "travel_time_s": Tolerance(0.0, travel),
-        }.get(metric)
+        return {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}.get(
+            metric
+        )
 
 
 def replayed_cases(
@@ -135,15 +127,9 @@ def replayed_cases(
 ) -> list[Case]:
     """The published runs of these controllers, junctions, densities and splits; all where empty.
 
-    Args:
-        names, controllers: of junctions and controllers on the command line.
-        densities, splits: as the runs are labelled; densities are mean inflows a lane [veh/h].
-        profile: None is each run's own vehicle, with the controller of the run; any other vehicle
-            goes with the controller of that profile.
-        horizon: simulated time [s].
-
-    Raises:
-        InputError: an unknown name, or no published run is left.
+    Densities [veh/h] and splits are those of the runs' labels. The profile None is each run's own
+    vehicle, with the controller of the run; any other vehicle goes with the controller of that
+    profile. `InputError` for an unknown name, or if no published run is left.
     """
     for split in splits:
         choice("split of a published run", split, SPLITS)

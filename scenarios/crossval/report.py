@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 CSV, REPORT = "crossval.csv", "crossval.md"
 
-#: What a table shows where there is nothing to show.
-NOTHING: Final = "–"
+NOTHING: Final = "–"  # in a table
 
 
 def write_report(
@@ -28,11 +27,7 @@ def write_report(
 ) -> None:
     """Write both files, each whole or not at all; raises `FileError`.
 
-    Args:
-        results: of the comparison.
-        folder: to write to; the figures are already there.
-        command: that makes the report again.
-        figures: file name -> caption.
+    `command` makes the report again; `figures`, in the folder already, are file name -> caption.
     """
     write_table(table(results), folder / CSV)
     write_text(folder / REPORT, markdown(results, command, figures))
@@ -121,7 +116,7 @@ def _rows(result: Result) -> Iterator[dict[str, Any]]:
             "seeds": len(result.pairs), "trips_minisim": row.trips[0], "trips_sumo": row.trips[1],
             **means, "ks": row.ks, "within": row.within,
             "collisions_minisim": result.collisions[0], "collisions_sumo": result.collisions[1],
-            "published": _published(case, row), "error": None,
+            "published": case.reference(row.metric, row.lane), "error": None,
         }  # fmt: skip
     for failure in result.failures:
         yield {**cell, **failure._asdict()}
@@ -188,8 +183,9 @@ def _replays(results: Sequence[Result]) -> str:
                 f"{case.density:g}",
                 *(
                     _number(value)
-                    for row in map(result.row, JUDGED)
-                    for value in (row.minisim.mean, row.sumo.mean, _published(case, row))
+                    for metric in JUDGED
+                    for row in [result.row(metric)]
+                    for value in (row.minisim.mean, row.sumo.mean, case.reference(metric, "all"))
                 ),
                 _share(result.agreement),
                 _yes(result.meets_paper("minisim")),
@@ -222,11 +218,7 @@ def _lanes(results: Sequence[Result]) -> str:
 
 def _cells(case: Case, row: Row) -> tuple[str, ...]:
     means = map(_interval, (row.minisim, row.sumo, row.difference))
-    return *means, _number(row.ks, 3), _number(_published(case, row))
-
-
-def _published(case: Case, row: Row) -> float | None:
-    return case.reference(row.metric, row.lane)
+    return *means, _number(row.ks, 3), _number(case.reference(row.metric, row.lane))
 
 
 def _partings(results: Sequence[Result]) -> str:

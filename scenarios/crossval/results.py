@@ -19,10 +19,7 @@ from scenarios.crossval.comparison import (
 )
 
 #: What the means of the two hosts may differ by where each has its own car following.
-HOST_TOLERANCES: Final = {
-    "travel_time_s": Tolerance(0.03),
-    "waiting_time_s": Tolerance(0.10, 0.3),
-}
+HOST_TOLERANCES: Final = {"travel_time_s": Tolerance(0.03), "waiting_time_s": Tolerance(0.10, 0.3)}
 #: Share of the trips that must be the same where both hosts have the same car following.
 HOST_SHARE: Final = 0.9
 

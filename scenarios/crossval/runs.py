@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 #: Host -> where its `simulate` is, imported when it is needed.
 HOSTS: Final = {"minisim": "minisim.simulation", "sumo": "minisim.sumo"}
 
-#: Folder of SUMO's kept runs, inside that of the report; they take nearly all the time.
-KEPT: Final = "sumo"
-
 #: Recorded before the departure of the first trip that differs, and after its arrival [s].
 BEFORE, AFTER = 30.0, 5.0
 
@@ -60,12 +57,9 @@ def crossvalidate(
     """Run every case with every seed in both hosts, and compare.
 
     A run that fails becomes a `Failure` of its case; one whose process dies is tried once more.
-    Replays have one run: their arrivals are not drawn.
-
-    Args:
-        cases, seeds, jobs: what to run, and in how many processes.
-        progress: called with the number of runs done and of all.
-        folder: where SUMO's runs are kept and looked for; None runs them all.
+    Replays have one run: their arrivals are not drawn. There are `jobs` processes; `progress` is
+    called with the number of runs done and of all. SUMO's runs, which take nearly all the time, are
+    kept and looked for in `folder`/sumo.
     """
     runs = [
         (
@@ -113,7 +107,7 @@ def _run(task: tuple[Case, str, int, Path | None]) -> _Outcome:
     if folder is not None and host == "sumo":
         version = importlib.metadata.version("libsumo")
         key = digest_of("\n".join([description_of(recipe), results_version(), version]))
-        file = folder / KEPT / f"{key[:24]}.npz"
+        file = folder / "sumo" / f"{key[:24]}.npz"
         if kept := _read(file):
             return kept
     run = recipe.run(_host(host))

@@ -77,37 +77,32 @@ STUDY = CapacityStudy(
 
 
 class Capacity(NamedTuple):
-    """The capacity of a point.
+    """The capacity of a point."""
 
-    Attributes:
-        series: the controller.
-        arms: of the junction.
-        brackets: of each seed, the highest demand served and the lowest that was not
-            [veh/h/lane]; 0 where none was served, infinite where all were.
-    """
-
-    series: str
-    arms: int
+    series: str  # the controller
+    arms: int  # of the junction
+    #: Of each seed, the highest demand served and the lowest that was not [veh/h/lane]; 0 where
+    #: none was served, infinite where all were.
     brackets: tuple[tuple[float, float], ...]
 
     @property
     def below(self) -> float | None:
         """The upper bound, if a seed served no demand that was tried; None otherwise."""
-        return max(high for _, high in self.brackets) if self._open(0.0) else None
+        lows, highs = zip(*self.brackets, strict=True)
+        return max(highs) if 0.0 in lows else None
 
     @property
     def above(self) -> float | None:
         """The lower bound, if a seed served every demand that was tried; None otherwise."""
-        return min(low for low, _ in self.brackets) if self._open(math.inf) else None
+        lows, highs = zip(*self.brackets, strict=True)
+        return min(lows) if math.inf in highs else None
 
     @property
     def interval(self) -> Interval:
         """Mean over seeds of the middles of their brackets, with its 95 % interval.
 
         A seed's value may be anywhere in its bracket, so half the bracket adds to the half width.
-
-        Raises:
-            InputError: only `below` or `above` is known.
+        `InputError` if only `below` or `above` is known.
         """
         if self.below is not None or self.above is not None:
             raise InputError(f"the capacity of {self.series} on {self.arms} arms has no bounds")
@@ -123,9 +118,6 @@ class Capacity(NamedTuple):
             return f"> {above:.0f}"
         mean, half, _ = self.interval
         return f"{mean:.0f}" if math.isnan(half) else f"{mean:.0f} ± {half:.0f}"
-
-    def _open(self, end: float) -> bool:
-        return any(end in bracket for bracket in self.brackets)
 
 
 def grows(row: Mapping[Any, Any]) -> bool:

@@ -40,22 +40,17 @@ STUDY = Study(
 
 
 class Crossing(NamedTuple):
-    """The demand from which on one controller does worse than another.
+    """The demand from which on one controller does worse than another."""
 
-    Attributes:
-        density: the lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is
-            positive at the lowest demand tried, +inf if it never is.
-        low, high: its interval, open (±inf) if the demands tried do not bound it.
-        until: where the mean difference falls back to 0 or less, +inf if it does not. Beyond the
-            capacity of both, neither wins.
-        tried: lowest and highest demand of both; nothing is known beyond.
-    """
-
+    #: The lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is positive
+    #: at the lowest demand tried, +inf if it never is.
     density: float
-    low: float
+    low: float  # low and high: its interval, open (±inf) if the demands tried do not bound it
     high: float
+    #: Where the mean difference falls back to 0 or less, +inf if it does not. Beyond the capacity
+    #: of both, neither wins.
     until: float
-    tried: tuple[float, float]
+    tried: tuple[float, float]  # lowest and highest demand of both; nothing is known beyond
 
     def __str__(self) -> str:
         bounded = math.isfinite(self.low) or math.isfinite(self.high)
@@ -88,10 +83,7 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
     confidence set by inversion of the test, Fieller 1954).
 
     Args:
-        differences: demand [veh/h/lane] -> one difference a seed, at least two.
-
-    Raises:
-        InputError: fewer than two demands, or a demand with fewer than two differences.
+        differences: two or more demands [veh/h/lane] -> one difference a seed, at least two.
     """
     densities = sorted(numbers("demands", list(differences)))
     if len(densities) < 2:
@@ -119,8 +111,7 @@ def paired_differences(
 ) -> dict[float, list[float]]:
     """Differences of a column between two series, ours minus theirs: density -> one a common seed.
 
-    Raises:
-        InputError: two runs of one seed with other arrivals.
+    `InputError` if two runs of one seed had other arrivals.
     """
     by_density = pairs(rows, metric, "series", (ours, theirs), ["density"])
     return {float(density): values for (density,), values in by_density.items() if len(values) > 1}
@@ -154,6 +145,5 @@ def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 
 def _zero(x: Sequence[float], y: Sequence[float], k: int) -> float:
-    """Where the line from point k − 1 to point k is 0."""
     share = y[k - 1] / (y[k - 1] - y[k])
     return x[k - 1] + share * (x[k] - x[k - 1])

@@ -34,13 +34,8 @@ def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> flo
     """Gini's coefficient Σᵢⱼ wᵢwⱼ|xᵢ − xⱼ| / (2 Σwᵢ Σwᵢxᵢ) (Gini 1912, mean difference form).
 
     It is 0 if all are equal or all are 0, and 1 − 1/n if one of n has everything.
-
-    Args:
-        values: ≥ 0.
-        weights: > 0 in sum, such as the trips behind each mean; equal by default.
-
-    Raises:
-        InputError: no value, a negative one, or weights that do not match.
+    Weights are > 0 in sum, such as the trips behind each mean, and equal by default. `InputError`
+    for no value, a negative one, or weights that do not match.
     """
     xs = numbers("values", values)
     ws = (1.0,) * len(xs) if weights is None else numbers("weights", weights)

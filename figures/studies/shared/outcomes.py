@@ -22,7 +22,6 @@ OUTCOMES = {
     "False grants": ("false_grants", ""),
     "Mean delay": (TOTAL_DELAY, "of all vehicles [s]"),
 }
-
 #: Small print.
 NOTE = (
     "Intervals 95 %: of counts Poisson's (Garwood), of delays Student's over seeds. Delay: time "

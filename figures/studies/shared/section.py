@@ -16,21 +16,14 @@ Drawing = Figure | Table
 
 @dataclass(frozen=True)
 class Item:
-    """A figure or table that can be made.
+    """A figure or table that can be made."""
 
-    Attributes:
-        name: on the command line, and of its files.
-        title: in one line.
-        draw: makes it from the results of the studies that it needs, one argument each.
-        needs: those studies.
-        in_report: whether the report shows it; otherwise it is a file only.
-    """
-
-    name: str
-    title: str
+    name: str  # on the command line, and of its files
+    title: str  # in one line
+    #: Makes it from the results of the studies that it needs, one argument each.
     draw: Callable[..., Drawing]
-    needs: tuple[str, ...] = ()
-    in_report: bool = True
+    needs: tuple[str, ...] = ()  # those studies
+    in_report: bool = True  # whether the report shows it; otherwise it is a file only
 
     def build(self, archive: Archive) -> Drawing:
         """Make it; raises `MissingRunsError` if it needs runs and there are none."""
@@ -39,18 +32,11 @@ class Item:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the report.
+    """A section of the report."""
 
-    Attributes:
-        heading: above it.
-        items: its figures and tables, in order.
-        answer: the study's answer in a few sentences, for the head of the report.
-        ending: a text below the items.
-        appendix: whether it comes after all others.
-    """
-
-    heading: str
-    items: tuple[Item, ...]
+    heading: str  # above it
+    items: tuple[Item, ...]  # its figures and tables, in order
+    #: The study's answer in a few sentences, for the head of the report.
     answer: Callable[[Results], str] | None = None
-    ending: Callable[[Archive], str] | None = None
-    appendix: bool = False
+    ending: Callable[[Archive], str] | None = None  # a text below the items
+    appendix: bool = False  # whether it comes after all others

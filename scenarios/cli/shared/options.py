@@ -14,58 +14,35 @@ from minisim.errors import InputError, integer
 from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals as ArrivalTable
     from scenarios.scenario import Scenario
 
 #: A group of options in the help.
 FILES = "Files"
 
+
+def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
+    """An option whose help says what there is to say of its default."""
+    return typer.Option(*flags, metavar=metavar, help=help, show_default=False, **more)
+
+
 ScenarioName = Annotated[
-    str,
-    typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, … or custom."),
+    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, … or custom.")
 ]
 ControllerName = Annotated[
-    str,
-    typer.Option(
-        "--controller", "-c", metavar="SPEC", show_default=False,
-        help="Who decides: dim, dim:gate=harmonious, …",
-    ),
-]  # fmt: skip
-Humans = Annotated[
-    float,
-    typer.Option(metavar="SHARE", show_default=False, help="Human drivers among DIM's, 0 … 1."),
+    str, option("Who decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
 ]
+Humans = Annotated[float, option("Human drivers among DIM's, 0 … 1.", "SHARE")]
 Density = Annotated[
-    float | None,
-    typer.Option(
-        "--density", "-d", metavar="VEH/H",
-        help="Mean inflow a lane; 350 unless told.",
-    ),
-]  # fmt: skip
-Split = Annotated[
-    str | None, typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …")
+    float | None, option("Mean inflow a lane; 350 unless told.", "VEH/H", "--density", "-d")
 ]
-Turns = Annotated[str | None, typer.Option(metavar="1:2:1", help="Shares of the exits, clockwise.")]
+Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
+Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
 ProfileName = Annotated[
-    str,
-    typer.Option(
-        "--profile", "-p", metavar="NAME", show_default=False,
-        help="Vehicle and speeds: paper, fair, as_run.",
-    ),
-]  # fmt: skip
-Side = Annotated[
-    str, typer.Option(metavar="SIDE", show_default=False, help="Of the traffic: left or right.")
+    str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Bearings = Annotated[
-    str | None, typer.Option(metavar="0,90,…", help="Of custom's arms, from north.")
-]
-Seed = Annotated[
-    int,
-    typer.Option(
-        "--seed", "-s", metavar="N", show_default=False,
-        help="Of the random arrivals; 0 unless told.",
-    ),
-]  # fmt: skip
+Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
+Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
+Seed = Annotated[int, option("Of the random arrivals; 0 unless told.", "N", "--seed", "-s")]
 Order = Annotated[
     str,
     typer.Option(
@@ -76,10 +53,7 @@ Order = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 Folder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write to.")]
-Jobs = Annotated[
-    int | None,
-    typer.Option(metavar="N", help="Processes to use; one a core by default."),
-]
+Jobs = Annotated[int | None, option("Processes to use; one a core by default.", "N")]
 Quick = Annotated[bool, typer.Option("--quick", help="Fewer and shorter runs: a smoke test.")]
 
 
@@ -91,10 +65,8 @@ def _file_name(text: str) -> Path:
 
 Arrivals = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE", parser=_file_name, rich_help_panel=FILES,
-        help="Replay these: demand_time_s, lane, manoeuvre.",
-    ),
+    option("Replay these: demand_time_s, lane, manoeuvre.", "FILE", parser=_file_name,
+           rich_help_panel=FILES),
 ]  # fmt: skip
 
 
@@ -117,26 +89,22 @@ def build_scenario(
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made
-    recorded = read_arrivals(arrivals, made.intersection.n)
-    _check_arms(arrivals, recorded, made.intersection.n)
+    n = made.intersection.n
+    recorded = read_arrivals(arrivals, n)
+    if len(recorded) >= ENOUGH:
+        # A table from a junction with fewer arms is refused: its manoeuvres would mean other exits.
+        arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
+        if arms < n:
+            raise InputError(
+                f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from "
+                f"lane {ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+            )
     return replace(made, recorded=recorded)
 
 
 #: So many arrivals use the last lane or the last manoeuvre. With equal shares on 4 arms, the chance
 #: that they use neither is (1/2)^30, one in 10^9.
 ENOUGH = 30
-
-
-def _check_arms(path: Path, recorded: ArrivalTable, n: int) -> None:
-    """Refuse a table from a junction with fewer arms: its manoeuvres would mean other exits."""
-    if len(recorded) < ENOUGH:
-        return
-    arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
-    if arms < n:
-        raise InputError(
-            f"{path} looks like arrivals of a junction with {arms} arms: none comes from lane "
-            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-        )
 
 
 def _bearings(text: str) -> tuple[float, ...]:

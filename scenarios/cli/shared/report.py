@@ -102,7 +102,6 @@ def metrics_table(metrics: Iterable[Metric]) -> Table:
 
 
 def _safety(summary: Mapping[str, Any]) -> Text:
-    """Collisions and, where measured, the closest calls of one run."""
     collisions = summary["collisions"]
     line = Text.assemble(
         "  collisions ", (str(collisions), "bold red" if collisions else "bold green")

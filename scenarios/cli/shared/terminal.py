@@ -66,18 +66,14 @@ def show(*renderables: Text | Table) -> None:
     console = Console(highlight=False, markup=False)
     for renderable in renderables:
         if isinstance(renderable, Table) or not console.is_terminal:
-            console.width = max(console.width, _width(console, renderable))
+            roomy = console.options.update(max_width=10_000)
+            console.width = max(console.width, Measurement.get(console, roomy, renderable).maximum)
         console.print(renderable)
 
 
 def show_json(value: Any) -> None:
     """Print JSON and nothing else; a missing value is null."""
     typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
-
-
-def _width(console: Console, renderable: Text | Table) -> int:
-    """The columns that it takes where there is room for everything."""
-    return Measurement.get(console, console.options.update(max_width=10_000), renderable).maximum
 
 
 def prepare_streams() -> None:

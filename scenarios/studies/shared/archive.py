@@ -45,11 +45,7 @@ class Archive:
         )
 
     def need(self, *names: str) -> tuple[Results, ...]:
-        """The results of these studies.
-
-        Raises:
-            MissingRunsError: none of them has a run; the message says how to make them.
-        """
+        """The results of these studies; `MissingRunsError` if none has a run, with the remedy."""
         results = tuple(map(self.study, names))
         if names and all(each.good.empty for each in results):
             raise MissingRunsError(

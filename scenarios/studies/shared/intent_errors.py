@@ -36,26 +36,17 @@ FEW = dict.fromkeys(MISREADERS, 5)
 
 
 class IntentErrorPoint(NamedTuple):
-    """DIM with vehicles that misread each other in one way.
+    """DIM with vehicles that misread each other in one way."""
 
-    Attributes:
-        series: the controller by its command-line name.
-        kind, rate, shared, persistent: of the intent errors, see `NoisyPerception`.
-        unsignalled: whether vehicles turn without a signal, at the published rates.
-        confidence: the least at which a reading is believed; 0 believes all.
-        arms: of the junction.
-        density: mean inflow a lane [veh/h].
-    """
-
-    series: str
-    kind: str = "missed"
+    series: str  # the controller by its command-line name
+    kind: str = "missed"  # this and the next three: see `NoisyPerception`
     rate: float = 0.0
     shared: bool = True
     persistent: bool = True
-    unsignalled: bool = False
-    confidence: float = 0.0
-    arms: int = 4
-    density: float = DENSITY
+    unsignalled: bool = False  # whether vehicles turn without a signal, at the published rates
+    confidence: float = 0.0  # the least at which a reading is believed; 0 believes all
+    arms: int = 4  # of the junction
+    density: float = DENSITY  # mean inflow a lane [veh/h]
 
     @property
     def perception(self) -> NoisyPerception:

@@ -33,16 +33,12 @@ def published() -> pd.DataFrame:
 
 
 def compare(rows: pd.DataFrame) -> pd.DataFrame:
-    """Every published value beside ours.
+    """Every published value beside the rows of a study of the paper's grid: columns `COMPARED`.
 
-    Args:
-        rows: of a study of the paper's grid (`Results.good`).
-
-    Returns:
-        One row a published value, with columns `COMPARED`. `low` and `high` bound the 95 %
-        prediction interval for one more run of ours, cut at 0 since no time is below. `inside`
-        says whether the paper's value lies in it; it is missing if there is one value or all are
-        equal, which makes no interval. Without a run, `seeds` is 0 and the rest is missing.
+    `low` and `high` bound the 95 % prediction interval for one more run of ours, cut at 0 since no
+    time is below. `inside` says whether the paper's value lies in it; it is missing if there is one
+    value or all are equal, which makes no interval. Without a run, `seeds` is 0 and the rest is
+    missing.
     """
     import pandas as pd
 
@@ -97,22 +93,16 @@ def score(compared: pd.DataFrame, *, comparable: bool = True) -> Score:
 
 
 class Discrepancy(NamedTuple):
-    """A known cause of a difference between the paper and us.
+    """A known cause of a difference between the paper and us."""
 
-    Attributes:
-        number: in the list of discrepancies (docs).
-        study, series, arms, split, density, metric: where it holds; empty holds anywhere.
-        cause: in words.
-    """
-
-    number: int
-    study: str
+    number: int  # in the list of discrepancies (docs)
+    study: str  # this and the next five: where it holds; empty holds anywhere
     series: str
     arms: str
     split: str
     density: str
     metric: str
-    cause: str
+    cause: str  # in words
 
     def holds(self, study: str, row: Mapping[Any, Any]) -> bool:
         """Whether it holds for a study's row of `compare`."""
@@ -145,10 +135,6 @@ def labels() -> Mapping[str, str]:
 
 
 def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:
-    """The known causes of a difference in one row of `compare`.
-
-    Raises:
-        InputError: another study than the paper's.
-    """
+    """The known causes of a difference in a row of `compare`; `study` is of the paper's grid."""
     choice("study of the paper's grid", study, ("text", "as-run"))
     return tuple(known for known in discrepancies() if known.holds(study, row))

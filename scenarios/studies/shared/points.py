@@ -39,25 +39,15 @@ class Point(Protocol):
 
 
 class ControllerPoint(NamedTuple):
-    """A controller at a demand.
+    """A controller at a demand."""
 
-    Attributes:
-        profile: by name.
-        series: the controller that a reader thinks of, such as "dim".
-        controller: the variant of it that the study needs, as on the command line.
-        arms: of the junction.
-        split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
-        density: mean inflow a lane [veh/h].
-        humans: share of human drivers.
-    """
-
-    profile: str
-    series: str
-    controller: str
-    arms: int
-    split: str
-    density: float
-    humans: float = 0.0
+    profile: str  # by name
+    series: str  # the controller that a reader thinks of, such as "dim"
+    controller: str  # the variant of it that the study needs, as on the command line
+    arms: int  # of the junction
+    split: str  # of the inflow over the lanes, "balanced" or such as "4:3:2:1"
+    density: float  # mean inflow a lane [veh/h]
+    humans: float = 0.0  # share of human drivers
 
     def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed. Collisions are counted: some published rules have them."""

@@ -17,25 +17,15 @@ from scenarios.sweep.store import Store
 
 @dataclass(frozen=True)
 class Made:
-    """What one call of `reproduce` did for a study.
+    """What one call of `reproduce` did for a study."""
 
-    Attributes:
-        name: of the study.
-        runs: all of its runs.
-        hours: that they simulate.
-        computed: runs that were not in the store before.
-        wall_s: time that the call took.
-        cpu_s: processor time of all runs, whenever they were made.
-        failed: rows of failed runs.
-    """
-
-    name: str
-    runs: int
-    hours: float
-    computed: int
-    wall_s: float
-    cpu_s: float
-    failed: tuple[Row, ...]
+    name: str  # of the study
+    runs: int  # all of its runs
+    hours: float  # that they simulate
+    computed: int  # runs that were not in the store before
+    wall_s: float  # time that the call took
+    cpu_s: float  # processor time of all runs, whenever they were made
+    failed: tuple[Row, ...]  # rows of failed runs
 
 
 def reproduce(
@@ -43,10 +33,7 @@ def reproduce(
 ) -> Made:
     """Run a study in `jobs` processes. Rows go to the store; what it has is not run again.
 
-    `progress` is called with the runs done and the most that there can be.
-
-    Raises:
-        FileError: the store cannot be written.
+    `progress` is called with the runs done and the most that there can be. Raises `FileError`.
     """
     study = study_named(name)
     total = study.most_runs(effort)

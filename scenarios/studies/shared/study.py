@@ -23,20 +23,14 @@ TOTAL_DELAY = "total_delay_s"
 
 @dataclass(frozen=True)
 class Study:
-    """Points that answer one question.
+    """Points that answer one question."""
 
-    Attributes:
-        name: on the command line.
-        question: in one line.
-        points: each once.
-        few: series -> most seeds, if more would cost too much.
-        about_collisions: whether its figures show collisions; the report does not list them then.
-    """
-
-    name: str
-    question: str
-    points: tuple[Point, ...]
+    name: str  # on the command line
+    question: str  # in one line
+    points: tuple[Point, ...]  # each once
+    #: Series -> most seeds, if more would cost too much.
     few: Mapping[str, int] = field(default_factory=dict)
+    #: Whether its figures show collisions; the report does not list them then.
     about_collisions: bool = False
 
     def runs(
@@ -82,19 +76,12 @@ class Runs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What is known about a study.
-
-    Attributes:
-        study: the study.
-        effort: how much of it was asked for.
-        rows: one a run that was made: the columns of a sweep and those of its point.
-        runs: of each point, in order.
-    """
+    """What is known about a study."""
 
     study: Study
-    effort: Effort
-    rows: pd.DataFrame
-    runs: Mapping[Point, Runs]
+    effort: Effort  # how much of it was asked for
+    rows: pd.DataFrame  # one a run that was made: the columns of a sweep and those of its point
+    runs: Mapping[Point, Runs]  # of each point, in order
 
     @classmethod
     def of(

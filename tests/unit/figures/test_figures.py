@@ -21,13 +21,13 @@ from PIL import Image
 
 import minisim
 from dim import Dim, HarmonyMatrix, explain
-from figures import decision_figure, performance_figure, save, style, write_animation
+from figures import decision_figure, performance_figure, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif, write_html
 from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from minisim.control import Plan, Unregulated
-from minisim.errors import FileError, InputError
+from minisim.errors import InputError
 from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
@@ -66,9 +66,6 @@ def crash() -> Run:
     return minisim.simulate(
         four_way(350, horizon=150), Unregulated(), seed=1, record="all", on_collision="record"
     )
-
-
-# --- the junction ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
@@ -117,9 +114,6 @@ def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
         assert drawn.covers(shapely.Polygon(drawing.place(glass, *front, angle)[0]))
 
 
-# --- film: the run by time -------------------------------------------------------------------
-
-
 def test_film_counts_what_the_trajectories_say(run: Run, film: Frames) -> None:
     frame = run.trajectories
     for time in (100.1, 112.0, 129.9):
@@ -155,11 +149,6 @@ def test_ways_end_at_the_exit(run: Run, film: Frames) -> None:
         assert np.min(np.linalg.norm(exits - way[-1], axis=1)) < 1e-6
 
 
-def test_indicators_follow_the_turn(film: Frames) -> None:
-    """Manoeuvre 1 is left, 2 straight, 3 right with left-hand traffic on four arms (paper)."""
-    assert film.turn.tolist() == [-1, 0, 1] * 4
-
-
 def test_collisions_are_ringed(crash: Run) -> None:
     film, first = Frames(crash, 0.0), crash.collisions[0]
     assert film.collided(first.time - 0.1) == 0
@@ -178,9 +167,6 @@ def test_nothing_recorded_is_an_error() -> None:
         Picture(empty)
     with pytest.raises(InputError, match="record"):
         Picture(minisim.simulate(four_way(300, horizon=5), Dim()))
-
-
-# --- the picture -----------------------------------------------------------------------------
 
 
 def pixels(image: Image.Image) -> npt.NDArray[np.int64]:
@@ -230,8 +216,6 @@ def test_frame_times_are_steps() -> None:
         with pytest.raises(InputError):
             frame_times(*bad, 0.1)
 
-
-# --- files -----------------------------------------------------------------------------------
 
 images = st.lists(
     st.binary(min_size=48, max_size=48).map(
@@ -317,18 +301,6 @@ def test_animation_is_written_whole_or_not(run: Run, tmp_path: Path) -> None:
     first = file.read_bytes()
     write_animation(run, file, start=110, seconds=2)
     assert file.read_bytes() == first
-
-
-def test_save_refuses(tmp_path: Path) -> None:
-    figure = style.new_figure(1, 1)
-    with pytest.raises(InputError, match=r"\.bmp"):
-        save(figure, tmp_path / "x.bmp")
-    with pytest.raises(FileError):
-        save(figure, tmp_path / "no" / "x.png")
-    assert list(tmp_path.iterdir()) == []
-
-
-# --- plots -----------------------------------------------------------------------------------
 
 
 def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> None:

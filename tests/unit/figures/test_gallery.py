@@ -6,7 +6,7 @@ import csv
 import io
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from pathlib import Path
 from types import ModuleType
@@ -20,7 +20,7 @@ from baselines import webster
 from dim import HarmonyMatrix
 from figures import plots, style
 from figures import reproduction_report as report
-from figures.gallery import GALLERY, SECTIONS, item_named, write
+from figures.gallery import GALLERY, SECTIONS, write
 from figures.junction.schematic import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import InputError
@@ -47,31 +47,24 @@ def archive() -> Archive:
     return Archive(synthetic_find, EFFORT)
 
 
-def partial_find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
-    """A store without adaptive signals."""
-    return [None if e.label == "adaptive" else synthetic_row(e) for e in recipes]
+def having(wanted: Callable[[Recipe], bool], effort: Effort = EFFORT, **columns: Any) -> Archive:
+    """Synthetic runs of the wanted recipes, with other values in some columns."""
+    return Archive(
+        lambda asked: [{**synthetic_row(e), **columns} if wanted(e) else None for e in asked],
+        effort,
+    )
 
 
-EMPTY = Archive(lambda asked: [None] * len(asked), EFFORT)
+#: A store without adaptive signals, and one without any run.
+PARTIAL, EMPTY = having(lambda e: e.label != "adaptive"), having(lambda _: False)
 
 
-def figure_of(name: str, archive: Archive) -> Figure:
-    drawing = GALLERY[name].build(archive)
-    assert isinstance(drawing, Figure)
-    return drawing
-
-
-def table_of(name: str, archive: Archive) -> Table:
-    drawing = GALLERY[name].build(archive)
-    assert isinstance(drawing, Table)
-    return drawing
+def drawn(name: str, archive: Archive) -> Any:
+    return GALLERY[name].build(archive)
 
 
 def texts_of(figure: Figure) -> list[str]:
     return [" ".join(text.get_text().split()) for text in figure.texts]
-
-
-# --- the gallery -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", GALLERY)
@@ -109,11 +102,6 @@ def test_the_study_of_the_guide_is_complete(monkeypatch: pytest.MonkeyPatch) -> 
     assert [len(axes.get_legend_handles_labels()[0]) for axes in figure.axes] == [2, 2, 2]
 
 
-def test_unknown_figure_names_the_nearest() -> None:
-    with pytest.raises(InputError, match="did you mean 'worst-case'"):
-        item_named("worst-cases")
-
-
 @pytest.mark.parametrize("name", ["worst-case", "losses-table", "gate"])
 def test_same_results_same_bytes(name: str, archive: Archive, tmp_path: Path) -> None:
     written = [
@@ -135,11 +123,7 @@ def test_nothing_to_draw_says_how_to_make_it() -> None:
 @pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
 def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
     runs = {key_of(recipe) for _, recipe in study_named(study).runs(EFFORT.seeds)}
-
-    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
-        return [synthetic_row(e) if key_of(e) in runs else None for e in asked]
-
-    drawing = GALLERY[name].build(Archive(find, EFFORT))
+    drawing = GALLERY[name].build(having(lambda e: key_of(e) in runs))
     if isinstance(drawing, Table):
         columns = {"as-run": 3, "text": 5}
         for other, column in columns.items():
@@ -152,7 +136,7 @@ def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
 
 
 def test_what_is_missing_is_said_in_the_picture() -> None:
-    figure = figure_of("fair", Archive(partial_find, EFFORT))
+    figure = drawn("fair", PARTIAL)
     (note,) = [text for text in texts_of(figure) if "no run" in text]
     assert "adaptive (fair, 4 arms, balanced, 50)" in note
     assert "9 more" in note
@@ -160,12 +144,8 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
 
 def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
-
-    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
-        lost = ("all-way-stop", 2)
-        return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
-
-    (note,) = [t for t in texts_of(figure_of("fair", Archive(find, EFFORT))) if "s each" in t]
+    some = having(lambda e: (e.label, e.seed) != ("all-way-stop", 2))
+    (note,) = [t for t in texts_of(drawn("fair", some)) if "s each" in t]
     assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
@@ -175,25 +155,18 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
 
 def test_losses_end_where_the_runs_do() -> None:
     archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)))
-    assert "demands tried, 150 to 350." in table_of("losses-table", archive).notes[0]
-    for axes in figure_of("losses", archive).axes:
+    assert "demands tried, 150 to 350." in drawn("losses-table", archive).notes[0]
+    for axes in drawn("losses", archive).axes:
         assert axes.get_xticks().tolist() == [150.0, 350.0]
         bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
         assert bars
         assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
-
-    def alone(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
-        return [synthetic_row(e) if e.label == "dim" else None for e in asked]
-
     with pytest.raises(MissingRunsError, match="DIM and another controller"):
-        GALLERY["losses"].build(Archive(alone, EFFORT))
-
-
-# --- what the pictures say -------------------------------------------------------------------
+        GALLERY["losses"].build(having(lambda e: e.label == "dim"))
 
 
 def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = figure_of("waiting-4321", archive)
+    figure = drawn("waiting-4321", archive)
     for axes in figure.axes:
         hollow = [line for line in axes.lines if line.get_markerfacecolor() == "none"]
         for line, (published, series) in zip(hollow, SERIES.items(), strict=True):
@@ -208,7 +181,7 @@ def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
 
 
 def test_our_means_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = figure_of("fair", archive)
+    figure = drawn("fair", archive)
     (results,) = archive.need("fair")
     handles = figure.axes[0].get_legend_handles_labels()[0]
     for handle, series in zip(handles, RIVALS, strict=True):
@@ -234,9 +207,6 @@ def test_log_axis_shows_plain_numbers() -> None:
     assert [t.get_text() for t in axes.get_yticklabels()] == ["0", "0.1", "1", "10", "100"]
 
 
-# --- tables ----------------------------------------------------------------------------------
-
-
 def test_webster_table_by_hand() -> None:
     """C0 = (1.5·8 + 5)/(1 − 4q/1500), g = (C0 − 8)/4; at 150: 28.33 and 5.08 s."""
     table = webster_table()
@@ -258,14 +228,14 @@ def test_harmony_table_is_the_published_matrix(arms: int) -> None:
 
 
 def test_lane_table_has_the_paper_s_numbers(archive: Archive) -> None:
-    printed = {row[:2]: row[2] for row in table_of("lanes", archive).rows}
+    printed = {row[:2]: row[2] for row in drawn("lanes", archive).rows}
     assert printed["4-way", "d"] == "10.21"
     assert printed["5-way", "e"] == "146.11"
     assert printed["3-way", "a"] == "0.46 †", "its run stopped early"
 
 
 def test_capacity_table_has_what_the_rows_hold(archive: Archive) -> None:
-    table = table_of("capacity-table", archive)
+    table = drawn("capacity-table", archive)
     first = dict(zip(table.headings, table.rows[0], strict=True))
     assert first["controller"] == "DIM"
     for arms in (3, 4, 5, 6):
@@ -291,9 +261,6 @@ def test_table_formats(tmp_path: Path) -> None:
         Table("t", ("a", "b"), (("1",),))
 
 
-# --- the report ------------------------------------------------------------------------------
-
-
 FEW = ("webster", "gate", "losses-table", "comparison-text")
 
 
@@ -303,10 +270,9 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     pictures = tmp_path / "figures"
     failed = {"controller": "x", "scenario": "four-way", "density": 1.0, "seed": 3, "error": "no"}
     made = [Made("text", 700, 700.0, 699, 12.3, 45.6, (failed,))]
-    drawn: list[int] = []
-    archive = Archive(partial_find, EFFORT)
-    count = report.write_report(archive, made, 2, tmp_path, lambda done, total: drawn.append(done))
-    assert count == len(FEW) == len(drawn)
+    done: list[int] = []
+    count = report.write_report(PARTIAL, made, 2, tmp_path, lambda k, total: done.append(k))
+    assert count == len(FEW) == len(done)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "![clear against harmonious gate](figures/gate.png)" in text
     assert (pictures / "gate.png").is_file()
@@ -344,13 +310,8 @@ def test_a_report_on_one_study_has_nothing_of_others(
 
 
 def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
-    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
-        return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
-
-    report.write_report(
-        Archive(find, Effort.of(quick=True)), [], 1, tmp_path, lambda done, total: None,
-        parts=("as-run",),
-    )  # fmt: skip
+    crashed = having(lambda e: e.label == "dim", Effort.of(quick=True), collisions=2)
+    report.write_report(crashed, [], 1, tmp_path, lambda done, total: None, parts=("as-run",))
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "- as-run: DIM, 5 arms, balanced, 350 veh/h/lane: 4 in 0.1 h" in text
     assert "Why DIM collides as it was run: the published five-arm table" in text
@@ -364,5 +325,5 @@ def test_the_report_keeps_its_appendix_for_the_end() -> None:
 
 
 def test_causes_that_share_a_number_are_named_once(archive: Archive) -> None:
-    for row in table_of("comparison-as-run", archive).rows:
+    for row in drawn("comparison-as-run", archive).rows:
         assert len(row[-1].split()) == len(set(row[-1].split()))

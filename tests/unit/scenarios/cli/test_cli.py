@@ -29,6 +29,8 @@ from scenarios.controllers import controller_named
 from scenarios.demo import Tour
 from tests import ROOT
 
+Captured = pytest.CaptureFixture[str]
+
 SHORT = ("--horizon", "240", "--density", "300")
 
 #: The issue's keys of `minisim run --json`.
@@ -38,14 +40,14 @@ RUN_KEYS = {
 }  # fmt: skip
 
 
-def ok(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def ok(capsys: Captured, *arguments: str) -> str:
     code = main(arguments)
     captured = capsys.readouterr()
     assert (code, captured.err) == (0, "")
     return captured.out
 
 
-def fails(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 2) -> str:
+def fails(capsys: Captured, *arguments: str, code: int = 2) -> str:
     returned = main(arguments)
     captured = capsys.readouterr()
     assert (returned, captured.out) == (code, "")
@@ -62,22 +64,16 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-# --- help ------------------------------------------------------------------------------------
-
-
-def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_every_command(capsys: Captured) -> None:
     text = ok(capsys, "--help")
     assert ok(capsys) == text
     assert all(f" {name} " in text for name in COMMANDS)
+    assert all(f"minisim {name}" in ok(capsys, name, "--help") for name in COMMANDS)
+    assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
     assert {c.name or c.callback.__name__ for c in app.registered_commands} == set(COMMANDS)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help(capsys: pytest.CaptureFixture[str], command: str) -> None:
-    assert f"minisim {command}" in ok(capsys, command, "--help")
-
-
-def test_run_help_has_examples_that_work(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_help_has_examples_that_work(capsys: Captured) -> None:
     lines = [" ".join(line.split()) for line in ok(capsys, "run", "--help").splitlines()]
     examples = [line for line in lines if line.startswith("minisim run ")]
     assert len(examples) == 2
@@ -92,10 +88,6 @@ def test_run_help_fits_on_two_screens() -> None:
     assert max(map(len, lines)) <= 80
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ok(capsys, "--version") == f"minisim {minisim.__version__}\n"
-
-
 def test_help_loads_nothing_heavy() -> None:
     script = (
         "import sys; from scenarios.cli import main; main(['run', '--help']); "
@@ -107,10 +99,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-# --- run -------------------------------------------------------------------------------------
-
-
-def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_json_is_the_summary_and_safety(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "run", "four-way", *SHORT, "--seed", "3", "--json"))
     run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
     assert set(printed) >= RUN_KEYS
@@ -122,7 +111,7 @@ def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) 
     assert safety["min_pet_s"] > 0
 
 
-def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
     out = ok(capsys, "run", "five-way", *SHORT, "-c", "fixed-time", "-p", "fair")
     rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
     served = [int(rows[lane][0]) for lane in "abcde"]
@@ -132,7 +121,7 @@ def test_run_prints_every_lane_and_the_total(capsys: pytest.CaptureFixture[str])
         assert word in out
 
 
-def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_tells_humans_from_the_others(capsys: Captured) -> None:
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
     printed = json.loads(ok(capsys, *arguments, "--json"))
     assert printed["controller"] == "dim+humans=0.4"
@@ -144,29 +133,24 @@ def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) ->
         assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
 
 
-def test_run_counts_false_grants_where_perception_errs(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_run_counts_false_grants_where_perception_errs(capsys: Captured) -> None:
     run = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", "300",
            "--no-safety", "--on-collision", "record")  # fmt: skip
     told = ok(capsys, *run, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)")
     assert "false grants" in told
-    summary = json.loads(
-        ok(capsys, *run, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))")
-    )
+    silent = "dim:perception=noisy(unsignalled=(0.29,0.25))"
+    summary = json.loads(ok(capsys, *run, "--json", "-c", silent))
     assert summary["crossings"] >= summary["trips"] - summary["unfinished"]
     assert "false grants" not in ok(capsys, *run)
 
 
-def test_run_without_vehicles(capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_without_vehicles(capsys: Captured) -> None:
     arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
     assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None
     assert "–" in ok(capsys, *arguments)
 
 
-def test_run_writes_trips_trajectories_and_fcd(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_run_writes_trips_trajectories_and_fcd(capsys: Captured, tmp_path: Path) -> None:
     trips, table, fcd = (tmp_path / name for name in ("trips.csv", "t.parquet", "fcd.xml"))
     plain = ok(capsys, "run", "four-way", *SHORT, "--json")
     full = ok(
@@ -183,7 +167,7 @@ def test_run_writes_trips_trajectories_and_fcd(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fcd.xml", "t.parquet", "trips.csv"]
 
 
-def test_run_replays_recorded_arrivals(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_run_replays_recorded_arrivals(capsys: Captured, tmp_path: Path) -> None:
     arrivals = tmp_path / "arrivals.csv"
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,c,1\n")
     printed = json.loads(
@@ -191,9 +175,11 @@ def test_run_replays_recorded_arrivals(capsys: pytest.CaptureFixture[str], tmp_p
     )
     assert (printed["trips"], printed["unfinished"]) == (2, 0)
     assert printed["lanes"]["c"]["trips"] == 1
+    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
+    assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
 
 
-def test_split_turns_and_side_reach_the_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+def test_split_turns_and_side_reach_the_scenario(capsys: Captured) -> None:
     lanes = json.loads(
         ok(capsys, "run", "four-way", *SHORT, "--split", "1:0:0:0", "--turns", "0:1:0",
            "--side", "right", "--json")
@@ -201,9 +187,7 @@ def test_split_turns_and_side_reach_the_scenario(capsys: pytest.CaptureFixture[s
     assert [lanes[lane]["trips"] == 0 for lane in "abcd"] == [False, True, True, True]
 
 
-def test_collision_stops_the_run_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: Path) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
     said = fails(capsys, *arguments, code=1)
@@ -216,7 +200,7 @@ def test_collision_stops_the_run_and_writes_nothing(
 
 
 def test_without_safety_nothing_is_recorded(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records, real = [], minisim.simulation.Simulation
 
@@ -232,7 +216,7 @@ def test_without_safety_nothing_is_recorded(
     assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
 
 
-def test_metrics_that_were_asked_for_by_movement(capsys: pytest.CaptureFixture[str]) -> None:
+def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
     printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--no-safety", "--json"))
     assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
@@ -248,7 +232,7 @@ def test_metrics_that_were_asked_for_by_movement(capsys: pytest.CaptureFixture[s
         assert word in out
 
 
-def test_metrics_lists_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+def test_metrics_lists_the_table(capsys: Captured) -> None:
     listed = json.loads(ok(capsys, "metrics", "--json"))
     assert [metric["name"] for metric in listed] == list(METRICS)
     out = ok(capsys, "metrics")
@@ -257,15 +241,12 @@ def test_metrics_lists_the_table(capsys: pytest.CaptureFixture[str]) -> None:
         assert metric.meaning in out
 
 
-# --- harmony and decide ----------------------------------------------------------------------
-
-
-def test_harmony_csv_is_the_papers_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_csv_is_the_papers_file(capsys: Captured) -> None:
     published = (ROOT / "dim" / "data" / "harmony_4way.csv").read_text()
     assert ok(capsys, "harmony", "four-way", "--csv").split() == published.split()
 
 
-def test_harmony_table_json_and_csv_agree(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_table_json_and_csv_agree(capsys: Captured) -> None:
     arguments = ("harmony", "custom", "--bearings", "0,80,190,260", "--side", "right")
     printed = json.loads(ok(capsys, *arguments, "--json"))
     text = ok(capsys, *arguments, "--csv")
@@ -276,7 +257,7 @@ def test_harmony_table_json_and_csv_agree(capsys: pytest.CaptureFixture[str]) ->
     assert table.count("●") - 1 == sum(map(sum, printed["harmony"])), "and one in the title"
 
 
-def test_harmony_of_twelve_arms_is_not_cut(capsys: pytest.CaptureFixture[str]) -> None:
+def test_harmony_of_twelve_arms_is_not_cut(capsys: Captured) -> None:
     show(harmony_table(HarmonyMatrix(12, np.zeros((132, 132), dtype=bool))))
     lines = capsys.readouterr().out.splitlines()
     assert "…" not in "".join(lines)
@@ -284,7 +265,7 @@ def test_harmony_of_twelve_arms_is_not_cut(capsys: pytest.CaptureFixture[str]) -
     assert [line.count("·") for line in lines if line.startswith((" a", " l"))] == [132] * 22
 
 
-def test_clearance_only_removes_harmony(capsys: pytest.CaptureFixture[str]) -> None:
+def test_clearance_only_removes_harmony(capsys: Captured) -> None:
     def pairs(clearance: str) -> int:
         text = ok(capsys, "harmony", "five-way", "--clearance", clearance, "--json")
         return sum(map(sum, json.loads(text)["harmony"]))
@@ -292,7 +273,7 @@ def test_clearance_only_removes_harmony(capsys: pytest.CaptureFixture[str]) -> N
     assert pairs("0") >= pairs("0.5") > pairs("3")
 
 
-def test_decide_answers_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+def test_decide_answers_as_the_paper(capsys: Captured) -> None:
     printed = json.loads(ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2", "--json"))
     assert printed["right_of_way"] == ["a1", "b2"]
     # Paper, section "Deadlock Analysis": (c2, a1), (a1, b2), (b2, d2).
@@ -304,17 +285,15 @@ def test_decide_answers_as_the_paper(capsys: pytest.CaptureFixture[str]) -> None
     assert printed["reason"] in text
 
 
-def test_decide_plots(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", ["decide three-way a1 c2", "verify three-way"])
+def test_answers_are_drawn(capsys: Captured, tmp_path: Path, command: str) -> None:
     for suffix, magic in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
         file = tmp_path / f"decision.{suffix}"
-        ok(capsys, "decide", "three-way", "a1", "c2", "--plot", str(file))
+        assert f"wrote {file}" in ok(capsys, *command.split(), "--plot", str(file))
         assert file.read_bytes().startswith(magic)
 
 
-# --- animate and demo ------------------------------------------------------------------------
-
-
-def test_animate_writes_a_gif(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
     ok(capsys, "animate", "four-way", "-o", str(file), "--start", "60", "--seconds", "2",
        "--fps", "5", "--density", "400")  # fmt: skip
@@ -325,7 +304,7 @@ def test_animate_writes_a_gif(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 
 def test_animate_checks_before_it_simulates(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -344,7 +323,7 @@ def test_animate_checks_before_it_simulates(
     assert recorded.read_text().startswith("demand_time_s")
 
 
-def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "out"
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
@@ -361,7 +340,7 @@ def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
 
 
 def test_demo_takes_the_seeds_it_is_given(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop(tour: Tour) -> None:
         raise InputError(f"{tour.seeds} seeds")
@@ -373,31 +352,19 @@ def test_demo_takes_the_seeds_it_is_given(
     assert "5 seeds" in fails(capsys, "demo", "--out", here)
 
 
-# --- errors ----------------------------------------------------------------------------------
-
 BAD = [
     (("rum",), "rum"),
     (("run",), "SCENARIO"),
     (("run", "four-way", "--fo"), "--fo"),
     (("run", "for-way"), "did you mean 'four-way'"),
     (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
-    (("run", "2-way"), "3 … 12"),
-    (("run", "custom"), "needs bearings"),
-    (("run", "custom", "--bearings", "0,10,90"), "at least 30°"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
-    (("run", "four-way", "--split", "1:1:inf:1"), "must be a finite number, got inf"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
-    (("run", "four-way", "-p", "pape"), "did you mean 'paper'"),
-    (("run", "four-way", "-d", "-1"), "-1"),
     (("run", "four-way", "-d", "many"), "many"),
-    (("run", "four-way", "--humans", "1.5"), "at least 0 and at most 1, got 1.5"),
-    (("run", "four-way", "-c", "adaptive", "--humans", "0.1"), "not with 'adaptive'"),
-    (("run", "four-way", "-p", "as_run", "--humans", "0.1"), "among vehicles of DIM"),
     (("run", "four-way", "--split", "4;3"), "4;3"),
-    (("run", "four-way", "--turns", "1:1"), "2 shares for 3 manoeuvres"),
     (("run", "four-way", "--side", "up"), "left, right"),
     (("run", "four-way", "--horizon", "0"), "horizon"),
     (("run", "four-way", "--on-collision", "ignore"), "stop, record"),
@@ -405,16 +372,11 @@ BAD = [
     (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
     (("run", "four-way", "--trips", "t.xlsx"), ".csv, .parquet"),
-    (("run", "four-way", "--trips", str(ROOT)), "allowed"),
-    (("run", "four-way", "--fcd", str(ROOT)), "allowed"),
     (("run", "four-way", "--fcd", "fcd.csv"), "allowed: .xml"),
     (("run", "four-way", "--trips", "trips.csv", "--fcd", "none/fcd.xml"), "no folder"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
     (("decide", "four-way"), "MOVEMENTS"),
-    (("decide", "four-way", "a1", "a2"), "a1 and a2"),
-    (("decide", "four-way", "a4"), "1 … 3"),
-    (("decide", "four-way", "e1"), "a … d"),
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
@@ -422,57 +384,42 @@ BAD = [
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
-    (("controllers", "own_none:X"), "no module 'own_none'"),
-    (("demo", "--seeds", "1001"), "--seeds"),
     (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
     (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
-    (("verify", "four-way", "--order", "sise"), "unknown order 'sise'"),
-    (("verify", "four-way", "--plot", "x.txt"), "a figure file ends in .png, .pdf, .svg"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
     (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
-    (("protocol", "three-way", "--commit", "shut"), "unknown commit rule 'shut'"),
     (("protocol", "three-way", "--priorities", "inflow"), "unknown priorities 'inflow'"),
     (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
-    (("protocol", "three-way", "--counterexample", "/nowhere/x.csv"), "there is no folder"),
     (("protocol", "three-way", "--counterexample", "x.csv"), "there is no counterexample"),
     (("sweep", "paper", "--jobs", "0"), "--jobs must be an integer 1"),
     (("sweep", "paper", "--seeds", "0"), "--seeds must be an integer 1"),
-    (("sweep", "paper", "--horizon", "-5"), "--horizon [s] must be above 0"),
     (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "paper", "--export", "missing/rows.csv"), "there is no folder"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
-    (("sweep", "papers"), "did you mean 'paper'"),
     (("sweep", "missing.toml"), "cannot read experiments from missing.toml"),
     (("sweep",), "Missing argument"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),
     (("figures", "webster", "--store", "runs.sqlite"), "there is no store"),
-    (("figures", "--seeds", "1"), "seeds must be an integer 2 … 10000, got 1"),
     (("reproduce", "--seeds", "1"), "seeds must be an integer"),
-    (("reproduce", "--jobs", "0"), "--jobs must be an integer 1 … 1024, got 0"),
     (("reproduce", "--only", "fare"), "did you mean 'fair'"),
-    (("crossval", "four-wy"), "unknown scenario"),
-    (("crossval", "-c", "dm"), "did you mean 'dim'"),
-    (("crossval", "--split", "4:x"), "4:x"),
     (("crossval", "--seeds", "0"), "--seeds"),
-    (("crossval", "--horizon", "0"), "horizon"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
-    (("crossval", "--replay", "-d", "400"), "no dim run of 400"),
+    (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
+    (("crossval", "--replay", "--split", "1:1:1:1"), "unknown split of a published run"),
     (("crossval", "--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("crossval", "--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
+    (("crossval", "--replay", "five-way", "-c", "v2ic"), "3 and 5 arms balanced only, with dim"),
     (("crossval", "three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
-    (("crossval", "-p", "as_run", "-c", "reservation"), "reservation cannot serve four-way at 150"),
 ]
 
 
 @pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a)[:50] for a, _ in BAD])
 def test_bad_input_is_one_line_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     arguments: tuple[str, ...], named: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
@@ -480,18 +427,12 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_broken_arrivals_name_the_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    arrivals = tmp_path / "arrivals.csv"
-    arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
-    assert "line 3" in fails(capsys, "run", "four-way", "--arrivals", str(arrivals))
-
-
 @pytest.mark.parametrize(
     ("first", "second"),
     [("--trips", "--trajectories"), ("--trips", "--fcd"), ("--arrivals", "--trips")],
 )
 def test_no_file_is_written_twice_or_over_an_input(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     first: str, second: str,
 ) -> None:  # fmt: skip
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
@@ -506,7 +447,7 @@ def test_no_file_is_written_twice_or_over_an_input(
     assert file.read_text() == before
 
 
-def test_ctrl_c_is_130(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_is_130(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -556,17 +497,11 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     assert "a1-b2" in decision.stdout
 
 
-# --- verify and protocol ---------------------------------------------------------------------
-
-
-def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_tells_what_all_cases_showed_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "verify", "four-way")
     assert "four-way, 4 arms: all 255 cases, order size" in text
     assert "130 (51%)" in text
     assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
-
-
-def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
     assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
     assert all(claim["holds"] for claim in printed["claims"])
@@ -574,7 +509,7 @@ def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
 
 
-def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
+def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
     assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
     (false,) = [claim for claim in printed["claims"] if not claim["holds"]]
@@ -582,23 +517,13 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[st
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
 
 
-def test_verify_draws(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    picture = tmp_path / "cases.png"
-    assert f"wrote {picture}" in ok(capsys, "verify", "four-way", "--plot", str(picture))
-    with Image.open(picture) as image:
-        assert image.width > 2 * image.height
-
-
-def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> None:
+def test_protocol_tells_what_it_visited_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "protocol", "three-way", "--order", "lanes")
     assert "872, with 3259 transitions\n" in text
     assert "safe         yes" in text
     assert "live         yes" in text
     assert "lane a       never starves" in text
     assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
-
-
-def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     rules = ("--order", "lanes", "--priorities", "waiting")
     printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
     assert printed["all_states"] is True
@@ -606,9 +531,7 @@ def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["starving"] == {"a": None, "b": None, "c": None}
 
 
-def test_protocol_writes_a_counterexample_that_collides(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_protocol_writes_a_counterexample_that_collides(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "two.csv"
     assert main(["protocol", "three-way", "--commit", "paper", "--counterexample", str(file)]) == 1
     text = capsys.readouterr().out
@@ -619,9 +542,7 @@ def test_protocol_writes_a_counterexample_that_collides(
     assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
 
 
-def test_arrivals_of_a_smaller_junction_are_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_arrivals_of_a_smaller_junction_are_refused(capsys: Captured, tmp_path: Path) -> None:
     """They fit, but a 3-arm manoeuvre 2 would be read as straight on."""
     table = tmp_path / "three.csv"
     rows = [f"{k},{'abc'[k % 3]},{k % 2 + 1}" for k in range(40)]

@@ -9,10 +9,10 @@ import pytest
 
 from minisim.parameters import parameters
 from scenarios.controllers import CONTROLLERS
-from tests.unit.scenarios.cli.test_cli import ok
+from tests.unit.scenarios.cli.test_cli import Captured, ok
 
 
-def test_it_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_lists_all_of_them(capsys: Captured) -> None:
     text = ok(capsys, "controllers")
     assert max(map(len, text.splitlines())) <= 80
     assert [line.split()[0] for line in text.splitlines() if line[0] != " "] == list(CONTROLLERS)
@@ -20,7 +20,7 @@ def test_it_lists_all_of_them(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
-def test_it_lists_the_parameters_of_each(capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_it_lists_the_parameters_of_each(capsys: Captured, name: str) -> None:
     text = ok(capsys, "controllers", name)
     assert max(map(len, text.splitlines())) <= 80
     declared = [it.name for it in parameters(CONTROLLERS[name].make)]
@@ -29,7 +29,7 @@ def test_it_lists_the_parameters_of_each(capsys: pytest.CaptureFixture[str], nam
     assert all(f"\n  {it['name']}={it['default']}" in text for it in found)
 
 
-def test_nested_recipes_are_listed_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     text = ok(capsys, "controllers", "dim")
     assert "perception=noisy: " in text
     assert ok(capsys, "controllers", "dim:gate=harmonious").split()[1:] == text.split()[1:]
@@ -37,7 +37,7 @@ def test_nested_recipes_are_listed_too(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_a_class_of_your_own(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own_signal.py").write_text(

@@ -18,11 +18,11 @@ from scenarios.studies.shared.archive import Archive, MissingRunsError, find_in
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import reproduce
 from scenarios.sweep.store import Store
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 
-def test_list_names_everything(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", "--list"]) == 0
-    printed = capsys.readouterr().out
+def test_list_names_everything(capsys: Captured) -> None:
+    printed = ok(capsys, "figures", "--list")
     assert all(name in printed for name in GALLERY)
 
 
@@ -33,7 +33,7 @@ def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
 
 
 def test_without_a_store_what_needs_runs_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     few = {name: GALLERY[name] for name in ("webster", "gate", "fair")}
     monkeypatch.setattr(gallery, "GALLERY", few)
@@ -43,25 +43,20 @@ def test_without_a_store_what_needs_runs_is_left_out(
     assert captured.err == "  not 2 others, which need runs: name a store with --store\n"
 
 
-def test_a_wrong_store_is_refused_before_a_folder_is_made(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_store_is_refused_before_a_folder_is_made(tmp_path: Path, capsys: Captured) -> None:
     notes, folder = tmp_path / "notes.txt", tmp_path / "out"
     notes.write_text("mine")
-    assert main(["reproduce", "--store", str(notes), "--out", str(folder)]) == 2
-    assert "is not a store of minisim" in capsys.readouterr().err
+    said = fails(capsys, "reproduce", "--store", str(notes), "--out", str(folder))
+    assert "is not a store of minisim" in said
     assert not folder.exists()
-    assert main(["figures", "webster", "--out", str(notes)]) == 2
-    assert "it is a file" in capsys.readouterr().err
+    assert "it is a file" in fails(capsys, "figures", "webster", "--out", str(notes))
 
 
-def test_an_empty_store_says_what_makes_its_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_empty_store_says_what_makes_its_runs(tmp_path: Path, capsys: Captured) -> None:
     store = tmp_path / "runs.sqlite"
     Store(store).close()
-    assert main(["figures", "gate", "--store", str(store), "--out", str(tmp_path)]) == 2
-    assert "minisim reproduce --only gate --seeds 10" in capsys.readouterr().err
+    said = fails(capsys, "figures", "gate", "--store", str(store), "--out", str(tmp_path))
+    assert "minisim reproduce --only gate --seeds 10" in said
 
 
 TINY = Effort(
@@ -102,7 +97,7 @@ def test_reproduce_computes_what_is_missing(tmp_path: Path) -> None:
 
 
 def test_progress_is_told_without_a_terminal(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = iter([0.0, 5.0, 25.0, 30.0, 50.0])
     monkeypatch.setattr(terminal, "SILENCE", 20.0)
@@ -117,7 +112,7 @@ def test_progress_is_told_without_a_terminal(
 
 @pytest.mark.usefixtures("small_search")
 def test_reproduce_says_what_each_study_took(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
 ) -> None:
     monkeypatch.setattr(Effort, "of", lambda **_: TINY)
     monkeypatch.setattr(report, "write_report", lambda *_, parts: len(parts))
@@ -132,9 +127,10 @@ def test_reproduce_says_what_each_study_took(
 
 
 @pytest.mark.parametrize("command", ["reproduce", "sweep"])
-def test_help_names_every_study(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, "--help"]) == 0
-    words = capsys.readouterr().out.replace("│", " ").replace(",", " ").replace(".", " ").split()
+def test_help_names_every_study(command: str, capsys: Captured) -> None:
+    words = (
+        ok(capsys, command, "--help").replace("│", " ").replace(",", " ").replace(".", " ").split()
+    )
     assert {*NAMES} - {"capacity"} <= {*words}
 
 

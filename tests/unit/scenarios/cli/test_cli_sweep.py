@@ -19,6 +19,7 @@ from scenarios.studies.shared.archive import find_in
 from scenarios.studies.shared.effort import Effort
 from scenarios.sweep.store import Store
 from tests import ROOT
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
 
@@ -30,15 +31,10 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sweep_and_the_same_again(
-    file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_and_the_same_again(file: Path, tmp_path: Path, capsys: Captured) -> None:
     store, table = tmp_path / "s.db", tmp_path / "rows.csv"
     arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
-    assert main(arguments) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    lines = captured.out.splitlines()
+    lines = ok(capsys, *arguments).splitlines()
     for name in ("dim", "fixed-time"):
         assert any(f" {name} " in line and "too short" in line for line in lines)
     assert any("4 runs in" in line for line in lines)
@@ -60,9 +56,7 @@ def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
     assert rows["error"].isna().all()
 
 
-def test_failures_are_rows_and_exit_code_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text('horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n')
     assert main(["sweep", str(file), "--jobs", "1", "--out", str(store)]) == 1
@@ -73,24 +67,21 @@ def test_failures_are_rows_and_exit_code_1(
         assert len(kept) == 4
 
 
-def test_a_capped_signal_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_capped_signal_is_told(tmp_path: Path, capsys: Captured) -> None:
     file = tmp_path / "e.toml"
     file.write_text('horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n')
-    assert main(["sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db")]) == 0
-    assert "over Webster's capacity; the cycle is capped at 180 s" in capsys.readouterr().out
+    said = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db"))
+    assert "over Webster's capacity; the cycle is capped at 180 s" in said
 
 
-def test_the_papers_grid(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     """The study `text`: what `minisim reproduce` needs of it is then in the store."""
     points = tuple(point for point in text.STUDY.points if point.density == 300)
     some = replace(text.STUDY, points=points)
     monkeypatch.setattr(text, "STUDY", some)
     store = tmp_path / "s.db"
     few = ["--seeds", "2", "--horizon", "5", "--jobs", "1", "--out", str(store)]
-    assert main(["sweep", "paper", *few]) == 0
-    assert "28 runs in" in capsys.readouterr().out
+    assert "28 runs in" in ok(capsys, "sweep", "paper", *few)
     with Store(store) as kept:
         assert len(kept) == 28
         assert set(kept.frame()["profile"]) == {"paper"}
@@ -98,24 +89,19 @@ def test_the_papers_grid(
         assert some.collect(effort, find_in(kept)).missing == ()
 
 
-def test_results_do_not_go_over_the_experiments(
-    file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["sweep", str(file), "--out", str(file)]) == 2
-    assert "FILE.toml and --out name the same file" in capsys.readouterr().err
+def test_results_do_not_go_over_the_experiments(file: Path, capsys: Captured) -> None:
+    said = fails(capsys, "sweep", str(file), "--out", str(file))
+    assert "FILE.toml and --out name the same file" in said
     assert file.read_text() == SMALL
 
 
 def test_the_extra_is_named_where_it_is_missing(
-    file: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    file: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)  # Python's own way to block an import
     store = tmp_path / "s.db"
-    assert main(["sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store)]) == 2
-    assert "pip install 'minisim[dask]'" in capsys.readouterr().err
+    said = fails(capsys, "sweep", str(file), "--scheduler", "tcp://x:1", "--out", str(store))
+    assert "pip install 'minisim[dask]'" in said
     assert not store.exists()
 
 

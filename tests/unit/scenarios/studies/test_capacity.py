@@ -81,11 +81,7 @@ def test_a_search_has_a_power_of_two_of_steps() -> None:
 
 
 def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
-    """A signal's capacity is its outflow with a standing queue (Webster: s·g/C).
-
-    Two independent measurements: a bisection for a queue that does not grow, and the trips in an
-    hour in which far more vehicles come than leave.
-    """
+    """Bisection against the trips in an hour in which far more come than leave (Webster: s·g/C)."""
     signal = FixedTime(greens=(8.0,) * 4)
 
     def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any]]:

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from dim import Dim, Mixed
-from minisim.errors import InputError
 from scenarios import studies
 from scenarios.controllers import RIVALS
 from scenarios.recipe import Recipe
@@ -83,11 +82,6 @@ def test_the_humans_study_tells_its_shares_apart() -> None:
     assert shares[0.0] == Dim()
     assert shares[0.4] == Mixed(Dim(), 0.4)
     assert fair("dim", 4, 150.0, 0.4).where == "40% humans, 4 arms, balanced"
-
-
-def test_unknown_study_names_the_nearest() -> None:
-    with pytest.raises(InputError, match="did you mean 'fair'"):
-        study_named("fare")
 
 
 def test_results_say_what_is_missing() -> None:
