@@ -81,40 +81,35 @@ def test_ways_that_are_not_netconverts_are_refused() -> None:
         simulate(scenario, Unregulated())
 
 
-@pytest.mark.parametrize("cell", [Cell("balanced", 350, 4), Cell("balanced", 150, 3)], ids=str)
-def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
-    ours, theirs = both(until(replay(*cell), 240.0), AsRunDim())
-    ended = ours.columns.arrived & theirs.columns.arrived
-    assert ended.sum() > 10
-    assert (ours.columns.arrived == theirs.columns.arrived).mean() > 0.99
-    for metric in ("travel_time_s", "waiting_time_s"):
-        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
-        assert (apart <= 0.1 + 1e-9).all()
-
-
 #: Share of the trips whose waiting and travel times are both within 0.1 s in the two hosts, at
 #: least. The issue asks for 0.9; five arms part late in the hour (docs/fidelity.md).
-SHARES = {
-    Cell("balanced", 150, 3): 1.0,
-    Cell("balanced", 350, 3): 0.99,
-    **{Cell("balanced", density, 4): 1.0 for density in (150, 200, 250, 300)},
-    Cell("balanced", 350, 4): 0.99,
-    Cell("4:3:2:1", 350, 4): 0.99,
-    Cell("4:1:4:1", 350, 4): 0.99,
-    Cell("balanced", 350, 5): 0.95,
-}
+SHARES = [
+    (Cell("balanced", 150, 3), 3600.0, 1.0),
+    (Cell("balanced", 350, 3), 3600.0, 0.99),
+    *((Cell("balanced", density, 4), 3600.0, 1.0) for density in (150, 200, 250, 300)),
+    *((Cell(split, 350, 4), 3600.0, 0.99) for split in ("balanced", "4:3:2:1", "4:1:4:1")),
+    (Cell("balanced", 350, 5), 3600.0, 0.95),
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("cell", SHARES, ids=str)
-def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
-    ours, theirs = both(replay(*cell), controller_of(*cell))
+@pytest.mark.parametrize(
+    ("cell", "horizon", "share"),
+    [
+        (Cell("balanced", 350, 4), 240.0, 1.0),
+        (Cell("balanced", 150, 3), 240.0, 1.0),
+        *(pytest.param(*it, marks=pytest.mark.slow) for it in SHARES),
+    ],
+    ids=str,
+)
+def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: float) -> None:
+    ours, theirs = both(until(replay(*cell), horizon), controller_of(*cell))
     ended = ours.columns.arrived & theirs.columns.arrived
+    assert ended.sum() > 10
     close = np.ones(ended.sum(), bool)
     for metric in ("travel_time_s", "waiting_time_s"):
         apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
         close &= apart <= 0.1 + 1e-9
-    assert close.mean() >= SHARES[cell]
+    assert close.mean() >= share
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
 
 
