@@ -106,8 +106,8 @@ def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: fl
     ended = ours.columns.arrived & theirs.columns.arrived
     assert ended.sum() > 10
     close = np.ones(ended.sum(), bool)
-    for metric in ("travel_time_s", "waiting_time_s"):
-        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
+    for column in ("travel_time", "waiting_time"):
+        apart = np.abs(getattr(ours.columns, column) - getattr(theirs.columns, column))[ended]
         close &= apart <= 0.1 + 1e-9
     assert close.mean() >= share
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99

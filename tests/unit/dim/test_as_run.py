@@ -192,18 +192,6 @@ def test_a_vehicle_that_loses_the_right_of_way_is_told_20_for_one_step() -> None
 # --- 9: lanes first ------------------------------------------------------------------------------
 
 
-def movements(*names: str) -> frozenset[Movement]:
-    return frozenset(Movement("abcde".index(name[0]), int(name[1])) for name in names)
-
-
-def test_the_first_clique_in_the_alphabet_wins_whatever_its_size() -> None:
-    """Size would choose {b2, d2}, not {a3}."""
-    matrix = HarmonyMatrix.paper(4)
-    case = movements("a2", "b2", "d1", "c3")
-    assert {str(m) for m in winner(matrix, case, "lanes")} == {"a2", "d1"}
-    assert winner(matrix, frozenset(), "lanes") == ()
-
-
 @pytest.mark.parametrize(
     ("options", "cars", "chosen"),
     [
@@ -233,6 +221,7 @@ def test_how_often_the_orders_differ(arms: int, differ: int, cases: int) -> None
             total += 1
             count += winner(matrix, case, "lanes") != winner(matrix, case, "size")
     assert (count, total) == (differ, cases)
+    assert winner(matrix, frozenset(), "lanes") == ()
 
 
 # --- the session ---------------------------------------------------------------------------------

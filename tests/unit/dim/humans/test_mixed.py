@@ -174,39 +174,24 @@ def test_dim_yields_to_a_human_in_the_yellow_zone_wherever_it_may_go(gate: str) 
     assert scene.goes(0.5, car._replace(distance=2.0, speed=0.0)) == {CARS[0]}
 
 
-def test_the_harmonious_gate_admits_harmony_with_all_that_a_human_may_do() -> None:
-    """Whatever comes out of lane b keeps clear of a left turn from a."""
-    car, driver = seen(CARS[0], A, LEFT, 6.0, 4.0), seen(PEOPLE[0], B, STRAIGHT, 7.5, 4.0)
-    assert Scene(replace(MIXED, dim=Dim(gate="harmonious"))).goes(0.0, car, driver) == {CARS[0]}
-    assert Scene().goes(0.0, car, driver) == set()
-
-
 def test_no_vehicle_of_dim_goes_from_behind_a_human() -> None:
     driver, car = seen(PEOPLE[0], A, STRAIGHT, 0.5), seen(CARS[0], A, STRAIGHT, 7.9)
     assert Scene(replace(MIXED, dim=Dim(gate="harmonious"))).goes(0.0, driver, car) == set()
 
 
-@pytest.mark.parametrize(("trust", "goes"), [("motion", False), ("signals", True)])
-def test_dim_may_believe_an_indicator(trust: str, goes: bool) -> None:
-    """a's left turn and c's straight way, of a driver that has already entered."""
-    inside = seen(TELLING, C, LEFT, -0.5, 3.0)
-    car = seen(CARS[0], A, STRAIGHT, 6.0, 4.0)
-    scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
-    assert (CARS[0] in scene.goes(0.0, car, inside)) is goes
-
-
+@pytest.mark.parametrize(("trust", "believed"), [("motion", False), ("signals", True)])
 @pytest.mark.parametrize("lane", [B, C, D])
 @pytest.mark.parametrize("manoeuvre", [LEFT, RIGHT])
 @pytest.mark.parametrize("distance", [-0.5, 8.0])  # inside; where the yellow zone begins
-def test_an_indicator_that_is_believed_means_its_way(
-    lane: int, manoeuvre: int, distance: float
+def test_an_indicator_that_is_believed_means_its_way_and_else_any(
+    lane: int, manoeuvre: int, distance: float, trust: str, believed: bool
 ) -> None:
     other = seen(TELLING, lane, manoeuvre, distance, 4.0)
-    matrix = Dim().harmony(SITE)
+    matrix, ways = Dim().harmony(SITE), [manoeuvre] if believed else [LEFT, STRAIGHT, RIGHT]
     for mine in (LEFT, STRAIGHT, RIGHT):
         car = seen(CARS[0], A, mine, 6.0, 4.0)
-        harmony = matrix.harmony(Movement(A, mine), Movement(lane, manoeuvre))
-        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust="signals"))
+        harmony = all(matrix.harmony(Movement(A, mine), Movement(lane, way)) for way in ways)
+        scene = Scene(replace(MIXED, dim=Dim(gate="harmonious"), trust=trust))
         assert (CARS[0] in scene.goes(0.0, car, other)) is harmony, mine
 
 
