@@ -11,8 +11,8 @@ from baselines.v2ic_as_run import AsRunList, Platoon, right_hand_conflicts
 from dim import HarmonyMatrix
 from minisim.errors import InputError
 from scenarios import AS_RUN, five_way, four_way
-from scenarios.paper import Cell, controller_of, reference_value, replay
-from tests.builders import replayed
+from scenarios.paper import Cell, controller_of, replay
+from tests.builders import reference_value, replayed
 
 MOVEMENTS = four_way().intersection.movements
 
