@@ -48,10 +48,7 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
         **GREENS,
     ),
     "longest-queue": st.builds(
-        LongestQueue,
-        interval=floats(0.5, 15.0),
-        detector_range=floats(5.0, 200.0),
-        amber=AMBERS,
+        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(5.0, 200.0), amber=AMBERS
     ),
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
@@ -93,10 +90,7 @@ def test_out_of_their_zones_no_two_bodies_touch(
     if entry_room(intersection, vehicle) <= 0.0:
         vehicle = FAIR.vehicle
     site = Site(
-        intersection=intersection,
-        vehicle=vehicle,
-        speed_limit=14.0,
-        demand=(0.0,) * intersection.n,
+        intersection=intersection, vehicle=vehicle, speed_limit=14.0, demand=(0.0,) * intersection.n
     )
     zones = conflict_zones(intersection, vehicle)
     conflicts = np.argwhere(site.conflicts)

@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.signals.fixed_time import FixedTime, Program
+from baselines.signals.fixed_time import Program
 from baselines.signals.heads import Colour
 from baselines.signals.webster import MIN_GREEN, webster, webster_delay
-from minisim.errors import MinisimError
 from scenarios.strategies import floats
 
 RATES = st.lists(floats(0.0, 3600.0), min_size=3, max_size=12)
-JUNK = (
-    st.none() | st.booleans() | st.text(max_size=5) | st.integers() | st.floats()
-    | st.lists(st.floats() | st.text(max_size=3), max_size=5)
-)  # fmt: skip
 
 
 @given(RATES, st.booleans())
 def test_any_demand_has_a_timing(rates: list[float], equal: bool) -> None:
     timing = webster(rates, equal_greens=equal)
-
     assert min(timing.greens) >= MIN_GREEN - 1e-9
     assert sum(timing.greens) + 2.0 * len(rates) == pytest.approx(timing.cycle)
     assert timing.capped == (timing.flow_ratio > 0.95)
@@ -65,7 +57,6 @@ def programs(draw: st.DrawFn) -> Program:
 @given(programs(), floats(0.0, 1e5))
 def test_a_program_shows_the_same_until_it_switches(program: Program, time: float) -> None:
     switch = program.next_switch(time)
-
     assert time < switch <= time + program.cycle + 1e-6
     shown = program.colours(time)
     for share in (0.001, 0.5, 0.999):
@@ -91,21 +82,3 @@ def test_a_program_does_not_drift(program: Program) -> None:
     ]
     assert starts == [k * program.cycle for k in range(1, len(starts) + 1)]
     assert len(starts) >= 49
-
-
-@given(st.dictionaries(st.sampled_from(sorted(FixedTime.__dataclass_fields__)), JUNK))
-def test_any_argument_makes_a_signal_or_a_clear_error(arguments: dict[str, Any]) -> None:
-    with suppress(MinisimError):
-        assert hash(FixedTime(**arguments)) == hash(FixedTime(**arguments))
-
-
-@given(JUNK, JUNK, JUNK)
-def test_any_argument_makes_a_timing_or_a_clear_error(a: Any, b: Any, c: Any) -> None:
-    for attempt in (
-        lambda: webster(a),
-        lambda: webster([100, 100, 100], saturation_flow=a, max_cycle=b),
-        lambda: webster([100, 100, 100], min_green=a, lost_time_per_phase=b),
-        lambda: webster_delay(a, b, c),
-    ):
-        with suppress(MinisimError):
-            attempt()

@@ -137,33 +137,6 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
         told = going
 
 
-@given(runs())
-def test_a_vehicle_that_starts_to_go_is_in_harmony_with_all_that_go(
-    run: tuple[Site, Dim, list[View]],
-) -> None:
-    """With commit="stoppable", one view after the other: the new right of way is safe."""
-    site, dim, shown = run
-    dim = replace(dim, commit="stoppable")
-    matrix = dim.harmony(site)
-    for view in shown:
-        session = dim.start(site)
-        going = {c.vehicle for c in session.decide(view) if isinstance(c, Go)}
-        near = [v for v in view.vehicles if v.distance <= 8.0]
-        crossing = [v for v in near if is_crossing(v, dim, site.vehicle.deceleration)]
-        movers = [v for v in near if v.id in going]
-        for v in movers:
-            assert [other for other in movers if other.lane == v.lane] == [v]
-            for other in [*movers, *crossing]:
-                assert other.lane == v.lane or matrix[v.movement, other.movement]
-        if movers and crossing:
-            assert dim.gate == "harmonious"
-        for v in movers:  # in front of all of its lane that have not entered
-            ahead = [o for o in near if o.lane == v.lane and o.distance < v.distance]
-            assert all(o.distance < 0 for o in ahead)
-        if near and not crossing:
-            assert movers  # a vehicle goes: no deadlock
-
-
 @pytest.mark.parametrize("maker", [three_way, four_way, five_way])
 @pytest.mark.parametrize("commit", COMMITS)
 @pytest.mark.parametrize("gate", GATES)

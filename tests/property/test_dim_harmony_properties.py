@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import numpy as np
 from hypothesis import given, settings
@@ -48,16 +47,6 @@ def test_the_mirror_moves_what_it_should() -> None:
     """Guards the property above: on 4 arms left and right turns and the arms b, d swap."""
     _, becomes = mirrored(Intersection((0.0, 90.0, 180.0, 270.0)))
     assert " ".join(map(str, becomes)) == "a3 a2 a1 d3 d2 d1 c3 c2 c1 b3 b2 b1"
-
-
-@settings(max_examples=25)
-@given(intersections(), st.lists(st.floats(0.0, 10.0), min_size=2, max_size=5))
-def test_more_clearance_only_removes_harmony(
-    intersection: Intersection, clearances: list[float]
-) -> None:
-    matrices = [HarmonyMatrix.from_geometry(intersection, clearance=c) for c in sorted(clearances)]
-    for smaller, larger in itertools.pairwise(matrices):
-        assert not np.any(larger.values & ~smaller.values)
 
 
 @settings(max_examples=12)

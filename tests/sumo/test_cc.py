@@ -82,41 +82,35 @@ def test_ways_that_are_not_netconverts_are_refused() -> None:
         simulate(scenario, Unregulated())
 
 
-def close(ours: Run, theirs: Run) -> np.ndarray:
-    """Of the trips that ended in both, those whose times differ by 0.1 s at most."""
-    a, b = ours.columns, theirs.columns
-    travel, waiting = a.travel_time - b.travel_time, a.waiting_time - b.waiting_time
-    return (np.maximum(abs(travel), abs(waiting)) <= 0.1 + 1e-9)[a.arrived & b.arrived]
-
-
-@pytest.mark.parametrize("cell", [Cell("balanced", 350, 4), Cell("balanced", 150, 3)], ids=str)
-def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
-    ours, theirs = both(until(replay(*cell), 240.0), AsRunDim())
-    ended = ours.columns.arrived & theirs.columns.arrived
-    assert ended.sum() > 10
-    assert (ours.columns.arrived == theirs.columns.arrived).mean() > 0.99
-    assert close(ours, theirs).all()
-
-
 #: Share of the trips whose waiting and travel times are both within 0.1 s in the two hosts, at
 #: least. The issue asks for 0.9; five arms part late in the hour (docs/fidelity.md).
-SHARES = {
-    Cell("balanced", 150, 3): 1.0,
-    Cell("balanced", 350, 3): 0.99,
-    **{Cell("balanced", density, 4): 1.0 for density in (150, 200, 250, 300)},
-    Cell("balanced", 350, 4): 0.99,
-    Cell("4:3:2:1", 350, 4): 0.99,
-    Cell("4:1:4:1", 350, 4): 0.99,
-    Cell("balanced", 350, 5): 0.95,
-}
+SHARES = [
+    (Cell("balanced", 150, 3), 3600.0, 1.0),
+    (Cell("balanced", 350, 3), 3600.0, 0.99),
+    *((Cell("balanced", density, 4), 3600.0, 1.0) for density in (150, 200, 250, 300)),
+    *((Cell(split, 350, 4), 3600.0, 0.99) for split in ("balanced", "4:3:2:1", "4:1:4:1")),
+    (Cell("balanced", 350, 5), 3600.0, 0.95),
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("cell", SHARES, ids=str)
-def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
-    ours, theirs = both(replay(*cell), controller_of(*cell))
-    assert close(ours, theirs).mean() >= SHARES[cell]
-    assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
+@pytest.mark.parametrize(
+    ("cell", "horizon", "share"),
+    [
+        (Cell("balanced", 350, 4), 240.0, 1.0),
+        (Cell("balanced", 150, 3), 240.0, 1.0),
+        *(pytest.param(*it, marks=pytest.mark.slow) for it in SHARES),
+    ],
+    ids=str,
+)
+def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: float) -> None:
+    ours, theirs = both(until(replay(*cell), horizon), controller_of(*cell))
+    a, b = ours.columns, theirs.columns
+    ended = a.arrived & b.arrived
+    assert ended.sum() > 10
+    travel, waiting = a.travel_time - b.travel_time, a.waiting_time - b.waiting_time
+    close = np.maximum(np.abs(travel), np.abs(waiting))[ended] <= 0.1 + 1e-9
+    assert close.mean() >= share
+    assert (a.arrived == b.arrived).mean() >= 0.99
 
 
 @pytest.mark.parametrize("controller", [FixedTime(), AsRunDim()], ids=lambda c: c.name)

@@ -245,7 +245,6 @@ def test_hours_compare_at_every_density(monkeypatch: pytest.MonkeyPatch) -> None
         signals = ("fixed-time", "adaptive", "actuated")
         outside += [(n, density) for n in signals if not alike(ours[density][n], theirs[n])]
     assert outside == []
-
     enter_as_sumo_does(monkeypatch)
     for density in DENSITIES:
         scenario = four_way(density, profile="fair")

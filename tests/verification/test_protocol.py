@@ -16,14 +16,13 @@ from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS
 from dim.perception import COMMITS, Percept
 from dim.proofs.conformance import Checked, ConformanceError
-from dim.proofs.modelcheck import Lasso, explore, is_stuck, starvation
+from dim.proofs.modelcheck import Lasso, explore, starvation
 from dim.proofs.protocol import (
     COMMITTED,
     PRIORITIES,
     ROLLING,
     WAITING,
     Event,
-    Front,
     Protocol,
     State,
 )  # fmt: skip
@@ -120,26 +119,6 @@ def test_with_the_stoppable_rule_all_vehicles_that_go_are_in_harmony() -> None:
                 if front is not None and front.goes:
                     going |= 1 << lane * 2 + front.manoeuvre - 1
             assert protocol.conflict(State((None,) * 3, going)) is None
-
-
-def test_a_stuck_state_is_found() -> None:
-    protocol = Protocol(paper(4))
-    assert not is_stuck(protocol, protocol.start)
-    silent = Front(2, WAITING, False)
-    assert not is_stuck(protocol, State((silent, None, None, None)))
-    # A committed vehicle without right of way would block the others for ever; they grant it.
-    assert not is_stuck(protocol, State((Front(2, COMMITTED, False), silent, None, None)))
-
-    class Mute(Protocol):
-        def look(self, state: State) -> State:
-            return state
-
-    assert is_stuck(Mute(paper(4)), State((silent, None, None, None)))
-
-
-def test_too_many_states_are_refused() -> None:
-    with pytest.raises(InputError, match="more than 100 states"):
-        explore(Protocol(paper(4)), max_states=100)
 
 
 # --- the agents ------------------------------------------------------------------------------

@@ -64,7 +64,6 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
     leader = predict(motion, lane_ways[1], first["s"][0] - ENTRY, first["v"][0], beyond=60.0)
     assert leader is not None
     assert np.allclose(leader[0], first["s"][: len(leader[0])] - ENTRY, atol=1e-6)
-
     until = float(branch(site.intersection, site.vehicle)[1, manoeuvre - 1]) - ENTRY
     follower = predict(
         motion, lane_ways[manoeuvre - 1], second["s"][0] - ENTRY, second["v"][0],

@@ -101,10 +101,3 @@ def test_harmonious_gate(lane: str, participants: str, crossing: str, goes: bool
     for before in (False, True):
         ego = agent(lane, goes=before, gate="harmonious")
         assert ego.decide(scene) is goes
-
-
-def test_the_order_of_the_table_counts() -> None:
-    by_lanes = Rules(DecisionTable(MATRIX, "lanes"))
-    scene = percept("a2 b1 d2")
-    assert [Agent(i, i, by_lanes).decide(scene) for i in (0, 1, 3)] == [True, False, False]
-    assert [agent(lane).decide(scene) for lane in "abd"] == [False, True, True]

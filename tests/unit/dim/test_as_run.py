@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import minisim
-from dim import AsRunDim, Dim
+from dim import AsRunDim
 from dim.as_run import (
     BOUND,
     EXIT_SPEED,
@@ -26,7 +26,6 @@ from minisim.control import Advise, Observed, Plan, View, Wake
 from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios import four_way, regular
-from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.paper import replay
 from tests.builders import replayed
@@ -56,18 +55,12 @@ def step(rule: AsRunRules, *cars: Car) -> dict[int, float]:
 )
 def test_zones_of_the_three_junctions(arms: int, red: float, yellow: float) -> None:
     assert step(rules(arms), car("v1.a_1", red - 0.01)) == {}
-    assert step(rules(arms), car("v1.a_1", red)) == {1: RED_SPEED}
     rule = rules(arms)
-    step(rule, car("v1.a_1", yellow - 0.01))
+    assert step(rule, car("v1.a_1", red)) == {1: RED_SPEED}
+    assert step(rule, car("v1.a_1", yellow - 0.01)) == {}, "told once"
     assert rule.action == []
     step(rule, car("v1.a_1", yellow))
     assert rule.action == [1]
-
-
-def test_the_red_zone_speaks_once() -> None:
-    rule = rules()
-    assert step(rule, car("v1.a_1", 466.0)) == {1: RED_SPEED}
-    assert step(rule, car("v1.a_1", 470.0)) == {}
 
 
 def test_a_lone_vehicle_never_stops() -> None:
@@ -80,16 +73,6 @@ def test_a_lone_vehicle_never_stops() -> None:
 
 
 # --- 3: names decide -----------------------------------------------------------------------------
-
-
-def test_names_are_compared_letter_by_letter() -> None:
-    """v100 is visited before v99: it takes the last place in the list."""
-    rule = rules()
-    step(rule, car("v100.d_2", 486.0), *(car(f"v{k}.{a}_2", 480.0) for k, a in enumerate("abc")))
-    rule.action, rule.chosen = [1, 2, 3], ()
-    others = [car(f"v{k}.{a}_2", 486.0) for k, a in ((1, "a"), (2, "b"), (3, "c"))]
-    step(rule, car("v99.d_2", 485.5), car("v100.d_1", 485.5), *others)
-    assert rule.action == [1, 2, 3, 100]
 
 
 def test_the_movement_breaks_a_tie_of_seconds() -> None:
@@ -131,18 +114,14 @@ def test_a_place_is_free_again_at_506_m_for_vehicles_visited_later() -> None:
 # --- 5: several of a lane ------------------------------------------------------------------------
 
 
-def test_of_one_movement_the_later_entry_is_chosen() -> None:
+@pytest.mark.parametrize("first", ["v1.a_1", "v1.a_3"])
+def test_of_one_lane_only_one_goes(first: str) -> None:
+    """Of one movement the later entry; a1 comes before a3."""
     rule = rules()
     rule.action = [1]
-    step(rule, car("v1.a_1", 487.9), car("v2.a_1", 485.0))
+    step(rule, car(first, 487.9), car("v2.a_1", 485.0))
     assert rule.action == [1, 2]
     assert rule.chosen == (2,)
-
-
-def test_of_one_lane_only_one_goes() -> None:
-    rule = rules()
-    step(rule, car("v1.a_3", 487.9), car("v2.a_1", 485.0))
-    assert rule.chosen == (2,)  # a1 comes before a3
 
 
 # --- 6: busy junction ----------------------------------------------------------------------------
@@ -213,33 +192,21 @@ def test_a_vehicle_that_loses_the_right_of_way_is_told_20_for_one_step() -> None
 # --- 9: lanes first ------------------------------------------------------------------------------
 
 
-def movements(*names: str) -> frozenset[Movement]:
-    return frozenset(Movement("abcde".index(name[0]), int(name[1])) for name in names)
-
-
-def test_the_first_clique_in_the_alphabet_wins_whatever_its_size() -> None:
-    """Size would choose {b2, d2}, not {a3}."""
-    matrix = HarmonyMatrix.paper(4)
-    case = movements("a2", "b2", "d1", "c3")
-    assert {str(m) for m in winner(matrix, case, "lanes")} == {"a2", "d1"}
-    case = movements("a3", "b2", "d2")
-    assert {str(m) for m in winner(matrix, case, "lanes")} == {"a3"}
-    assert {str(m) for m in winner(matrix, case, "size")} == {"b2", "d2"}
-    assert winner(matrix, frozenset(), "lanes") == ()
-
-
-@pytest.mark.parametrize(("order", "chosen"), [("lanes", (1,)), ("size", (2, 4))])
-def test_the_rules_decide_by_their_order(order: str, chosen: tuple[int, ...]) -> None:
-    rule = rules(order=order)
-    step(rule, car("v1.a_3", 486.0), car("v2.b_2", 486.0), car("v4.d_2", 486.0))
-    assert rule.chosen == chosen
-
-
-@pytest.mark.parametrize(("names", "chosen"), [("abcd", (2,)), ("acbd", (3,))])
-def test_the_rules_decide_by_the_arms_names(names: str, chosen: tuple[int, ...]) -> None:
-    """b2 and c2 are in conflict; in the runs at 4:1:4:1 the second arm was called c."""
-    rule = rules(names=names)
-    step(rule, car("v2.b_2", 486.0), car("v3.c_2", 486.0))
+@pytest.mark.parametrize(
+    ("options", "cars", "chosen"),
+    [
+        ({"order": "lanes"}, "v1.a_3 v2.b_2 v4.d_2", (1,)),
+        ({"order": "size"}, "v1.a_3 v2.b_2 v4.d_2", (2, 4)),
+        # In conflict; in the runs at 4:1:4:1 the second arm was called c.
+        ({"names": "abcd"}, "v2.b_2 v3.c_2", (2,)),
+        ({"names": "acbd"}, "v2.b_2 v3.c_2", (3,)),
+    ],
+)
+def test_the_rules_decide_by_order_and_by_the_arms_names(
+    options: dict[str, str], cars: str, chosen: tuple[int, ...]
+) -> None:
+    rule = rules(**options)
+    step(rule, *(car(name, 486.0) for name in cars.split()))
     assert rule.chosen == chosen
 
 
@@ -254,6 +221,7 @@ def test_how_often_the_orders_differ(arms: int, differ: int, cases: int) -> None
             total += 1
             count += winner(matrix, case, "lanes") != winner(matrix, case, "size")
     assert (count, total) == (differ, cases)
+    assert winner(matrix, frozenset(), "lanes") == ()
 
 
 # --- the session ---------------------------------------------------------------------------------
@@ -324,25 +292,15 @@ def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     assert long.reach == 0.0
 
 
-def test_names_and_orders() -> None:
-    assert isinstance(controller_named("dim", "as_run"), AsRunDim)
-    assert controller_named("dim", "as_run") == AsRunDim(order="lanes")
-    assert controller_named("dim", "fair") == Dim()
-    assert controller_named("dim-as-run:order=size") == AsRunDim(order="size")
-
-
 def test_the_exit_speed_can_be_that_of_the_signals() -> None:
     """as_run.md, discrepancy 15."""
     assert step(rules(exit_speed=14.0), car("v1.a_1", 508.01)) == {1: 14.0}
     assert AsRunDim(exit_speed=0.5).name == "dim-as-run:exit_speed=0.5"
 
 
-def test_names_are_different_letters() -> None:
+def test_names_and_sites_that_the_rules_do_not_fit() -> None:
     with pytest.raises(InputError, match=r"^names must be different letters, got 'abca'"):
         AsRunDim(names="abca")
-
-
-def test_sites_that_the_rules_do_not_fit() -> None:
     with pytest.raises(InputError, match="3, 4 or 5 arms"):
         AsRunDim().start(regular(6, profile="as_run").site())
     with pytest.raises(InputError, match="matrix is for 3 arms"):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from dim import Dim, HarmonyMatrix, Monitor, Zones
+from dim import Dim, HarmonyMatrix, Zones
 from dim.agent import GATES
-from dim.perception import See
+from dim.perception import COMMITS, See
 from minisim.control import Controller, Go, Hold, Observed, Session, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
@@ -60,18 +60,6 @@ def test_a_late_arrival_waits_until_the_junction_is_clear() -> None:
     assert scene.show(car(2, "a1", 2.2)) == "go 2"
 
 
-def test_a_right_of_way_is_kept_while_another_vehicle_crosses() -> None:
-    scene = Scene(Dim())
-    both = [car(1, "a1", 2.2), car(2, "b2", 2.2)]
-    assert scene.show(*both) == "go 1, go 2"
-    # 1 is on its way, 2 has not moved; c and d would prefer another clique without 1.
-    assert (
-        scene.show(car(1, "a1", -1.0, 3.0), both[1], car(3, "d2", 8, 4), car(4, "c2", 8, 4)) == ""
-    )
-    # 1 is clear: now the three others decide, and 2 and 3 are in harmony.
-    assert scene.show(both[1], car(3, "d2", 2.2), car(4, "c2", 2.2)) == "go 3"
-
-
 @EVERY_GATE
 def test_a_new_decision_revokes_an_unused_right_of_way(gate: str) -> None:
     scene = Scene(Dim(gate=gate))
@@ -83,23 +71,6 @@ def test_a_new_decision_revokes_an_unused_right_of_way(gate: str) -> None:
 
 
 @EVERY_GATE
-def test_a_committed_vehicle_keeps_its_right_of_way(gate: str) -> None:
-    scene = Scene(Dim(gate=gate))
-    assert scene.show(car(3, "c2", 2.2)) == "go 3"
-    assert scene.show(car(3, "c2", 1.0, 2.5), car(2, "b2", 8.0, 4.8)) == ""
-
-
-@EVERY_GATE
-def test_revoked_and_standing_in_the_green_zone_it_takes_part(gate: str) -> None:
-    scene = Scene(Dim(gate=gate))
-    scene.show(car(3, "c2", 2.2))
-    assert scene.show(car(3, "c2", 1.2, 1.0), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
-    # It stands past half of the green zone: with commit="stoppable" not committed.
-    assert scene.show(car(3, "c2", 0.4), car(2, "b2", 3.0, 3.0), car(1, "a1", 8, 4)) == "go 1"
-    assert scene.show(car(3, "c2", 0.4)) == "go 3"
-
-
-@EVERY_GATE
 def test_a_vehicle_that_lost_its_right_of_way_and_looks_committed_is_waited_for(gate: str) -> None:
     """No wake-up comes when it stands, so the session asks to look again every step."""
     scene = Scene(Dim(gate=gate))
@@ -107,64 +78,6 @@ def test_a_vehicle_that_lost_its_right_of_way_and_looks_committed_is_waited_for(
     scene.show(car(3, "c2", 1.3, 1.0), car(2, "b2", 8.0, 4.8))
     assert scene.show(car(3, "c2", 0.2, 0.9)) == "wake in 0.1"
     assert scene.show(car(3, "c2", 0.05)) == "go 3"
-
-
-def test_paper_commit_at_half_of_the_green_zone() -> None:
-    scene = Scene(Dim(commit="paper"))
-    assert scene.show(car(3, "c2", 2.2)) == "go 3"
-    # Before half of it a moving vehicle is revoked, even one that cannot stop any more...
-    assert scene.show(car(3, "c2", 1.1, 5.0), car(2, "b2", 8.0, 4.8)) == "go 2, hold 3"
-    # ...and past it the others grant it the right of way: now two conflicting vehicles go.
-    assert scene.show(car(3, "c2", 0.9, 4.9), car(2, "b2", 7.5, 4.8)) == "go 3"
-
-
-def test_paper_commit_counts_a_standing_vehicle_past_half_as_crossing() -> None:
-    scene = Scene(Dim(commit="paper"))
-    assert scene.show(car(3, "c2", 0.9), car(1, "a1", 2.2)) == "go 3"
-    assert scene.show(car(3, "c2", -9.0, 5.0), car(1, "a1", 2.2)) == ""
-    assert scene.show(car(1, "a1", 2.2)) == "go 1"
-
-
-def test_the_harmonious_gate_admits_beside_a_crossing_vehicle() -> None:
-    crossing = car(1, "c2", -3.0, 5.0)
-    arriving = [car(2, "a1", 8.0, 4.8), car(3, "d2", 2.2)]  # a1 and d2 are in conflict
-    for gate, commands in [("clear", ""), ("harmonious", "go 2")]:
-        scene = Scene(Dim(gate=gate))
-        scene.show(car(1, "c2", 5.0, 3.0))
-        assert scene.show(crossing, *arriving) == commands
-
-
-def test_beside_a_crossing_vehicle_a_right_of_way_may_be_revoked_too() -> None:
-    both = [car(1, "c2", 2.2), car(2, "a2", 2.2)]
-    later = [car(1, "c2", -1.0, 3.0), car(2, "a2", 2.2), car(3, "b1", 8.0, 4.8)]
-    for gate, commands in [("clear", ""), ("harmonious", "hold 2, go 3")]:
-        scene = Scene(Dim(gate=gate, priorities=(1, 0, 2, 3)))
-        assert scene.show(*both) == "go 2, go 1"
-        assert scene.show(*later) == commands  # a2 and b1 are in conflict, b comes first
-
-
-def test_a_vehicle_follows_those_of_its_lane_beside_harmonious_others() -> None:
-    follower = car(2, "a3", 7.0, 4.0)
-    for gate, commands in [("clear", ""), ("harmonious", "go 2")]:
-        scene = Scene(Dim(gate=gate))
-        assert scene.show(car(1, "a2", 5.0, 3.0), car(3, "c1", 5.0, 3.0)) == "go 1, go 3"
-        # a3 would follow a2, but is in conflict with c1...
-        assert scene.show(car(1, "a2", -3.0, 5.0), follower, car(3, "c1", -3.0, 5.0)) == ""
-        # ... until that is clear.
-        assert scene.show(car(1, "a2", -9.0, 5.0), follower) == commands
-
-
-@pytest.mark.parametrize(("gate", "commands"), [("clear", ""), ("harmonious", "go 2, hold 3")])
-def test_no_vehicle_of_a_lane_takes_part_until_its_committed_front_vehicle_has_entered(
-    gate: str, commands: str
-) -> None:
-    """c2 may go beside a2; the follower a3 is in conflict with it, and of a higher lane."""
-    scene = Scene(Dim(gate=gate))
-    behind, beside = car(2, "a3", 6.9), car(3, "c2", 2.2)
-    assert scene.show(car(1, "a2", 2.2), beside) == "go 1, go 3"
-    assert scene.show(car(1, "a2", 2.0, 1.0), behind, beside) == ""  # not committed yet
-    assert scene.show(car(1, "a2", 1.0, 3.0), behind, beside) == ""  # 3²/(2·2) = 2.25 > 1
-    assert scene.show(car(1, "a2", -0.1, 4.0), behind, beside) == commands
 
 
 def test_vehicles_out_of_sight_are_forgotten() -> None:
@@ -213,35 +126,13 @@ def test_the_plan() -> None:
     assert Dim(period=0.1).start(site).plan.period == 0.1
 
 
-@pytest.mark.parametrize(
-    ("gate", "commit", "marks"),
-    [
-        ("clear", "stoppable", (9,)),
-        ("clear", "paper", (9, 2)),
-        ("harmonious", "stoppable", (9, 0)),
-        ("harmonious", "paper", (9, 2, 0)),
-    ],
-)
-def test_wake_up_marks(gate: str, commit: str, marks: tuple[float, ...]) -> None:
+@EVERY_GATE
+@pytest.mark.parametrize("commit", COMMITS)
+def test_wake_up_marks(gate: str, commit: str) -> None:
     """Yellow zone; half of the green zone, where the paper commits; entry, for the followers."""
     dim = Dim(zones=Zones(yellow=5, green=4), gate=gate, commit=commit)
+    marks = (9, *[2] * (commit == "paper"), *[0] * (gate == "harmonious"))
     assert dim.start(four_way().site()).plan.marks == marks
-
-
-@pytest.mark.parametrize(
-    ("dim", "name"),
-    [
-        (Dim(), "dim"),
-        (Dim(monitor=Monitor()), "dim:monitor=on"),
-        (Dim(priorities=(1, 0, 2)), "dim:priorities=(1,0,2)"),
-        (
-            Dim("lanes", "paper", "harmonious", "inflow"),
-            "dim:order=lanes,commit=paper,gate=harmonious,priorities=inflow",
-        ),
-    ],
-)
-def test_name(dim: Dim, name: str) -> None:
-    assert dim.name == name
 
 
 def test_it_is_a_controller_hashable_and_picklable() -> None:

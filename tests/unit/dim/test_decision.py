@@ -22,8 +22,8 @@ from minisim.junction.movements import Movement
 
 Clique = tuple[Movement, ...]
 
-#: Of every case of 3, 4, 5 arms: how many, and in how many the two orders differ (as_run.md).
-CASES = {3: (26, 1), 4: (255, 26), 5: (3124, 508)}
+#: How many there are of 3, 4, 5 arms.
+CASES = {3: 26, 4: 255, 5: 3124}
 
 
 def text(movements: Iterable[Movement]) -> str:
@@ -57,35 +57,16 @@ def oracle(participants: Clique, matrix: HarmonyMatrix, order: str, ranks: Seque
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_table_online_and_oracle_agree_on_every_case(n: int, order: str) -> None:
     matrix = HarmonyMatrix.paper(n)
-    table = DecisionTable(matrix, order)
-    table.complete()
-    count = 0
-    for participants in all_cases(n):
-        count += 1
-        expected = oracle(participants, matrix, order, range(n))
-        assert decide(participants, matrix, order) == expected, text(participants)
-        assert table.decide(participants) == expected, text(participants)
-    assert count == len(table) == CASES[n][0]
-
-
-@pytest.mark.parametrize("n", [3, 4])
-def test_given_priorities_agree_with_the_oracle_on_every_case(n: int) -> None:
-    matrix = HarmonyMatrix.paper(n)
-    rng = random.Random(n)
-    for order in ORDERS:
-        ranks = rng.sample(range(n), n)
+    for ranks in (None, random.Random(n).sample(range(n), n)):
         table = DecisionTable(matrix, order, ranks)
+        table.complete()
+        count = 0
         for participants in all_cases(n):
-            expected = oracle(participants, matrix, order, ranks)
-            assert decide(participants, matrix, order, ranks) == expected
-            assert table.decide(participants) == expected
-
-
-@pytest.mark.parametrize("n", [3, 4, 5])
-def test_in_how_many_cases_the_orders_differ(n: int) -> None:
-    by_size, by_lanes = (DecisionTable(HarmonyMatrix.paper(n), order) for order in ORDERS)
-    differing = sum(by_size.lanes(case) != by_lanes.lanes(case) for case in range(1, n**n))
-    assert differing == CASES[n][1]
+            count += 1
+            expected = oracle(participants, matrix, order, ranks or range(n))
+            assert decide(participants, matrix, order, ranks) == expected, text(participants)
+            assert table.decide(participants) == expected, text(participants)
+        assert count == len(table) == CASES[n]
 
 
 def test_the_papers_example() -> None:
@@ -99,13 +80,6 @@ def test_the_papers_example() -> None:
         "3 cliques tie at the largest size, 2; a1 b2 holds the highest-priority lanes of them "
         "(priority a b c d)."
     )
-
-
-def test_the_papers_worst_case_goes_by_the_table() -> None:
-    """A and C turn left, B and D go straight: the text expects four tied pairs (Fig. 4)."""
-    explanation = explain(["a1", "b2", "c1", "d2"], HarmonyMatrix.paper(4))
-    assert text(explanation.right_of_way) == "a1 b2"
-    assert [text(clique) for clique in explanation.tied] == ["a1 b2", "a1 c1", "b2 d2", "c1 d2"]
 
 
 @pytest.mark.parametrize(
@@ -144,41 +118,30 @@ def test_without_participants_no_vehicle_goes() -> None:
         explain([], matrix)
 
 
-DIGEST = """
-import hashlib
+ANSWERS = """
 from itertools import product
 from dim import DecisionTable, HarmonyMatrix, decide
-from dim.decision import ORDERS
-digest = hashlib.sha256()
-for n in (3, 4, 5):
-    matrix = HarmonyMatrix.paper(n)
-    tables = [DecisionTable(matrix, order) for order in ORDERS]
-    for digits in product(range(n), repeat=n):
+matrix = HarmonyMatrix.paper(4)
+for order in ("size", "lanes"):
+    table = DecisionTable(matrix, order)
+    for digits in product(range(4), repeat=4):
         # A set of strings: its order depends on the hash seed, the answers must not.
-        participants = {f"{'abcde'[lane]}{j}" for lane, j in enumerate(digits) if j}
-        for order, table in zip(ORDERS, tables):
-            answer = table.decide(participants)
-            if n < 5:
-                assert answer == decide(participants, matrix, order)
-            digest.update(" ".join(map(str, answer)).encode() + b";")
-print(digest.hexdigest())
+        participants = {f"{'abcd'[lane]}{j}" for lane, j in enumerate(digits) if j}
+        print(*table.decide(participants), *decide(participants, matrix, order))
 """
 
 
 def test_answers_do_not_depend_on_the_hash_seed() -> None:
     root = str(Path(dim.__file__).parents[1])
-    digests = set()
-    for seed in ("0", "1", "20240229"):
-        result = subprocess.run(
-            [sys.executable, "-c", DIGEST],
+    answers = {
+        subprocess.check_output(
+            [sys.executable, "-c", ANSWERS],
             env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": root},
-            capture_output=True,
-            text=True,
-            check=True,
         )
-        digests.add(result.stdout)
-    assert len(digests) == 1
-    assert len(digests.pop().strip()) == 64
+        for seed in ("0", "1", "20240229")
+    }
+    assert len(answers) == 1
+    assert answers.pop().count(b"\n") == 2 * 4**4
 
 
 def test_cases_are_the_integers_from_one() -> None:
@@ -223,29 +186,6 @@ def test_a_table_of_many_arms_is_filled_on_demand_only() -> None:
     assert text(table.decide(["a1", "h7", "c2"])) == "a1 c2 h7"
     with pytest.raises(InputError, match="8 arms have 16777215 cases"):
         table.complete()
-
-
-@pytest.mark.parametrize(
-    ("participants", "crossing", "admitted"),
-    [
-        ("a1 b2 c2 d2", "", "a1 b2 c2 d2"),
-        ("a1 b2 c2 d2", "b1", "a1 b2 c2 d2"),  # b2 follows in the lane of b1
-        ("a1 b2 c2 d2", "a1", "a1 b2 c2"),
-        ("a1 b2 c2 d2", "a1 b2", "a1 b2"),
-        ("a2 c2", "b2", ""),
-        ("c1", "a1 b1", "c1"),
-        ("d3", "d1 d2", "d3"),  # all of one lane
-        ("a3 b2", "a1 c1", ""),  # a3 behind a1, but in conflict with c1
-    ],
-)
-def test_what_is_admitted_beside_crossing_vehicles(
-    participants: str, crossing: str, admitted: str
-) -> None:
-    matrix = HarmonyMatrix.paper(4)
-    table = DecisionTable(matrix)
-    occupied = sum(1 << matrix.index(m) for m in crossing.split())
-    case = table.admitted(table.case(participants.split()), occupied)
-    assert text(table.participants(case)) == admitted
 
 
 @pytest.mark.parametrize(

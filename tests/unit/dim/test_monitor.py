@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -89,11 +90,7 @@ def test_a_reading_that_changes_is_a_doubt() -> None:
     assert braking(monitors, true) == {}
     assert 2 in braking(monitors, true, {2: read_as(true, a=3)})
     assert braking(monitors, true, {2: read_as(true, a=2)}) == {}, "no change: it still brakes"
-
-
-def test_an_unknown_intent_is_every_manoeuvre() -> None:
-    true = view(car(1, "a2", 0.5, 6.0), car(2, "c2", 2.0, 6.0))
-    assert 2 in braking(started(), true, {2: read_as(true, a=UNKNOWN)})
+    assert 2 in braking(started(), true, {2: read_as(true, a=UNKNOWN)}), "any manoeuvre"
 
 
 def test_an_unknown_intent_is_one_of_its_own_lane() -> None:
@@ -157,21 +154,13 @@ def test_a_vehicle_that_is_out_in_good_time_goes_on() -> None:
 def test_it_brakes_when_one_more_step_would_take_more_than_comfort(v: float) -> None:
     """That step at full acceleration, then v²/2b, and `ROOM`."""
     shared, _ = regions(A2, B2)
-    a, b, dt = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt
-    after = v + a * dt
-    needed = (v + after) / 2.0 * dt + after * after / (2.0 * b) + ROOM
-    x = shared.room(0.0, 3.0) - needed
-    assert x > 0.0
-    other = car(2, "b2", 3.0, 5.0)
-    assert 1 not in braking(started(), view(car(1, "a2", x - 1e-3, v), other))
-    assert braking(started(), view(car(1, "a2", x + 1e-3, v), other))[1] == b
-    gentle = 0.7 * b
-    needed = (v + after) / 2.0 * dt + after * after / (2.0 * gentle) + ROOM
-    x = shared.room(0.0, 3.0) - needed
-    assert 1 not in braking(started(deceleration=gentle), view(car(1, "a2", x - 1e-3, v), other))
-    assert (
-        braking(started(deceleration=gentle), view(car(1, "a2", x + 1e-3, v), other))[1] == gentle
-    )
+    after, other = v + SITE.vehicle.acceleration * SITE.dt, car(2, "b2", 3.0, 5.0)
+    for options, b in (({}, SITE.vehicle.deceleration), ({"deceleration": 3.1}, 3.1)):
+        needed = (v + after) / 2.0 * SITE.dt + after * after / (2.0 * b) + ROOM
+        x = shared.room(0.0, 3.0) - needed
+        assert x > 0.0
+        assert 1 not in braking(started(**options), view(car(1, "a2", x - 1e-3, v), other))
+        assert braking(started(**options), view(car(1, "a2", x + 1e-3, v), other))[1] == b
 
 
 def test_a_vehicle_stops_before_the_junction_while_it_can() -> None:
@@ -356,28 +345,29 @@ def test_a_session_brakes_as_its_monitors_say_and_looks_again() -> None:
     assert [c.time for c in commands if isinstance(c, Wake)] == [7.0 + SITE.dt]
 
 
+WAITING = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
+
+
 def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
     """a2, b2 and d3 are in conflict, so it is a's turn; but a takes d for d2, and waits."""
-    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
     misread = wrong({3: 2}, reader=1)
     session = Dim(perception=misread, monitor=Monitor(patience=1.5)).start(SITE)
     for time, commands in ((0.0, []), (1.4, []), (1.5, [Go(1)]), (1.6, [])):
-        found = list(session.decide(view(*waiting, time=time)))
+        found = list(session.decide(view(*WAITING, time=time)))
         assert [c for c in found if not isinstance(c, Wake)] == commands
         assert Wake(time + SITE.dt) in found
     bare = Dim(perception=misread).start(SITE)
     assert not any(
-        isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*waiting, time=t))
+        isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*WAITING, time=t))
     )
 
 
 def test_a_vehicle_that_arrives_at_the_yellow_zone_ends_the_wait() -> None:
     """As above, with c3, which is in conflict with all; 8 m before the junction it takes part."""
-    waiting = [car(1, "a2", -2.1, 0.0), car(2, "b2", -2.1, 0.0), car(4, "d3", -2.1, 0.0)]
     for past, goes in ((-8.0, False), (-8.001, True)):
         session = Dim(perception=wrong({3: 2}, reader=1), monitor=Monitor()).start(SITE)
         for time in (0.0, 9.0):
-            commands = list(session.decide(view(*waiting, car(3, "c3", past, 1.0), time=time)))
+            commands = list(session.decide(view(*WAITING, car(3, "c3", past, 1.0), time=time)))
         assert (Go(1) in commands) is goes
 
 
@@ -426,23 +416,22 @@ def test_two_that_misread_each_other_do_not_collide_nor_block(
     assert without > 0, "the test can fail"
 
 
-NOISY = NoisyPerception(intent_error=0.15, kind="symmetric")
+FAIR = four_way(250, profile="fair", horizon=900.0, arm_length=150.0)
 
 
-def test_noisy_intent_collides_without_it_and_not_with_it() -> None:
+@pytest.mark.parametrize(
+    ("scenario", "dim", "seed"),
+    [
+        (FAIR, Dim(perception=NoisyPerception(0.15, "symmetric", shared=False)), 3),
+        (FAIR, Dim(perception=NoisyPerception(0.15, "symmetric", persistent=False)), 3),
+        (four_way(300, horizon=900.0), Dim(commit="paper"), 1),
+    ],
+    ids=["own errors", "fleeting errors", "the paper's commit rule"],
+)
+def test_what_collides_without_it_does_not_with_it(scenario: Any, dim: Dim, seed: int) -> None:
     """Some 280 vehicles; none waits for ever either."""
-    scenario = drained(four_way(250, profile="fair", horizon=900.0, arm_length=150.0), 3, 3000.0)
-    for options in ({"shared": False}, {"persistent": False}):
-        noisy = dataclasses.replace(NOISY, **options)
-        bare = minisim.simulate(scenario, Dim(perception=noisy), 3, on_collision="record")
-        saved = minisim.simulate(scenario, Dim(perception=noisy, monitor=Monitor()), 3)
-        assert bare.collisions
-        assert saved.columns.arrived.all()
-
-
-def test_it_also_removes_what_the_papers_commit_rule_causes() -> None:
-    scenario = drained(four_way(300, horizon=900.0), 1, 3000.0)
-    bare = minisim.simulate(scenario, Dim(commit="paper"), 1, on_collision="record")
-    saved = minisim.simulate(scenario, Dim(commit="paper", monitor=Monitor()), 1)
+    scenario = drained(scenario, seed, 3000.0)
+    bare = minisim.simulate(scenario, dim, seed, on_collision="record")
+    saved = minisim.simulate(scenario, dataclasses.replace(dim, monitor=Monitor()), seed)
     assert bare.collisions
     assert saved.columns.arrived.all()

@@ -47,12 +47,6 @@ def test_a_mark_passed_within_rounding_counts() -> None:
     assert STOPPABLE.read(view(car(1, "a1", 8.0 + 1e-3))).participants == ()
 
 
-def test_only_the_front_vehicle_of_a_lane_takes_part() -> None:
-    percept = STOPPABLE.read(view(car(1, "a1", 2.0), car(2, "a3", 7.5), car(3, "b1", 5.0)))
-    assert percept.participants == (1, 3)
-    assert percept.case == TABLE.case(["a1", "b1"])
-
-
 @pytest.mark.parametrize(
     ("reader", "distance", "speed"),
     [
@@ -92,12 +86,6 @@ def test_the_same_movement_twice_occupies_once() -> None:
     percept = STOPPABLE.read(view(car(1, "d3", -9.0, 5.0), car(2, "d3", -1.0, 5.0)))
     assert percept.crossing == (1, 2)
     assert percept.occupied == occupied("d3")
-
-
-def test_any_part_of_the_body_in_the_junction_is_crossing_moving_or_not() -> None:
-    for reader in (STOPPABLE, PAPER):
-        assert reader.read(view(car(1, "a1", -0.01))).crossing == (1,)
-        assert reader.read(view(car(1, "a1", -0.01, 5.0))).crossing == (1,)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import itertools
 import pytest
 
 from dim import Zones
-from minisim.control import Marking, Site
+from minisim.control import Site
 from minisim.errors import InputError
 from scenarios import FAIR, PAPER, four_way
 
@@ -18,13 +18,6 @@ KMH = 1 / 3.6
 def site(speed_limit: float = PAPER.speed_limit, deceleration: float = 2.0) -> Site:
     vehicle = dataclasses.replace(PAPER.vehicle, deceleration=deceleration)
     return Site(four_way().intersection, vehicle, speed_limit, (350.0,) * 4)
-
-
-def test_the_papers_zones() -> None:
-    zones = Zones()
-    assert (zones.red, zones.yellow, zones.green) == (30, 6, 2)
-    assert zones.red_speed == pytest.approx(20 * KMH)
-    assert (zones.red_start, zones.yellow_start, zones.hold_distance) == (38, 8, 2)
 
 
 def test_the_papers_markings() -> None:
@@ -77,11 +70,6 @@ def test_braking_begins_at_the_red_zone_where_that_is_enough(
         assert limited.start + braking == pytest.approx(zones.red_start)
     else:
         assert limited.start == zones.yellow_start
-
-
-def test_a_speed_above_the_limit_is_painted_on_the_whole_red_zone() -> None:
-    red, *_ = Zones(red_speed=15.0).markings(site())
-    assert red == Marking("red", 38, 8, 15.0)
 
 
 def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,23 +11,20 @@ import pytest
 import minisim
 from baselines import FixedTime
 from baselines.signals.webster import webster
-from minisim.arrivals import Arrivals
 from minisim.control import Site, View
 from minisim.errors import InputError
 from minisim.results.safety import safety_summary
-from minisim.testing import SmallScenario, drained, small_scenario
+from minisim.testing import drained, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios.library import four_way
-from tests.builders import drive, said, seen
+from tests.builders import drive, replayed, said, seen
 
 # Timing.
 
 
 def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
     site = four_way(density=250).site()
-
     timing = FixedTime().timing(site)
-
     assert timing == webster([250.0] * 4)
     assert timing.cycle == pytest.approx(51.0)
     assert timing.greens == pytest.approx((10.75,) * 4)
@@ -36,7 +33,6 @@ def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
 def test_the_cycle_counts_what_is_really_lost() -> None:
     site = four_way(density=250).site()
     timing = FixedTime(amber=3.0, all_red=1.0).timing(site)
-
     assert timing.greens == pytest.approx((10.75,) * 4)
     assert timing.cycle == pytest.approx(4 * (10.75 + 4.0))
     assert timing.saturation == pytest.approx((250 * 59 / (1500 * 10.75),) * 4)
@@ -53,7 +49,6 @@ def test_greens_may_be_one_number_or_one_a_lane() -> None:
 def test_unbalanced_demand_has_proportional_or_equal_greens() -> None:
     site = four_way(density=250, split=(4, 3, 2, 1)).site()
     fair, equal = FixedTime().timing(site), FixedTime(equal_greens=True).timing(site)
-
     assert np.array(fair.greens) / sum(fair.greens) == pytest.approx([0.4, 0.3, 0.2, 0.1])
     assert equal.greens == pytest.approx((10.75,) * 4)
     assert equal.saturation[0] == pytest.approx(1.27, abs=0.006)
@@ -97,7 +92,6 @@ def test_each_lane_is_open_in_turn_and_the_cycle_begins_with_a() -> None:
 def test_no_cycle_drifts_by_more_than_a_step(dt: float) -> None:
     green, cycle = 5.083, 4 * 7.083
     answers = drive(FixedTime(greens=green), at(dt), 3600.0)
-
     opened = [time for time, commands in answers.items() if "Open 0" in commands]
     closed = [time for time, commands in answers.items() if "Close 0" in commands]
     assert len(opened) == 3600 // cycle + 1
@@ -120,7 +114,6 @@ def test_a_late_head_still_ends_on_time() -> None:
     crossing = seen(3, 0, 2, -5.0, 5.0)
     session.decide(View(0.0, ()))
     session.decide(View(10.0, (crossing,)))
-
     # b's green is due at 12 s, but a2 stands in the junction until 15 s.
     assert said(session.decide(View(12.0, (crossing,)))) == ["Wake 22"]
     assert said(session.decide(View(15.0, ()))) == ["Open 1", "Wake 22"]
@@ -133,7 +126,6 @@ def test_a_head_that_could_not_turn_green_stays_red() -> None:
     session.decide(View(0.0, ()))
     session.decide(View(10.0, (crossing,)))
     session.decide(View(12.0, (crossing,)))
-
     # No vehicle of lane b got the right of way, so none is let go when its time is over.
     waiting = seen(4, 1, 2, 0.3, 1.5)
     assert said(session.decide(View(22.0, (crossing, waiting)))) == ["Wake 24"]
@@ -149,23 +141,12 @@ def test_at_amber_only_vehicles_that_cannot_stop_keep_going() -> None:
 # On the road.
 
 
-@dataclass(frozen=True, kw_only=True)
-class OneVehicle(SmallScenario):
-    """One vehicle, a2, that comes at `start`."""
-
-    start: float = 0.0
-
-    def arrivals(self, seed: int) -> Arrivals:
-        return Arrivals(np.array([self.start]), np.array([0]), np.array([2]))
-
-
 @pytest.mark.parametrize("start", np.arange(0.0, 6.0, 0.3).tolist())
 def test_at_amber_a_vehicle_either_passes_or_stops_comfortably(start: float) -> None:
     # Green a: 0 … 37 s. Free flow takes 487.8/14 = 34.8 s to the stop line, so that these
     # vehicles are up to 47 m before it or past it at the end of the green.
-    scenario = OneVehicle(start=start, demand_time=70.0)
+    scenario = replayed(four_way(profile="fair"), (start, 0, 2), horizon=100.0)
     run = minisim.simulate(scenario, FixedTime(greens=37.0, amber=2.0), record="all")
-
     path = run.site.intersection.paths[1]
     frame = run.trajectories
     braking = -frame.loc[frame["s_m"] < path.entry, "acceleration_mps2"].min()
@@ -186,7 +167,6 @@ def test_at_amber_a_vehicle_either_passes_or_stops_comfortably(start: float) -> 
 def test_greens_on_the_road_are_where_the_timing_puts_them() -> None:
     signal = FixedTime(greens=(6.0, 9.0, 12.0, 7.5), amber=2.0)
     run = minisim.simulate(four_way(density=300, horizon=300.0), signal, seed=3, record="junction")
-
     frame = run.trajectories
     waiting = frame[frame["s_m"] < run.site.intersection.approach_length - 40.0]
     released = waiting[waiting["right_of_way"]]
@@ -201,7 +181,6 @@ def test_greens_on_the_road_are_where_the_timing_puts_them() -> None:
 def test_drivers_of_different_speeds_are_served_without_collision() -> None:
     scenario = drained(4, density=350, vehicle=VehicleType(speed_deviation=0.3))
     run = minisim.simulate(scenario, FixedTime(), seed=2, record="junction")
-
     assert run.summary()["unfinished"] == 0
     worst = safety_summary(run.trajectories, run.site)["min_pet_s"]
     assert worst is not None

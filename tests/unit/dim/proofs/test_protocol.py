@@ -111,22 +111,6 @@ def test_a_vehicle_that_enters_leaves_the_others_as_they_are() -> None:
     assert after == state(front("a1"), inside=C1 | B1, came=(0,))
 
 
-def test_the_clear_gate_leaves_things_as_they_are_while_a_vehicle_crosses() -> None:
-    rules = protocol()
-    assert goes(rules, state(front("a1"), front("b2", WAITING, True), inside=C2)) == "b"
-    assert goes(rules, state(front("a1"), front("b1", COMMITTED, False))) == "b"
-    assert goes(rules, state(front("a1"), front("b2", WAITING, True))) == "ab"
-    assert goes(rules, state(front("a2"), front("b2", WAITING, True))) == "a"
-
-
-def test_the_harmonious_gate_keeps_out_vehicles_in_conflict() -> None:
-    rules = protocol(gate="harmonious")
-    assert goes(rules, state(front("a1"), front("b2"), inside=C1)) == "a"
-    assert goes(rules, state(front("a1"), front("b1"), front("c1", COMMITTED, True))) == "abc"
-    assert goes(rules, state(front("b1", WAITING, True), inside=A2)) == ""
-    assert goes(rules, state(front("a2"), inside=A1)) == "a"  # those of a lane follow each other
-
-
 @pytest.mark.parametrize(
     ("inside", "pair"),
     [

@@ -8,14 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dim.senses.intent import (
-    KINDS,
-    Lane,
-    confidence,
-    confusion,
-    doubts,
-    leftover_error,
-)
+from dim.senses.intent import KINDS, Lane, confidence, confusion, doubts, leftover_error
 from dim.senses.noise import UNSIGNALLED
 from minisim.streams import Draws
 from minisim.testing import small_scenario
@@ -35,26 +28,19 @@ def close(count: int, share: float, of: int = COUNT) -> bool:
     return abs(count - share * of) <= Z * math.sqrt(of * share * (1.0 - share)) + 1e-9
 
 
-def test_a_missed_signal_is_a_turn_taken_for_straight_on() -> None:
-    assert confusion(2, (0.0, 0.0, 0.0), 0.25, "missed") == (
-        (0.75, 0.25, 0.0),
-        (0.0, 1.0, 0.0),
-        (0.0, 0.25, 0.75),
-    )
-
-
-def test_symmetric_errors_are_spread_alike() -> None:
-    assert confusion(2, (0.0, 0.0, 0.0), 0.2, "symmetric") == (
-        (0.8, 0.1, 0.1),
-        (0.1, 0.8, 0.1),
-        (0.1, 0.1, 0.8),
-    )
-
-
-def test_what_readings_are_worth() -> None:
+@pytest.mark.parametrize(
+    ("kind", "error", "table", "doubt"),
+    [
+        ("missed", 0.25, ((0.75, 0.25, 0.0), (0.0, 1.0, 0.0), (0.0, 0.25, 0.75)), (0, 1 / 3, 0)),
+        ("symmetric", 0.2, ((0.8, 0.1, 0.1), (0.1, 0.8, 0.1), (0.1, 0.1, 0.8)), (0.2,) * 3),
+    ],
+)
+def test_how_readings_err_and_what_they_are_worth(
+    kind: str, error: float, table: object, doubt: tuple[float, ...]
+) -> None:
     """Bayes by hand: a turn is never read where there is none; of 1.5 straights 1 is one."""
-    assert doubts(confusion(2, (0.0,) * 3, 0.25, "missed")) == pytest.approx((0.0, 1 / 3, 0.0))
-    assert doubts(confusion(2, (0.0,) * 3, 0.2, "symmetric")) == pytest.approx((0.2,) * 3)
+    assert confusion(2, (0.0,) * 3, error, kind) == table
+    assert doubts(confusion(2, (0.0,) * 3, error, kind)) == pytest.approx(doubt)
 
 
 @pytest.mark.parametrize(

@@ -229,14 +229,6 @@ def test_a_late_view_is_the_one_of_then() -> None:
     assert sights[7].vehicles == (views[7].vehicles[0], views[2].vehicles[1])
 
 
-def test_a_newcomer_is_the_last_of_its_lane_in_an_older_view() -> None:
-    see = NoisyPerception(delay=0.2).start(SITE)
-    before = View(0.0, (seen(1, 0, 2, 2.0), seen(2, 1, 2, 2.0)))
-    see(before, before.vehicles[0])
-    now = View(0.2, (seen(1, 0, 2, -1.0), seen(3, 0, 1, 8.0), seen(2, 1, 2, 2.0)))
-    assert [v.id for v in see(now, now.vehicles[1]).vehicles] == [1, 3, 2]
-
-
 def test_an_older_view_with_the_ego_in_its_place() -> None:
     a, b, d = seen(1, 0, 1, 2.0), seen(2, 1, 1, 2.0), seen(4, 3, 1, 2.0)
     older = (a, b, d)

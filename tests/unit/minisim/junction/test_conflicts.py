@@ -64,20 +64,6 @@ def test_separation_is_symmetric_and_zero_within_an_arm(square: Intersection) ->
     assert (apart[~square.movements.apart] == 0.0).all()
 
 
-def test_crossing_movements_conflict(square: Intersection) -> None:
-    conflict = conflicts(square, CAR, 0.5)
-
-    def meet(p: str, q: str) -> bool:
-        return bool(conflict[square.index(p), square.index(q)])
-
-    assert meet("a2", "b2")
-    assert meet("a2", "d2")
-    assert not meet("a2", "c2")
-    near, far = ("1", "3") if square.side == "left" else ("3", "1")
-    assert not meet(f"a{near}", f"c{near}")  # opposite turns to the near side
-    assert meet(f"a{far}", "c2")  # across the opposite traffic
-
-
 def test_room_beside_a_held_vehicle(square: Intersection) -> None:
     """Straight traffic passes at a lane minus a body; a vehicle that turns in cuts the corner."""
     assert 1.0 < entry_room(square, CAR) < 3.2 - 1.8
@@ -106,11 +92,6 @@ def test_zones_of_merging_paths_end_where_the_rear_has_left() -> None:
         assert conflict_zones(JUNCTION, SITE.vehicle)[p, q, 1] == pytest.approx(
             crossing + SITE.vehicle.length
         )
-
-
-def test_zones_are_where_movements_conflict() -> None:
-    zones = conflict_zones(JUNCTION, SITE.vehicle)
-    assert np.array_equal(np.isfinite(zones[..., 0]), SITE.conflicts)
 
 
 def test_a_vehicle_is_in_the_way_until_its_body_has_left_it() -> None:
@@ -152,7 +133,6 @@ def test_the_conflict_area_of_two_straight_movements() -> None:
     """a2 drives south at x = 1.6 ± 0.9; b2 drives west at y = −1.6 ± 0.9."""
     areas = conflict_areas(JUNCTION, SITE.vehicle)
     a2, b2 = map(JUNCTION.index, ("a2", "b2"))
-
     # a2's front reaches y = −0.7 after 7.2 + 0.7 m; its rear leaves y = −2.5 after 7.2 + 2.5 + 5.
     assert areas.enter[a2, b2] - ENTRY == pytest.approx(7.9, abs=AREA_STEP)
     assert areas.leave[a2, b2] - ENTRY == pytest.approx(14.7, abs=AREA_STEP)

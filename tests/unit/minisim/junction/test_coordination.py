@@ -86,16 +86,6 @@ def test_a_vehicle_that_has_stopped_in_time_is_in_no_others_way() -> None:
                     assert mirrored.way(y, x) == math.inf
 
 
-def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
-    a2, b2 = 1, 4
-    shared = region(*PLACE, a2, b2)
-    assert shared is not None
-    assert shared.room(-3.0, -50.0) == pytest.approx(shared.room(0.0, 0.0) + 3.0)
-    assert shared.room(100.0, 0.0) == math.inf
-    assert shared.room(0.0, 100.0) == math.inf
-    assert shared.room(shared.ends(0.0) + STEP, 0.0) == math.inf
-
-
 #: Five positions of the first vehicle, three of the second.
 BY_HAND = Region(
     close=np.array([[0, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),

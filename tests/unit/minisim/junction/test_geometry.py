@@ -51,12 +51,6 @@ def test_default_radius_leaves_the_kerb_of_netconvert() -> None:
     assert smallest == pytest.approx(7.2 / math.tan(math.radians(15.0)))
 
 
-def test_lanes_keep_to_their_side(square: Intersection) -> None:
-    """A vehicle from the north drives south, so its left is east."""
-    x, y = square.path(Movement(0, 2)).position(0.0)
-    assert (x, y) == pytest.approx((1.6 if square.side == "left" else -1.6, 500.0))
-
-
 @pytest.mark.parametrize("bearings", [SQUARE, STAR, ODD])
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_paths_are_circular_arcs_tangent_to_both_lanes(
@@ -127,18 +121,6 @@ def test_bodies_are_rectangles_with_both_bumpers_on_the_path(square: Intersectio
         # The rear lies on the chord, which is shorter than the arc by L³/24R² at most.
         off = np.linalg.norm(rear - path.position(s - CAR.length), axis=1)
         assert off.max() <= CAR.length**3 / (24.0 * path.radius**2) + 0.005
-
-
-def test_mirrored_bearings_and_the_other_side_give_the_mirror_image() -> None:
-    """x → −x turns left-hand traffic on ODD into right-hand traffic on the mirrored arms."""
-    left = Intersection(ODD, side="left")
-    right = Intersection(tuple(sorted(360.0 - b for b in ODD)), side="right")
-    n = left.n
-    for path in left.paths:
-        i, j = path.movement
-        twin = right.path(Movement(n - 1 - i, n - j))
-        assert twin.exit == pytest.approx(path.exit)
-        np.testing.assert_allclose(twin.points * [-1.0, 1.0], path.points, atol=1e-9)
 
 
 # --- speeds, errors ---------------------------------------------------------------------

@@ -23,14 +23,9 @@ PATTERN = re.compile(
 
 #: Expressions that it must find.
 BY_HAND = [
-    "lane * (n - 1) + manoeuvre - 1",
-    "vehicle.lane * self._manoeuvres + vehicle.manoeuvre",
-    "lane * 3 + manoeuvre - 1",
     "lane * (site.intersection.n - 1)",
-    "path // (self.n - 1)",
     "path % (len(lanes) - 1) + 1",
     "path_of // manoeuvres",
-    "(lane + manoeuvre) % n",
     "(m.origin + m.manoeuvre) % self.n",
     "1 << manoeuvre - 1",
     "np.repeat(np.arange(n), n - 1)",

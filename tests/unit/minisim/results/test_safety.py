@@ -66,7 +66,6 @@ def drive(vehicle: int, movement: str, start: float, v: float) -> list[dict[str,
 def test_ttc_and_drac_behind_a_slower_leader() -> None:
     frame = frame_of(at(1, "a2", -80.0, 10.0), at(2, "a1", -100.0, 15.0))
     (row,) = following(frame, SITE).to_dict("records")
-
     # Gap 20 − 5 m, closing at 5 m/s.
     assert (row["follower"], row["leader"]) == (2, 1)
     assert row["gap_m"] == pytest.approx(15.0)
@@ -103,7 +102,6 @@ def test_a_leader_that_has_turned_off_is_none() -> None:
     a1, a2 = map(SITE.intersection.index, ("a1", "a2"))
     parts = branch(SITE.intersection, SITE.vehicle)[a1, a2] - ENTRY
     follower = at(2, "a2", -3.0, 8.0)
-
     still = frame_of(at(1, "a1", parts + 5.0 - 0.1, 4.0), follower)
     gone = frame_of(at(1, "a1", parts + 5.0 + 0.1, 4.0), follower)
     assert len(following(still, SITE)) == 1
@@ -154,7 +152,6 @@ def test_pet_of_two_crossing_vehicles(headway: float, pet: float) -> None:
     # At 10 m/s a2 leaves the area 1.47 s after its entry, b2 enters it 0.47 s after its own.
     frame = frame_of(*drive(1, "a2", 10.0, 10.0), *drive(2, "b2", 10.0 + headway, 10.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
-
     assert (row["first"], row["second"]) == (1, 2)
     assert row["pet_s"] == pytest.approx(pet, abs=0.02)
     assert row["time_s"] == pytest.approx(10.0 + headway + 0.47, abs=0.01)
@@ -168,7 +165,6 @@ def test_pet_of_merging_vehicles_ends_when_the_first_is_clear() -> None:
     # d2 is clear (rear past the exit) after 14.4 + 5 m; then a1 begins.
     frame = frame_of(*drive(1, "d2", 10.0, 10.0), *drive(2, "a1", 13.0, 5.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
-
     areas = conflict_areas(SITE.intersection, SITE.vehicle)
     enter = areas.enter[0, SITE.intersection.index("d2")] - ENTRY
     assert row["pet_s"] == pytest.approx(13.0 + enter / 5.0 - (10.0 + 1.94), abs=0.02)
@@ -213,22 +209,13 @@ def test_crossing_ttc_is_the_time_of_the_second_to_the_area() -> None:
     # b2: 4.7 m to enter at 8 m/s, 0.5875 s.
     frame = frame_of(at(1, "a2", 5.0, 10.0), at(2, "b2", 0.0, 8.0))
     (row,) = crossings(frame, SITE).to_dict("records")
-
     assert (row["first"], row["second"]) == (1, 2)
     assert row["ttc_s"] == pytest.approx(0.5875, abs=0.02)
     assert safety_summary(frame, SITE)["min_ttc_s"] == row["ttc_s"]
-
-
-def test_no_crossing_course_when_the_first_has_left_in_time() -> None:
-    # b2 at 4 m/s needs 1.175 s, a2 has left after 0.97 s.
+    # At 4 m/s b2 needs 1.175 s, so a2 has left; a2 that stands inside is met for sure.
     assert len(crossings(frame_of(at(1, "a2", 5.0, 10.0), at(2, "b2", 0.0, 4.0)), SITE)) == 0
-
-
-def test_a_standing_vehicle_in_the_area_is_met_for_sure() -> None:
-    (row,) = crossings(frame_of(at(1, "a2", 9.0, 0.0), at(2, "b2", -5.0, 10.0)), SITE).to_dict(
-        "records"
-    )
-    assert row["ttc_s"] == pytest.approx(0.97, abs=0.02)
+    met = crossings(frame_of(at(1, "a2", 9.0, 0.0), at(2, "b2", -5.0, 10.0)), SITE)
+    assert met["ttc_s"].tolist() == pytest.approx([0.97], abs=0.02)
 
 
 def test_a_vehicle_without_right_of_way_is_on_no_crossing_course() -> None:
@@ -270,13 +257,11 @@ def test_a_signal_is_safe_and_anarchy_is_not() -> None:
     wild = minisim.simulate(
         scenario, Unregulated(), seed=1, record="junction", on_collision="record"
     )
-
     calm: dict[str, Any] = dict(safety_summary(safe.trajectories, safe.site))
     assert calm["pets"] > 50
     assert calm["min_pet_s"] > 1.0
     assert len(crossings(safe.trajectories, safe.site)) == 0
     assert 1.0 < calm["max_braking_mps2"] < 6.0
-
     # Two vehicles of different arms that collide are in the conflict area together.
     touched = {c.vehicles for c in wild.collisions if c.movements[0][0] != c.movements[1][0]}
     assert touched

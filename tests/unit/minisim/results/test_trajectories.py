@@ -52,7 +52,6 @@ def test_trajectories_read_back(run: Run, tmp_path: Path, suffix: str) -> None:
         pytest.importorskip("pyarrow")
     path = tmp_path / f"trajectories{suffix}"
     write_trajectories(run.trajectories, path)
-
     read = pd.read_parquet(path) if suffix == ".parquet" else pd.read_csv(path)
     assert tuple(read.columns) == TRAJECTORY_COLUMNS
     read, written = (frame.astype({"lane": object}) for frame in (read, run.trajectories))
@@ -63,7 +62,6 @@ def test_trajectories_read_back(run: Run, tmp_path: Path, suffix: str) -> None:
 def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "trips.csv"
     write_trips(run.trips, path)
-
     read = pd.read_csv(path)
     assert tuple(read.columns) == TRIP_COLUMNS
     pd.testing.assert_frame_equal(read, run.trips, check_dtype=False, rtol=0, atol=1e-6)
@@ -99,7 +97,6 @@ def test_fcd_follows_the_schema_of_sumo(run: Run, tmp_path: Path) -> None:
     """Element and attribute names and kinds of SUMO's fcd_file.xsd."""
     path = tmp_path / "fcd.xml"
     write_fcd(run.trajectories, path, run.site)
-
     root = ET.parse(path).getroot()
     assert root.tag == "fcd-export"
     assert {(step.tag, *step.attrib) for step in root} == {("timestep", "time")}
@@ -120,7 +117,6 @@ def test_fcd_follows_the_schema_of_sumo(run: Run, tmp_path: Path) -> None:
 def test_fcd_says_what_the_frame_says(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "fcd.xml"
     write_fcd(run.trajectories, path, run.site)
-
     rows = [
         (float(step.attrib["time"]), int(v.attrib["id"]), *(float(v.attrib[k]) for k in "xy"))
         for step in ET.parse(path).getroot()
@@ -135,7 +131,6 @@ def test_fcd_positions_are_measured_from_the_start_of_the_lane(run: Run, tmp_pat
     places = (5.0, path.entry - 0.01, path.entry + 0.01, path.exit - 0.01, path.exit + 3.0)
     frame = frame_of(*((float(i), 7, "a", 1, s) for i, s in enumerate(places)))
     write_fcd(frame, tmp_path / "fcd.xml", run.site)
-
     read = [v.attrib for step in ET.parse(tmp_path / "fcd.xml").getroot() for v in step]
     assert [v["lane"] for v in read] == ["a_in_0", "a_in_0", ":C_a1_0", ":C_a1_0", "b_out_0"]
     arc = path.exit - path.entry
@@ -170,18 +165,6 @@ def test_a_movement_that_the_site_does_not_have_is_an_error(
 
 
 # All or nothing.
-
-
-@pytest.mark.parametrize("target", ["missing/t.csv", "file/t.csv", "folder.csv", "a\0b.csv"])
-def test_a_place_that_cannot_be_written_is_one_clear_error(
-    run: Run, tmp_path: Path, target: str
-) -> None:
-    (tmp_path / "file").write_text("not a folder", encoding="utf-8")
-    (tmp_path / "folder.csv").mkdir()
-    before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(FileError, match="cannot write"):
-        write_trips(run.trips, tmp_path / target)
-    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_failure_halfway_leaves_the_old_file(
