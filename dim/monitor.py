@@ -94,16 +94,11 @@ class Monitor:
 
 
 class Monitors:
-    """The monitors of all vehicles in one run; each uses what its own vehicle sees.
-
-    Attributes:
-        patience: of vehicles that wait for each other.
-        needed: whether a vehicle might get in another's way before the next wake-up.
-    """
+    """The monitors of all vehicles in one run; each uses what its own vehicle sees."""
 
     def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
         self.patience = Patience(monitor.patience, sight, site.vehicle.deceleration)
-        self.needed = False
+        self.needed = False  #: whether one might get in another's way before the next wake-up
         self._margin = monitor.time_margin
         self._site, self._rows = site, site.intersection.movements.rows
         self._conflict = ~matrix.values
@@ -120,10 +115,8 @@ class Monitors:
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
         """Which vehicles have to brake, and how hard.
 
-        Args:
-            view: the true one; only positions and speeds of the others are taken from it.
-            seen: what each deciding vehicle sees, by its id.
-            going: ids of the vehicles with the right of way.
+        Only positions and speeds of the others are taken from `view`, the true one. `seen` is what
+        each deciding vehicle sees; those in `going` have the right of way.
         """
         crossing = [v for v in view.vehicles if _crosses(v, self._b)]
         going = going | {v.id for v in crossing}
@@ -225,10 +218,8 @@ class Monitors:
 class Patience:
     """How vehicles that all stand and wait for each other come to an end.
 
-    Args:
-        time: how long all participants stand before the first of them goes alone [s].
-        sight: from where on before the junction vehicles take part [m].
-        deceleration: comfortable braking [m/s²].
+    After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
+    junction on; `deceleration` is comfortable braking [m/s²].
     """
 
     def __init__(self, time: float, sight: float, deceleration: float) -> None:
@@ -239,14 +230,9 @@ class Patience:
     def goes(
         self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
     ) -> bool:
-        """Whether a vehicle goes, either as it decided, or alone where all stand and wait.
+        """Whether a vehicle goes, either as it `decided`, or alone where all stand and wait.
 
-        Args:
-            view: the true one; only positions and speeds of the others are taken from it.
-            seen: what the ego sees.
-            ego: the vehicle.
-            decided: whether it goes by its own decision.
-            ranks: of the lanes, 0 first.
+        Only positions and speeds of the others are taken from `view`, the true one.
         """
         alone = ego.id in self._alone
         if not alone and (decided or ego.speed >= STANDING):

@@ -234,21 +234,6 @@ def reference_rows(cell: Cell, metric: str, lane: str = "all") -> pd.DataFrame:
     ].copy()
 
 
-def reference_value(
-    cell: Cell, metric: str, controller: str | None = None, lane: str = "all"
-) -> float:
-    """One published mean [s], of the cell's controller or of another; raises `InputError`."""
-    table = _reference()
-    if controller is not None:
-        cell = cell._replace(controller=controller)
-    choice("metric", metric, sorted(set(table["metric"])))
-    choice("published controller", cell.controller, sorted(set(table["controller"])))
-    rows = reference_rows(cell, metric, lane)
-    if rows.empty:
-        raise InputError(f"the paper has no {metric} of {cell.controller}, lane {lane}, for {cell}")
-    return float(rows["value"].iloc[0])
-
-
 def _cell(split: str, density: int, arms: int, controller: str) -> Cell:
     choice("split", split, SPLITS)
     choice("published controller", controller, LABELS)

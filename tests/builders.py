@@ -33,6 +33,7 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
+from scenarios.paper import Cell, reference_rows
 from scenarios.recipe import Recipe
 from scenarios.scenario import AS_RUN
 from scenarios.sweep.rows import identity_of
@@ -273,3 +274,8 @@ def free_flow(seconds: float) -> dict[str, float | None]:
 def share(part: float) -> settings:
     """Decorator: only this share of the profile's examples, for costly properties."""
     return settings(max_examples=max(1, round(part * settings().max_examples)))
+
+
+def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
+    """One published mean of a cell [s]."""
+    return float(reference_rows(cell, metric, lane)["value"].item())

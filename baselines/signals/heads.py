@@ -53,7 +53,7 @@ class Heads:
     def __init__(self, site: Site) -> None:
         n = site.intersection.n
         movements = site.intersection.movements
-        ways = [list(movements.of_lane(lane)) for lane in range(n)]
+        ways = [list(row[1:]) for row in movements.rows]
         self._rows = movements.rows
         # Nested lists: a plain lookup is much faster than one in a small array.
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])

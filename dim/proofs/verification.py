@@ -59,22 +59,16 @@ class Claim:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The result of all n^n − 1 cases of a matrix, by the rules of `dim.decide`.
-
-    Attributes:
-        sizes: cases by the number of vehicles that may go.
-        ties: cases by the number of cliques of the largest size.
-        worst: of the cases with the most such cliques, by that size: the first one, and their
-            number.
-    """
+    """The result of all n^n − 1 cases of a matrix, by the rules of `dim.decide`."""
 
     matrix: HarmonyMatrix
     order: str
     priorities: tuple[int, ...]
     cases: int
     claims: tuple[Claim, ...]
-    sizes: Mapping[int, int]
-    ties: Mapping[int, int]
+    sizes: Mapping[int, int]  #: cases by the number of vehicles that may go
+    ties: Mapping[int, int]  #: cases by the number of cliques of the largest size
+    #: Of the cases with the most such cliques, by that size: the first one, and their number.
     worst: Mapping[int, tuple[Movements, int]]
 
     @property

@@ -70,33 +70,21 @@ def environment() -> Mapping[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The result of a run.
-
-    Attributes:
-        scenario, controller, seed: what was run.
-        site, plan: what the controller knew and asked for.
-        collisions: each pair of vehicles once.
-        columns: all trips as arrays.
-        record: what was recorded of the trajectories: "junction", "all" or None.
-        trace, rows: the recording, and each row's vehicle id and path.
-        counts: what the controller's session counted.
-        kinds: kind of each vehicle by id; empty where all are of one kind.
-        host: what moved the vehicles, for the provenance: `host`, and perhaps its version.
-        environment: versions, for the provenance.
-    """
+    """The result of a run."""
 
     scenario: ScenarioLike
     controller: Controller
     seed: int
-    site: Site
-    plan: Plan
-    collisions: tuple[Collision, ...]
-    columns: Trips
-    record: str | None
-    trace: Records
-    rows: Records
-    counts: Mapping[str, float] = field(default_factory=dict)
-    kinds: tuple[str, ...] = ()
+    site: Site  #: what the controller knew
+    plan: Plan  #: what it asked for
+    collisions: tuple[Collision, ...]  #: each pair of vehicles once
+    columns: Trips  #: all trips as arrays
+    record: str | None  #: what was recorded of the trajectories: "junction", "all" or None
+    trace: Records  #: the recording
+    rows: Records  #: vehicle id and path of each of its rows
+    counts: Mapping[str, float] = field(default_factory=dict)  #: of the controller's session
+    kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty where all are of one kind
+    #: What moved the vehicles, for the provenance: `host`, and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
     environment: Mapping[str, str] = field(default_factory=environment)
 

@@ -38,8 +38,8 @@ def sweep(
 ) -> pd.DataFrame:
     """Run all experiments and return one row each, in their order.
 
-    The rows do not depend on the executor, nor on the number of its workers, but for the columns
-    `MEASURED`.
+    The rows do not depend on the executor, nor on the number of its workers, but for the column
+    `cpu_s`.
 
     Args:
         experiments: what to run.

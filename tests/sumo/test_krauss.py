@@ -14,8 +14,9 @@ from minisim.simulation import Run
 from minisim.sumo import simulate
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.paper import Cell, controller_of, reference_value, replay
+from scenarios.paper import Cell, controller_of, replay
 from scenarios.scenario import AS_RUN_SIGNALS, FAIR
+from tests.builders import reference_value
 
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=VehicleType(model="krauss"))
 

@@ -13,8 +13,8 @@ from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios import AS_RUN, five_way, four_way
 from scenarios.controllers import controller_named
-from scenarios.paper import Cell, controller_of, reference_value, replay
-from tests.builders import replayed
+from scenarios.paper import Cell, controller_of, replay
+from tests.builders import reference_value, replayed
 
 MOVEMENTS = four_way().intersection.movements
 

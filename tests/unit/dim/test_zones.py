@@ -24,7 +24,7 @@ def test_the_papers_zones() -> None:
     zones = Zones()
     assert (zones.red, zones.yellow, zones.green) == (30, 6, 2)
     assert zones.red_speed == pytest.approx(20 * KMH)
-    assert (zones.red_start, zones.yellow_start, zones.hold_distance) == (38, 8, 2)
+    assert (zones.red_start, zones.yellow_start) == (38, 8)
 
 
 def test_the_papers_markings() -> None:

@@ -26,7 +26,7 @@ from figures.tables import WRITERS, Table, save_table
 from minisim.errors import InputError
 from scenarios import studies
 from scenarios.controllers import RIVALS
-from scenarios.paper import SERIES, Cell, reference_value
+from scenarios.paper import SERIES, Cell
 from scenarios.recipe import Recipe
 from scenarios.studies import NAMES, study_named
 from scenarios.studies.fairness import PRIORITIES
@@ -36,7 +36,7 @@ from scenarios.studies.shared.reproduction import Made
 from scenarios.sweep.cells import saturated
 from scenarios.sweep.keys import key_of
 from tests import ROOT
-from tests.builders import capacity_of, synthetic_find, synthetic_row
+from tests.builders import capacity_of, reference_value, synthetic_find, synthetic_row
 
 SEARCH = Search(step=20.0, steps=64, seeds=2)
 EFFORT = Effort(seeds=2, search=SEARCH)
@@ -199,7 +199,7 @@ def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
         for line, (published, series) in zip(hollow, SERIES.items(), strict=True):
             assert line.get_marker() == style.look(series).marker
             wanted = {
-                reference_value(Cell("4:3:2:1", d, 4), "waiting_time_s", published)
+                reference_value(Cell("4:3:2:1", d, 4, published), "waiting_time_s")
                 for d in (150, 200, 250, 300, 350)
             }
             assert set(np.asarray(line.get_ydata(), float).tolist()) == wanted

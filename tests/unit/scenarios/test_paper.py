@@ -24,12 +24,12 @@ from scenarios.paper import (
     Cell,
     controller_of,
     reference,
-    reference_value,
     replay,
     scenario,
 )
 from scenarios.published import published_arrivals
 from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
+from tests.builders import reference_value
 
 
 def test_the_grids_are_every_published_run() -> None:

@@ -51,10 +51,11 @@ from scenarios.crossval.comparison import (
     times,
 )
 from scenarios.crossval.report import markdown, summary, table
-from scenarios.paper import GREENS, GRID, PHASES, Cell, reference_value, replay
+from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
 from scenarios.published import published_arrivals
 from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from scenarios.statistics import ks_distance, mean_interval
+from tests.builders import reference_value
 
 END = 100.0
 LANES = (0, 1, 0, 1)

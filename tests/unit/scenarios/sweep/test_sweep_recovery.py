@@ -22,7 +22,6 @@ from scenarios.sweep import sweep
 from scenarios.sweep.file import read_experiments
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
-from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
 from tests.builders import Deadly, killing
@@ -37,7 +36,7 @@ def quick(count: int) -> list[Recipe]:
 
 
 def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.drop(columns=list(MEASURED))
+    return rows.drop(columns="cpu_s")
 
 
 def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
