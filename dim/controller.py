@@ -132,9 +132,8 @@ class Dim:
     def start(self, site: Site) -> DimSession:
         """Begin a run.
 
-        Raises:
-            InputError: a matrix or priorities for another number of arms, or roads too short for
-                the zones.
+        Raises `InputError`: a matrix or priorities for another number of arms, or roads too short
+        for the zones.
         """
         return DimSession(self, site)
 

@@ -35,19 +35,14 @@ PAPER_ARMS = (3, 4, 5)
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
-    Two matrices are equal, and hash alike, when their entries are.
-
-    Attributes:
-        n: number of arms, 3 … 12.
-        values: bool, shape (m, m) with m = n(n−1), read-only; rows and columns in the order
-            a1, a2, …, b1, … True is harmony, False conflict; symmetric, and False within a lane.
-
-    Raises:
-        InputError: not square, not symmetric, an entry other than 0 and 1, or harmony within a
-            lane; the message names the entry.
+    Two matrices are equal, and hash alike, when their entries are. Raises `InputError` where it is
+    not square, not symmetric, has an entry other than 0 and 1, or harmony within a lane; the
+    message names the entry.
     """
 
-    n: int
+    n: int  #: number of arms, 3 … 12
+    #: Shape (m, m) with m = n(n−1), read-only; rows and columns in the order a1, a2, …, b1, … True
+    #: is harmony, False conflict; symmetric, and False within a lane.
     values: Bools
 
     def __post_init__(self) -> None:
@@ -66,10 +61,7 @@ class HarmonyMatrix:
     ) -> HarmonyMatrix:
         """Harmony where swept corridors of different arms stay more than `clearance` [m] apart.
 
-        Args:
-            intersection: the geometry.
-            vehicle: whose body sweeps the corridors; by default `VehicleType()`.
-            clearance: 0 … 10 m.
+        That is 0 … 10 m. The vehicle whose body sweeps is `VehicleType()` by default.
         """
         instance("intersection", intersection, Intersection)
         vehicle = VehicleType() if vehicle is None else vehicle
@@ -88,9 +80,8 @@ class HarmonyMatrix:
     def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
         """Read a matrix: a header `,a1,a2,…`, then one line a movement, `a1,0,0,1,…`.
 
-        Raises:
-            FileError: unreadable, or not such a table (with the line).
-            InputError: a table whose labels or entries are no harmony matrix (with the entry).
+        Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
+        for labels or entries that are no harmony matrix (with the entry).
         """
         instance("path of a harmony matrix", path, (str, os.PathLike))
         try:

@@ -42,50 +42,40 @@ from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
-#: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
-#: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
-TIME_MARGIN = 1.0
-
-#: How far beside a path a vehicle may seem to be while it is on it [m]: the lateral error that
-#: automated driving on local streets must stay below (0.29 m; Reid et al., "Localization
-#: requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv 1906.01061).
-TOLERANCE = 0.3
-
-#: How far ahead motion is predicted where it is too late to stop before the area [s]: longer than
-#: a vehicle at 20 km/h takes through the junction.
-LOOK_AHEAD = 4.0
-
 #: What a vehicle that stops leaves between itself and where it must not be [m].
 ROOM = 0.25
-
-#: How long all participants stand before the first of them goes alone [s]: the longest time between
-#: two vehicles at an all-way stop, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
-PATIENCE = 2.0
 
 
 @declared
 class Monitor:
     """A last resort for every vehicle, beside what it decides."""
 
+    # A shorter post-encroachment time is critical (Várhelyi, AAP 30(6), 1998).
     time_margin: float = real(
         "least time between leaving a conflict area and another's entering it", "s",
-        default=TIME_MARGIN, low=0, high=10,
+        default=1.0, low=0, high=10,
     )  # fmt: skip
+    # For where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
     look_ahead: float = real(
-        "how far ahead motion is predicted", "s", default=LOOK_AHEAD, low=0.5, high=30
+        "how far ahead motion is predicted", "s", default=4.0, low=0.5, high=30
     )
+    # The lateral error that automated driving on local streets must stay below (0.29 m; Reid et
+    # al., "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv
+    # 1906.01061).
     tolerance: float = real(
         "how far beside a path a vehicle may seem to be while it is on it", "m",
-        default=TOLERANCE, above=0, high=1,
+        default=0.3, above=0, high=1,
     )  # fmt: skip
     # Less than 1 m/s² is no braking even on ice.
     deceleration: float | None = real(
         "how hard it brakes at most; none is what the brakes can do", "m/s²",
         low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
     )  # fmt: skip
+    # The longest time between two vehicles at an all-way stop is 1 … 2 s in SUMO's recommendations
+    # (`jmAllwayStopWait`).
     patience: float = real(
         "how long all that take part stand before the first of them goes alone", "s",
-        default=PATIENCE, low=0.5, high=60,
+        default=2.0, low=0.5, high=60,
     )  # fmt: skip
 
     def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Monitors:

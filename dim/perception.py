@@ -51,9 +51,7 @@ class Perception(Protocol):
 class ExactPerception:
     """Every vehicle sees everything at once and as it is, as the paper assumes."""
 
-    @property
-    def period(self) -> None:
-        """None: the wake-ups suffice."""
+    period = None  #: the wake-ups suffice
 
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
         """Begin a run."""

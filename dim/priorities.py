@@ -68,11 +68,7 @@ def longest_waiting(
 
 
 def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> float:
-    """The time for which a vehicle has watched at least when it begins to take part [s].
-
-    Raises:
-        InputError: the sensors do not reach beyond the yellow zone.
-    """
+    """How long a vehicle has watched at least when it begins to take part [s]; or `InputError`."""
     room = sensor_range - zones.yellow_start
     if room <= 0.0:
         raise InputError(

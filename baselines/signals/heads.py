@@ -45,9 +45,8 @@ class Colour(Enum):
 class Heads:
     """The signal heads of a run, and the vehicles that they have let go.
 
-    Attributes:
-        colours: what each lane's head shows now. A head that should be green while a vehicle
-            still crosses its lane's way stays red (or amber) until that vehicle is clear.
+    `colours` is what each lane's head shows now. A head that should be green while a vehicle still
+    crosses its lane's way stays red (or amber) until that vehicle is clear.
     """
 
     def __init__(self, site: Site) -> None:

@@ -132,21 +132,14 @@ class Run:
     @property
     def provenance(self) -> dict[str, str]:
         """Versions and parameters: all that is needed to run it again."""
-        return {
-            **self.environment,
-            "scenario": repr(self.scenario),
-            "controller": repr(self.controller),
-            "seed": str(self.seed),
-            **self.host,
-        }
+        what = {"scenario": repr(self.scenario), "controller": repr(self.controller)}
+        return {**self.environment, **what, "seed": str(self.seed), **self.host}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the run to one file; see `minisim.results.saved`.
 
-        Raises:
-            MissingExtraError: pyarrow is not installed.
-            InputError: the site is not made of our classes.
-            FileError: the file cannot be written; nothing is left behind.
+        Raises `MissingExtraError` without pyarrow, `InputError` for a site that is not made of our
+        classes, and `FileError` where the file cannot be written; then nothing is left behind.
         """
         from minisim.results.saved import save
 
@@ -156,9 +149,8 @@ class Run:
     def load(cls, path: str | os.PathLike[str]) -> Run:
         """Read a run that `save` has written.
 
-        Raises:
-            MissingExtraError: pyarrow is not installed.
-            FileError: no such file, no saved run, a damaged one, or one of another layout.
+        Raises `MissingExtraError` without pyarrow, and `FileError` for no such file, no saved run,
+        a damaged one, or one of another layout.
         """
         from minisim.results.saved import load
 
@@ -176,11 +168,7 @@ class Run:
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
-        """One row a vehicle and step, columns `minisim.results.trajectories.TRAJECTORY_COLUMNS`.
-
-        Raises:
-            InputError: nothing was recorded.
-        """
+        """One row a vehicle and step, columns `TRAJECTORY_COLUMNS`; `InputError` for no record."""
         import pandas as pd
 
         if self.record is None:
