@@ -87,7 +87,8 @@ class HarmonyMatrix:
         try:
             data = Path(path).read_bytes()
         except (OSError, ValueError) as error:
-            raise FileError(f"cannot read harmony matrix {path!s}: {_reason(error)}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise FileError(f"cannot read harmony matrix {path!s}: {reason}") from None
         return _parse(data, f"harmony matrix {path!s}")
 
     def to_text(self) -> str:
@@ -127,12 +128,8 @@ class HarmonyMatrix:
         instance("other", other, HarmonyMatrix)
         if other.n != self.n:
             raise InputError(f"cannot compare matrices of {self.n} and {other.n} arms")
-        rows, columns = np.nonzero(np.triu(self.values != other.values))
-        movements = self.movements
-        return tuple(
-            (movements[r], movements[c])
-            for r, c in zip(rows.tolist(), columns.tolist(), strict=True)
-        )
+        movements, differ = self.movements, np.triu(self.values != other.values)
+        return tuple((movements[r], movements[c]) for r, c in _where(differ))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, HarmonyMatrix):
@@ -194,7 +191,7 @@ def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
 
 
 def _where(bad: Bools) -> Iterator[tuple[int, int]]:
-    return ((int(r), int(c)) for r, c in np.argwhere(bad))
+    return ((r, c) for r, c in np.argwhere(bad).tolist())
 
 
 def _refuse(labels: tuple[str, ...], row: int, column: int, why: str) -> NoReturn:
@@ -265,7 +262,3 @@ def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> l
                 f"{where}: the harmony of {label} with {other} is {cell!r}; allowed: 0 or 1"
             )
     return [int(cell) for cell in cells[1:]]
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
