@@ -41,22 +41,17 @@ MAX_TIME = 1e7
 class Arrivals:
     """An arrival table, sorted by demand time (ties keep lane order).
 
-    Attributes:
-        time: demand time [s], shape (k,).
-        lane: index of the approach lane, shape (k,).
-        manoeuvre: 1 … n−1, shape (k,).
+    All columns have the shape (k,).
     """
 
-    time: Floats
-    lane: Ints
-    manoeuvre: Ints
+    time: Floats  # demand time [s]
+    lane: Ints  # index of the approach lane
+    manoeuvre: Ints  # 1 … n−1
 
     def __post_init__(self) -> None:
-        time, lane, manoeuvre = (
-            _column("demand_time_s", self.time, np.float64),
-            _column("lane", self.lane, np.int64),
-            _column("manoeuvre", self.manoeuvre, np.int64),
-        )
+        time = _column("demand_time_s", self.time, np.float64)
+        lane = _column("lane", self.lane, np.int64)
+        manoeuvre = _column("manoeuvre", self.manoeuvre, np.int64)
         if not len(time) == len(lane) == len(manoeuvre):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if len(time) and (not np.isfinite(time).all() or time.min() < 0):
@@ -65,23 +60,19 @@ class Arrivals:
             raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
         order = np.lexsort((lane, time))
         for name, column in (("time", time), ("lane", lane), ("manoeuvre", manoeuvre)):
-            sorted_column = column[order]
-            sorted_column.setflags(write=False)
-            object.__setattr__(self, name, sorted_column)
+            column = column[order]
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
 
     def __len__(self) -> int:
         return len(self.time)
 
     def check(self, n: int) -> None:
         """Raise `InputError` for a lane or manoeuvre that n arms do not have."""
-        if not len(self):
-            return
-        if self.lane.min() < 0 or self.lane.max() >= n:
-            bad = int(self.lane[(self.lane < 0) | (self.lane >= n)][0])
+        for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
             name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
             raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
-        if self.manoeuvre.min() < 1 or self.manoeuvre.max() >= n:
-            bad = int(self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)][0])
+        for bad in self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)].tolist():
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
@@ -173,9 +164,7 @@ class Demand:
         lane = np.repeat(np.arange(n), [len(t) for t in times])
         time = np.concatenate(times)
         order = np.lexsort((lane, time))
-        manoeuvre = stream(seed, "manoeuvres").choice(
-            np.arange(1, n), size=len(time), p=np.array(turns)
-        )
+        manoeuvre = stream(seed, "manoeuvres").choice(np.arange(1, n), size=len(time), p=turns)
         return Arrivals(time[order], lane[order], manoeuvre)
 
     def _lane_times(self, rate: float, duration: float, rng: np.random.Generator) -> Floats:
@@ -207,7 +196,6 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
     instance("arrivals file", path, (str, os.PathLike))
     if n is not None:
         integer("number of arms", n, low=3, high=len(ARM_NAMES))
-    times, lanes, manoeuvres = [], [], []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
@@ -218,18 +206,12 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
                     f"{path}: column {', '.join(wrong)} missing or twice; "
                     f"needed once each: {', '.join(COLUMNS)}"
                 )
-            for row in reader:
-                time, lane, manoeuvre = _parse_row(path, reader.line_num, row, n)
-                times.append(time)
-                lanes.append(lane)
-                manoeuvres.append(manoeuvre)
+            rows = [_parse_row(path, reader.line_num, row, n) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot read arrivals from {path}: {reason}") from error
-    return Arrivals(
-        np.array(times, dtype=np.float64), np.array(lanes, dtype=np.int64),
-        np.array(manoeuvres, dtype=np.int64),
-    )  # fmt: skip
+    time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
+    return Arrivals(np.array(time, float), np.array(lane, int), np.array(manoeuvre, int))
 
 
 def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
@@ -241,10 +223,8 @@ def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
         with Path(path).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(COLUMNS)
-            for time, lane, manoeuvre in zip(
-                arrivals.time.tolist(), arrivals.lane, arrivals.manoeuvre, strict=True
-            ):
-                writer.writerow([time, ARM_NAMES[lane], manoeuvre])
+            lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
+            writer.writerows(zip(arrivals.time.tolist(), lanes, arrivals.manoeuvre, strict=True))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot write arrivals to {path}: {reason}") from error
@@ -280,7 +260,7 @@ def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, .
     """Shares of so many things, with the sum 1."""
     if given is None:
         return (1.0 / count,) * count
-    shares = tuple(map(float, given))  # a text no more: `Demand` has read it
+    shares = tuple(map(float, given))  # `Demand` has already turned a text into numbers
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     total = sum(shares)

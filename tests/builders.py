@@ -10,9 +10,10 @@ import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from hypothesis import settings
 
 from dim import Dim, NoisyPerception
@@ -34,8 +35,8 @@ from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
 from scenarios.paper import Cell, reference_rows
+from scenarios.profiles import AS_RUN
 from scenarios.recipe import Recipe
-from scenarios.scenario import AS_RUN
 from scenarios.sweep.rows import identity_of
 
 
@@ -76,17 +77,24 @@ class Fixed:
     name: str = "fixed"
 
     def start(self, site: Site) -> Session:
-        return _FixedSession(self.plan, self.first)
+        return ScriptedSession(self.plan, lambda view: () if view.time else self.first)
 
 
-class _FixedSession:
-    def __init__(self, plan: Plan, first: tuple[Command, ...]) -> None:
-        self.plan = plan
-        self.first = first
+@dataclass(frozen=True)
+class Scripted:
+    """A controller whose sessions answer a view by calling `answer`."""
 
-    def decide(self, view: View) -> Iterable[Command]:
-        commands, self.first = self.first, ()
-        return commands
+    answer: Callable[[View], Iterable[Command]]
+    plan: Plan = field(default_factory=Plan)
+    name: str = "scripted"
+
+    def start(self, site: Site) -> Session:
+        return ScriptedSession(self.plan, self.answer)
+
+
+class ScriptedSession(NamedTuple):
+    plan: Plan
+    decide: Callable[[View], Iterable[Command]]
 
 
 @dataclass(frozen=True)
@@ -108,6 +116,11 @@ class Deadly:
                 Path(self.once).touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return Unregulated().start(site)
+
+
+def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows without the columns that differ when a run is repeated."""
+    return rows.drop(columns="cpu_s")
 
 
 def as_run(scenario: SmallScenario) -> SmallScenario:
@@ -277,5 +290,5 @@ def share(part: float) -> settings:
 
 
 def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
-    """One published mean of a cell [s]."""
+    """One published mean [s]."""
     return float(reference_rows(cell, metric, lane)["value"].item())

@@ -1,8 +1,8 @@
 """Vehicles under cruise control: the law of the published runs, SUMO's CC model.
 
-Everything that is special about this law stands here: its leaders, what it remembers of each
-vehicle, and how it chooses accelerations. The kernel calls `accelerate` in place of its own, and
-`look` after every step. The equations are in `minisim.carfollowing`.
+All that is special about this law is in this module: its leaders, what it remembers of each vehicle
+and how it chooses accelerations. The kernel calls `accelerate` in place of its own, and `look`
+after every step. The equations are in `minisim.carfollowing`.
 
 A vehicle obeys the hardest braking that any of its leaders asks for
 (`MSVehicle::planMoveInternal`, with the model's radar). The leaders are:
@@ -15,13 +15,13 @@ A vehicle obeys the hardest braking that any of its leaders asks for
 - the radar's leader: where no vehicle is ahead on its own lane or way, the nearest one that will
   leave by the same exit. Where there is no room left, it counts as if it were just ahead.
 
-A vehicle that only crosses its way is no leader. For those, SUMO asks of a vehicle no more than to
-be able to stop before the crossing (`adaptToJunctionLeader`), and the CC model answers that
-question with the radar's leader, whichever vehicle is meant.
+A vehicle that only crosses its way is no leader. SUMO asks only whether the vehicle could stop
+before the crossing (`adaptToJunctionLeader`), and the CC model answers with the radar's leader,
+whichever vehicle SUMO asked about.
 
-One rule is left out: inside the junction SUMO's vehicles also follow one that crosses before them,
-while there is room up to the crossing. `docs/fidelity.md` shows the one replay in which that was
-seen.
+One rule is left out: inside the junction, SUMO's vehicles also follow a vehicle that crosses before
+them while there is room up to the crossing. `docs/fidelity.md` shows the only replay in which that
+happened.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
-                # One beside it, still on another way, is left to the radar (`adaptToLeader`).
+                # A vehicle beside it on another way is left to the radar (`adaptToLeader`).
                 beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
                 if not beside:
                     u = min(u, follow(v, gap - law.min_gap, ahead["v"], cruise))

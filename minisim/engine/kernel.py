@@ -12,9 +12,9 @@ import math
 from minisim.carfollowing import ballistic, semi_implicit
 from minisim.control import Site
 from minisim.engine import cruise
+from minisim.engine.broad_phase import may_touch
 from minisim.engine.laws import braking_begins, closeness, follow, hold, insertable, slow_down
 from minisim.engine.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
-from minisim.engine.touch import may_touch
 from minisim.jit import njit
 
 #: Reasons to return, as bits.
@@ -23,12 +23,12 @@ MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
 #: SUMO's limit below which a vehicle counts as waiting [m/s].
 WAITING_SPEED = 0.1
 
-#: What a law of motion brings along that has leaders of its own. There is one such law.
+#: The data of a law of motion that has leaders of its own. There is one such law.
 Motion = cruise.Cruise
 
 
 def build_motion(site: Site, vehicles: Records) -> Motion | None:
-    """What the law of motion of these vehicles brings along; None where it brings nothing."""
+    """The data that the law of these vehicles needs beside `Law`, or None."""
     return cruise.build_cruise(site, len(vehicles))
 
 

@@ -26,7 +26,7 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
-    from scenarios.controllers import CONTROLLERS, described, package_of, plugins
+    from scenarios.controllers import CONTROLLERS, maker_of, package_of, plugins
 
     if name is None:
         meanings = {known: _meaning(entry.make) for known, entry in CONTROLLERS.items()}
@@ -40,7 +40,7 @@ def controllers(
             typer.echo(wrapped(f"{known:{width}}{meaning}", width))
         return
     ours = name.partition(":")[0]
-    make = described(ours if ours in CONTROLLERS else name).make
+    make = maker_of(ours if ours in CONTROLLERS else name)
     meaning, parameters = _meaning(make), list(_parameters(make))
     if as_json:
         show_json({"name": name, "meaning": meaning, "parameters": parameters})

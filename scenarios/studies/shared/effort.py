@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from minisim.errors import InputError, integer
+from minisim.errors import InputError, integer, show
 from minisim.parameters import checked, declared, part, real, reals, whole
 
 
 def _power_of_two(title: str, value: Any) -> int:
     steps = integer(title, value, low=2)
     if steps.bit_count() != 1:
-        raise InputError(f"{title} must be a power of two, got {steps}")
+        raise InputError(f"{title} must be a power of two, got {show(steps)}")
     return steps
 
 

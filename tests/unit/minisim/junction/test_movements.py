@@ -50,7 +50,8 @@ def test_the_tables_agree_with_each_other(n: int) -> None:
         assert movements.exits[k] == range(n)[lane - n + manoeuvre]
         assert movements.bits[lane][manoeuvre] == 1 << k
     assert (movements.index_of[:, 0] == -1).all()
-    for lane in range(n):
+    for lane, row in enumerate(movements.rows):
+        assert movements.bits[lane][0] == sum(1 << k for k in row[1:])
     assert (movements.apart == (movements.origins[:, None] != movements.origins)).all()
 
 

@@ -144,6 +144,20 @@ def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) ->
         assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
 
 
+def test_run_counts_false_grants_where_perception_errs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", "300",
+           "--no-safety", "--on-collision", "record")  # fmt: skip
+    told = ok(capsys, *run, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)")
+    assert "false grants" in told
+    summary = json.loads(
+        ok(capsys, *run, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))")
+    )
+    assert summary["crossings"] >= summary["trips"] - summary["unfinished"]
+    assert "false grants" not in ok(capsys, *run)
+
+
 def test_run_without_vehicles(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
     assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None

@@ -5,9 +5,12 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from dim import Dim, Monitor
+from dim import Dim, Monitor, NoisyPerception
 from dim.senses.intent import RATES
 from dim.senses.noise import UNSIGNALLED
+from minisim import simulate
+from minisim.errors import CollisionError
+from scenarios import four_way
 from scenarios.statistics import poisson_interval
 from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
@@ -65,3 +68,15 @@ def test_a_row_holds_what_was_counted() -> None:
     assert row["deadlock_s"] == 0.0
     plain, _ = outcome_of(IntentErrorPoint("dim").recipe(1, 60.0))
     assert "crossings" not in plain
+
+
+def test_the_collision_that_docs_explain() -> None:
+    """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
+    scenario = four_way(250, profile="fair")
+    with pytest.raises(CollisionError) as caught:
+        simulate(scenario, Dim(perception=NoisyPerception(0.15)), 1)
+    (collision,) = caught.value.collisions
+    assert (collision.time, collision.movements) == (662.8, ("c3", "b3"))
+    table = Dim().start(scenario.site(1)).rules.table
+    assert [str(m) for m in table.decide(["b3", "c3", "d1"])] == ["c3", "d1"]
+    assert [str(m) for m in table.decide(["b3", "c2", "d1"])] == ["b3"]
