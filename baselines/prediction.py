@@ -56,7 +56,7 @@ def courses(site: Site) -> tuple[Course, ...]:
     junction = site.intersection
     turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
     return tuple(
-        Course(path.exit - path.entry, min(site.speed_limit, turn), path.exit_arm)
+        Course(path.crossing, min(site.speed_limit, turn), path.exit_arm)
         for path, turn in zip(junction.paths, turns, strict=True)
     )
 

@@ -115,11 +115,7 @@ class Slot:
 
 
 class Manager:
-    """Which vehicles hold which reservation, and which are possible; times in steps of the host.
-
-    Attributes:
-        slots: the reservations by vehicle, in the order of their grants.
-    """
+    """Which vehicles hold which reservation, and which are possible; times in steps of the host."""
 
     def __init__(self, site: Site, buffer: float) -> None:
         if isinstance(site.vehicle, CruiseVehicle):
@@ -127,7 +123,7 @@ class Manager:
                 "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
                 "use the profile paper or fair"
             )
-        self.slots: dict[int, Slot] = {}
+        self.slots: dict[int, Slot] = {}  #: by vehicle, in the order of their grants
         self._motion = Following.of(site)
         self._ways = courses(site)
         self._zones: list[dict[int, tuple[float, float]]] = [

@@ -82,22 +82,18 @@ class V2ICSession:
     """One run: the serving list, and what follows from it.
 
     It is called where vehicles register and where they have left; in between only while any waits.
-
-    Attributes:
-        order: ids of the registered vehicles, in order of registration.
-        granted: ids of the vehicles with the right of way.
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:
         self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
-        paths = site.intersection.paths
-        self.order: list[int] = []
-        self.granted: set[int] = set()
+        paths, length = site.intersection.paths, site.vehicle.length
+        self.order: list[int] = []  #: ids of the vehicles, in order of registration
+        self.granted: set[int] = set()  #: of those with the right of way
         self._period = controller.period
         self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
         self._acceleration = site.vehicle.acceleration
-        self._crossing = [path.exit - path.entry + site.vehicle.length for path in paths]
+        self._crossing = [path.crossing + length for path in paths]
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
 
     def decide(self, view: View) -> Iterable[Command]:

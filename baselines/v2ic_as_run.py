@@ -103,16 +103,11 @@ class Platoon(NamedTuple):
 
 
 class AsRunList:
-    """The authors' loop body: the serving list, and the desired speeds that follow from it.
-
-    Attributes:
-        order: ids of the listed vehicles, in order of registration.
-        granted: ids of the vehicles that were released ("priority 0").
-    """
+    """The authors' loop body: the serving list, and the desired speeds that follow from it."""
 
     def __init__(self) -> None:
-        self.order: list[int] = []
-        self.granted: set[int] = set()
+        self.order: list[int] = []  #: ids of the listed vehicles, in order of registration
+        self.granted: set[int] = set()  #: ids of the vehicles that were released ("priority 0")
         self._conflicts = right_hand_conflicts()
 
     def step(self, platoons: dict[int, Platoon]) -> dict[int, float]:

@@ -26,13 +26,7 @@ class Rules:
 
 
 class Agent:
-    """One vehicle's side of Algorithm 1; it only remembers whether it holds the right of way.
-
-    Attributes:
-        vehicle: its id.
-        lane: its approach lane.
-        right_of_way: whether it goes; False until it has decided otherwise.
-    """
+    """One vehicle's side of Algorithm 1; it only remembers whether it holds the right of way."""
 
     __slots__ = ("lane", "right_of_way", "rules", "vehicle")
 
@@ -54,9 +48,7 @@ class Agent:
           another's intent, it must belong to the clique of every possible case. So all that go
           belong to the clique of the true case, however little each of them knows.
 
-        Args:
-            percept: what it sees.
-            table: for the present lane priorities, where these change; by default the rules'.
+        Where lane priorities change, `table` is for the present ones; by default it is the rules'.
         """
         rules = self.rules
         table = rules.table if table is None else table

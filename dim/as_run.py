@@ -138,13 +138,7 @@ class Car(NamedTuple):
 
 
 class AsRunRules:
-    """The authors' loop body: lists of vehicles and the desired speeds that follow from them.
-
-    Attributes:
-        serving: ids of the vehicles from the red zone on until they are clear.
-        action: ids of the participants, in order of entry.
-        chosen: ids of the vehicles with the right of way.
-    """
+    """The authors' loop body: lists of vehicles and the desired speeds that follow from them."""
 
     def __init__(self, dim: AsRunDim, matrix: HarmonyMatrix) -> None:
         self.arms, self.matrix = matrix.n, matrix
@@ -153,15 +147,14 @@ class AsRunRules:
         self.yellow_start = self.bound - YELLOW
         self.red_start = self.yellow_start - RED[self.arms]
         self.green_start = self.bound - GREEN
-        self.serving: list[int] = []
-        self.action: list[int] = []
-        self.chosen: tuple[int, ...] = ()
+        self.serving: list[int] = []  #: ids, from the red zone on until they are clear
+        self.action: list[int] = []  #: ids of the participants, in order of entry
+        self.chosen: tuple[int, ...] = ()  #: ids of the vehicles with the right of way
 
     def step(self, cars: Mapping[int, Car]) -> dict[int, float]:
-        """Update the lists from what is on the road; the desired speeds that are set now [m/s].
+        """Update the lists; the desired speeds that are set now [m/s].
 
-        Args:
-            cars: by id, at least those from the start of the red zone on until they are clear.
+        `cars` are at least those from the start of the red zone on until they are clear.
         """
         speeds: dict[int, float] = {}
         visited = sorted(cars.values(), key=lambda car: (car.name, car.id))

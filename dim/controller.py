@@ -132,9 +132,8 @@ class Dim:
     def start(self, site: Site) -> DimSession:
         """Begin a run.
 
-        Raises:
-            InputError: a matrix or priorities for another number of arms, or roads too short for
-                the zones.
+        Raises `InputError`: a matrix or priorities for another number of arms, or roads too short
+        for the zones.
         """
         return DimSession(self, site)
 
@@ -163,15 +162,8 @@ class Dim:
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
-    Attributes:
-        rules, reader, see: which all agents share.
-        plan: what the host has to provide.
-
-    Args:
-        dim: the recipe.
-        site: where it runs.
-        follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
-        takes: how vehicles take what they have seen of a true view: (true, seen) -> taken.
+    Vehicles for whose id `follows` is false are seen, but have no agent. `takes` says how vehicles
+    take what they have seen of a true view: (true, seen) -> taken.
     """
 
     def __init__(
@@ -191,7 +183,7 @@ class DimSession:
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
         entry = (0.0,) if dim.gate == "harmonious" else ()
         self.plan = Plan(
-            hold_distance=zones.hold_distance,
+            hold_distance=zones.green,
             markings=zones.markings(site),
             marks=(zones.yellow_start, *half_green, *entry),
             wake_on_clear=True,

@@ -31,11 +31,7 @@ Movements = tuple[Movement, ...]
 
 
 def lane_ranks(priorities: Iterable[int] | None, n: int) -> tuple[int, ...]:
-    """Rank of each of n lanes, 0 first; by default the lanes' own order.
-
-    Raises:
-        InputError: no permutation of 0 … n−1.
-    """
+    """Rank of each of n lanes, 0 first, by default in order; raises `InputError` for others."""
     if priorities is None:
         return tuple(range(n))
     given = items("priorities", priorities, "lane ranks")
@@ -92,11 +88,7 @@ def explain(
     order: str = "size",
     priorities: Sequence[int] | None = None,
 ) -> Explanation:
-    """`decide`, with the graph and all that was chosen from; the same arguments and errors.
-
-    Raises:
-        InputError: also without any participant.
-    """
+    """`decide`, with the graph and all that was chosen from; `InputError` without participants."""
     participants = _participants(movements, matrix)
     if not participants:
         raise InputError("a decision needs at least one participant, such as a1")

@@ -35,19 +35,14 @@ PAPER_ARMS = (3, 4, 5)
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
-    Two matrices are equal, and hash alike, when their entries are.
-
-    Attributes:
-        n: number of arms, 3 … 12.
-        values: bool, shape (m, m) with m = n(n−1), read-only; rows and columns in the order
-            a1, a2, …, b1, … True is harmony, False conflict; symmetric, and False within a lane.
-
-    Raises:
-        InputError: not square, not symmetric, an entry other than 0 and 1, or harmony within a
-            lane; the message names the entry.
+    Two matrices are equal, and hash alike, when their entries are. Raises `InputError` where it is
+    not square, not symmetric, has an entry other than 0 and 1, or harmony within a lane; the
+    message names the entry.
     """
 
-    n: int
+    n: int  #: number of arms, 3 … 12
+    #: Shape (m, m) with m = n(n−1), read-only; rows and columns in the order a1, a2, …, b1, … True
+    #: is harmony, False conflict; symmetric, and False within a lane.
     values: Bools
 
     def __post_init__(self) -> None:
@@ -66,10 +61,7 @@ class HarmonyMatrix:
     ) -> HarmonyMatrix:
         """Harmony where swept corridors of different arms stay more than `clearance` [m] apart.
 
-        Args:
-            intersection: the geometry.
-            vehicle: whose body sweeps the corridors; by default `VehicleType()`.
-            clearance: 0 … 10 m.
+        That is 0 … 10 m. The vehicle whose body sweeps is `VehicleType()` by default.
         """
         instance("intersection", intersection, Intersection)
         vehicle = VehicleType() if vehicle is None else vehicle
@@ -88,15 +80,15 @@ class HarmonyMatrix:
     def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
         """Read a matrix: a header `,a1,a2,…`, then one line a movement, `a1,0,0,1,…`.
 
-        Raises:
-            FileError: unreadable, or not such a table (with the line).
-            InputError: a table whose labels or entries are no harmony matrix (with the entry).
+        Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
+        for labels or entries that are no harmony matrix (with the entry).
         """
         instance("path of a harmony matrix", path, (str, os.PathLike))
         try:
             data = Path(path).read_bytes()
         except (OSError, ValueError) as error:
-            raise FileError(f"cannot read harmony matrix {path!s}: {_reason(error)}") from None
+            reason = getattr(error, "strerror", None) or error
+            raise FileError(f"cannot read harmony matrix {path!s}: {reason}") from None
         return _parse(data, f"harmony matrix {path!s}")
 
     def to_text(self) -> str:
@@ -136,12 +128,8 @@ class HarmonyMatrix:
         instance("other", other, HarmonyMatrix)
         if other.n != self.n:
             raise InputError(f"cannot compare matrices of {self.n} and {other.n} arms")
-        rows, columns = np.nonzero(np.triu(self.values != other.values))
-        movements = self.movements
-        return tuple(
-            (movements[r], movements[c])
-            for r, c in zip(rows.tolist(), columns.tolist(), strict=True)
-        )
+        movements, differ = self.movements, np.triu(self.values != other.values)
+        return tuple((movements[r], movements[c]) for r, c in _where(differ))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, HarmonyMatrix):
@@ -203,7 +191,7 @@ def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
 
 
 def _where(bad: Bools) -> Iterator[tuple[int, int]]:
-    return ((int(r), int(c)) for r, c in np.argwhere(bad))
+    return ((r, c) for r, c in np.argwhere(bad).tolist())
 
 
 def _refuse(labels: tuple[str, ...], row: int, column: int, why: str) -> NoReturn:
@@ -274,7 +262,3 @@ def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> l
                 f"{where}: the harmony of {label} with {other} is {cell!r}; allowed: 0 or 1"
             )
     return [int(cell) for cell in cells[1:]]
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)

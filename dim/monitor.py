@@ -42,50 +42,40 @@ from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
-#: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
-#: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
-TIME_MARGIN = 1.0
-
-#: How far beside a path a vehicle may seem to be while it is on it [m]: the lateral error that
-#: automated driving on local streets must stay below (0.29 m; Reid et al., "Localization
-#: requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv 1906.01061).
-TOLERANCE = 0.3
-
-#: How far ahead motion is predicted where it is too late to stop before the area [s]: longer than
-#: a vehicle at 20 km/h takes through the junction.
-LOOK_AHEAD = 4.0
-
 #: What a vehicle that stops leaves between itself and where it must not be [m].
 ROOM = 0.25
-
-#: How long all participants stand before the first of them goes alone [s]: the longest time between
-#: two vehicles at an all-way stop, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
-PATIENCE = 2.0
 
 
 @declared
 class Monitor:
     """A last resort for every vehicle, beside what it decides."""
 
+    # A shorter post-encroachment time is critical (Várhelyi, AAP 30(6), 1998).
     time_margin: float = real(
         "least time between leaving a conflict area and another's entering it", "s",
-        default=TIME_MARGIN, low=0, high=10,
+        default=1.0, low=0, high=10,
     )  # fmt: skip
+    # For where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
     look_ahead: float = real(
-        "how far ahead motion is predicted", "s", default=LOOK_AHEAD, low=0.5, high=30
+        "how far ahead motion is predicted", "s", default=4.0, low=0.5, high=30
     )
+    # The lateral error that automated driving on local streets must stay below (0.29 m; Reid et
+    # al., "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv
+    # 1906.01061).
     tolerance: float = real(
         "how far beside a path a vehicle may seem to be while it is on it", "m",
-        default=TOLERANCE, above=0, high=1,
+        default=0.3, above=0, high=1,
     )  # fmt: skip
     # Less than 1 m/s² is no braking even on ice.
     deceleration: float | None = real(
         "how hard it brakes at most; none is what the brakes can do", "m/s²",
         low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
     )  # fmt: skip
+    # The longest time between two vehicles at an all-way stop is 1 … 2 s in SUMO's recommendations
+    # (`jmAllwayStopWait`).
     patience: float = real(
         "how long all that take part stand before the first of them goes alone", "s",
-        default=PATIENCE, low=0.5, high=60,
+        default=2.0, low=0.5, high=60,
     )  # fmt: skip
 
     def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Monitors:
@@ -94,16 +84,11 @@ class Monitor:
 
 
 class Monitors:
-    """The monitors of all vehicles in one run; each uses what its own vehicle sees.
-
-    Attributes:
-        patience: of vehicles that wait for each other.
-        needed: whether a vehicle might get in another's way before the next wake-up.
-    """
+    """The monitors of all vehicles in one run; each uses what its own vehicle sees."""
 
     def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
         self.patience = Patience(monitor.patience, sight, site.vehicle.deceleration)
-        self.needed = False
+        self.needed = False  #: whether one might get in another's way before the next wake-up
         self._margin = monitor.time_margin
         self._site, self._rows = site, site.intersection.movements.rows
         self._conflict = ~matrix.values
@@ -120,10 +105,8 @@ class Monitors:
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
         """Which vehicles have to brake, and how hard.
 
-        Args:
-            view: the true one; only positions and speeds of the others are taken from it.
-            seen: what each deciding vehicle sees, by its id.
-            going: ids of the vehicles with the right of way.
+        Only positions and speeds of the others are taken from `view`, the true one. `seen` is what
+        each deciding vehicle sees; those in `going` have the right of way.
         """
         crossing = [v for v in view.vehicles if _crosses(v, self._b)]
         going = going | {v.id for v in crossing}
@@ -225,10 +208,8 @@ class Monitors:
 class Patience:
     """How vehicles that all stand and wait for each other come to an end.
 
-    Args:
-        time: how long all participants stand before the first of them goes alone [s].
-        sight: from where on before the junction vehicles take part [m].
-        deceleration: comfortable braking [m/s²].
+    After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
+    junction on; `deceleration` is comfortable braking [m/s²].
     """
 
     def __init__(self, time: float, sight: float, deceleration: float) -> None:
@@ -239,14 +220,9 @@ class Patience:
     def goes(
         self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
     ) -> bool:
-        """Whether a vehicle goes, either as it decided, or alone where all stand and wait.
+        """Whether a vehicle goes, either as it `decided`, or alone where all stand and wait.
 
-        Args:
-            view: the true one; only positions and speeds of the others are taken from it.
-            seen: what the ego sees.
-            ego: the vehicle.
-            decided: whether it goes by its own decision.
-            ranks: of the lanes, 0 first.
+        Only positions and speeds of the others are taken from `view`, the true one.
         """
         alone = ego.id in self._alone
         if not alone and (decided or ego.speed >= STANDING):

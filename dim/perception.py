@@ -51,9 +51,7 @@ class Perception(Protocol):
 class ExactPerception:
     """Every vehicle sees everything at once and as it is, as the paper assumes."""
 
-    @property
-    def period(self) -> None:
-        """None: the wake-ups suffice."""
+    period = None  #: the wake-ups suffice
 
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
         """Begin a run."""
@@ -68,23 +66,16 @@ def see_all(view: View, ego: Observed) -> View:  # noqa: ARG001  (See's argument
 class Percept(NamedTuple):
     """What Algorithm 1 needs to know of a view.
 
-    Attributes:
-        participants: ids of the vehicles that take part, by lane. The front vehicle of a lane does
-            between the start of the yellow zone and the junction, until it is committed. While it
-            is committed, no vehicle of its lane takes part.
-        crossing: ids of the vehicles that are committed, or have any part of the body in the
-            junction.
-        case: the participants' movements as an integer, see `DecisionTable`.
-        occupied: the crossing vehicles' movements, bit k for the k-th movement; all movements of
-            the lane where the intent is `UNKNOWN`.
-        unknown: lanes of participants with `UNKNOWN` intent, bit i for lane i; not in the case.
+    The front vehicle of a lane takes part between the start of the yellow zone and the junction,
+    until it is committed. While it is committed, no vehicle of its lane takes part.
     """
 
-    participants: tuple[int, ...]
-    crossing: tuple[int, ...]
-    case: int
+    participants: tuple[int, ...]  #: ids of the vehicles that take part, by lane
+    crossing: tuple[int, ...]  #: of those that are committed, or partly in the junction
+    case: int  #: the participants' movements as an integer, see `DecisionTable`
+    #: The crossing vehicles' movements, bit k for the k-th; all of the lane for `UNKNOWN` intent.
     occupied: int
-    unknown: int = 0
+    unknown: int = 0  #: lanes of participants with `UNKNOWN` intent, bit i for lane i; not in case
 
 
 class Reader(NamedTuple):

@@ -54,15 +54,10 @@ def rotating(time: float, n: int, turn_time: float = TURN_TIME) -> Ranking:
 def longest_waiting(
     time: float, n: int, since: dict[int, float], memory: float, turn_time: float = TURN_TIME
 ) -> Ranking:
-    """Ranks by waiting time, counted up to `memory`.
+    """Ranks of n lanes by waiting time, counted up to `memory`; rotating ranks break ties [s].
 
-    Args:
-        time: now [s].
-        n: number of lanes.
-        since: lane -> when its front vehicle passed the start of the yellow zone [s]; any time at
-            least `memory` ago for a vehicle that was there before the observer.
-        memory: the time for which every participant has watched at least [s].
-        turn_time: of the rotating ranks, which break ties [s].
+    `since` is when the front vehicle of each lane passed the start of the yellow zone; any time at
+    least `memory` ago for a vehicle that was there before the observer.
     """
     turns = rotating(time, n, turn_time)
     waits = {lane: min(time - when, memory) for lane, when in since.items()}
@@ -73,11 +68,7 @@ def longest_waiting(
 
 
 def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> float:
-    """The time for which a vehicle has watched at least when it begins to take part [s].
-
-    Raises:
-        InputError: the sensors do not reach beyond the yellow zone.
-    """
+    """How long a vehicle has watched at least when it begins to take part [s]; or `InputError`."""
     room = sensor_range - zones.yellow_start
     if room <= 0.0:
         raise InputError(
@@ -88,11 +79,7 @@ def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> f
 
 
 class PassingTimes:
-    """When each vehicle passed the start of the yellow zone, as one observer saw it.
-
-    Args:
-        start: of the yellow zone [m before the junction].
-    """
+    """When each vehicle passed `start`, that of the yellow zone [m], as one observer saw it."""
 
     def __init__(self, start: float) -> None:
         self._start = start

@@ -36,11 +36,6 @@ class Zones:
     )  # fmt: skip
 
     @property
-    def hold_distance(self) -> float:
-        """The hold line's distance before the junction [m]."""
-        return self.green
-
-    @property
     def yellow_start(self) -> float:
         """Distance before the junction from which a vehicle takes part [m]."""
         return self.green + self.yellow

@@ -125,8 +125,9 @@ def _value(name: str, parameter: Parameter, value: Any) -> Any:
     call = Call(value) if isinstance(value, str) else value
     if not isinstance(call, Call):
         return value
-    word = choice(name, call.name.lower(), parameter.kinds)
-    return build(f"{name}={word}", parameter.kinds[word], call)
+    nothing = ("off", "none") if parameter.optional else ()
+    word = choice(name, call.name.lower(), (*parameter.kinds, *nothing))
+    return None if word in nothing else build(f"{name}={word}", parameter.kinds[word], call)
 
 
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:

@@ -71,14 +71,8 @@ class GapSession(PhaseSession):
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
         self._detector = signal.detector(site)
-        super().__init__(
-            site,
-            detector_range=self._detector,
-            marks=(self._detector - site.vehicle.length,),
-            min_green=signal.min_green,
-            amber=signal.amber,
-            order=signal.order,
-        )
+        marks = (self._detector - site.vehicle.length,)
+        super().__init__(site, self._detector, signal.min_green, signal.amber, marks, signal.order)
         self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 

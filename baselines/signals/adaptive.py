@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens, on_detector
-from minisim.control import Observed, Site, View
+from minisim.control import Site, View
 from minisim.parameters import Name, declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
@@ -60,14 +60,8 @@ class DelaySession(PhaseSession):
     """Which vehicles prolong a green, and by how much."""
 
     def __init__(self, signal: Adaptive, site: Site) -> None:
-        super().__init__(
-            site,
-            detector_range=signal.detector_range,
-            marks=(signal.detector_range,),
-            min_green=signal.min_green,
-            amber=signal.amber,
-            order=signal.order,
-        )
+        reach = signal.detector_range
+        super().__init__(site, reach, signal.min_green, signal.amber, (reach,), signal.order)
         self._signal = signal
         self._speed_limit = site.speed_limit
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
@@ -84,8 +78,13 @@ class DelaySession(PhaseSession):
         present = on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
         self._entered = {v.id: self._entered[v.id] for v in approaching}
-        delayed = [v for v in approaching if v.lane == lane and self._is_delayed(v, view.time)]
-        times = [v.distance / self._speed_limit for v in delayed]
+        limit, now = self._speed_limit, view.time
+        times = [
+            v.distance / limit
+            for v in approaching
+            if v.lane == lane
+            and time_loss(*self._entered[v.id], now, v.distance, limit) > signal.min_time_loss
+        ]
         in_time = [time for time in times if elapsed + time <= signal.max_green]
         prolongation = max(0.0, signal.min_green - elapsed, *in_time)
         idle = all(v.lane == lane for v in present)
@@ -94,10 +93,6 @@ class DelaySession(PhaseSession):
         else:
             prolongation = min(prolongation, signal.max_green - elapsed)
         return Verdict(lane, prolongation) if prolongation > 0.0 else self.pass_on(lane)
-
-    def _is_delayed(self, vehicle: Observed, now: float) -> bool:
-        lost = time_loss(*self._entered[vehicle.id], now, vehicle.distance, self._speed_limit)
-        return lost > self._signal.min_time_loss
 
 
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:

@@ -60,9 +60,8 @@ class FixedTime:
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
 
-        Raises:
-            InputError: as many greens as lanes are needed, `max_cycle` is too short, or `order`
-                is not all lanes, each once.
+        Raises `InputError`: as many greens as lanes are needed, `max_cycle` is too short, or
+        `order` is not all lanes, each once.
         """
         n = site.intersection.n
         if self.greens is None:
@@ -93,12 +92,8 @@ class FixedTime:
 class Program:
     """Lanes that are green in turn, over and over; the first turns green at time 0.
 
-    A program remembers nothing: what it shows follows from the time alone.
-
-    Args:
-        order: the lanes in the order of their greens.
-        greens: of each lane [s].
-        amber, all_red: after every green [s].
+    A program remembers nothing: what it shows follows from the time alone. `order` holds the lanes
+    in the order of their greens; times are in seconds.
     """
 
     def __init__(

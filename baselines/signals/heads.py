@@ -45,15 +45,14 @@ class Colour(Enum):
 class Heads:
     """The signal heads of a run, and the vehicles that they have let go.
 
-    Attributes:
-        colours: what each lane's head shows now. A head that should be green while a vehicle
-            still crosses its lane's way stays red (or amber) until that vehicle is clear.
+    `colours` is what each lane's head shows now. A head that should be green while a vehicle still
+    crosses its lane's way stays red (or amber) until that vehicle is clear.
     """
 
     def __init__(self, site: Site) -> None:
         n = site.intersection.n
         movements = site.intersection.movements
-        ways = [list(movements.of_lane(lane)) for lane in range(n)]
+        ways = [list(row[1:]) for row in movements.rows]
         self._rows = movements.rows
         # Nested lists: a plain lookup is much faster than one in a small array.
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])

@@ -48,12 +48,7 @@ class QueueSession(PhaseSession):
     """Which queue is the longest."""
 
     def __init__(self, signal: LongestQueue, site: Site) -> None:
-        super().__init__(
-            site,
-            detector_range=signal.detector_range,
-            min_green=signal.interval,
-            amber=signal.amber,
-        )
+        super().__init__(site, signal.detector_range, signal.interval, signal.amber)
         self._signal = signal
         self._last_green = [-math.inf] * site.intersection.n  # [s]
 

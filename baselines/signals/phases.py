@@ -33,33 +33,17 @@ class PhaseSession:
     """Shows green to one lane at a time; a subclass judges when a phase ends.
 
     It is called when its rule asked for it, when a vehicle clears the junction, and when one
-    passes a mark.
-
-    Args:
-        site: of the run.
-        detector_range: how far before the junction the rule sees [m].
-        marks: how far before the junction the rule must see every front bumper pass [m].
-        min_green: time from the start of a phase until the rule is asked [s].
-        amber: [s].
-        order: the lanes in the order of their greens; None is a, b, c….
-
-    Raises:
-        InputError: `order` is not all lanes, each once.
+    passes a mark. The rule sees `detector_range` [m] far before the junction, and is asked from
+    `min_green` after the start of a phase on. `marks` are where it must see front bumpers pass [m].
+    An `order` must be all lanes, each once (`InputError`); None is a, b, c….
     """
 
     def __init__(
-        self,
-        site: Site,
-        *,
-        detector_range: float,
-        min_green: float,
-        amber: float,
-        marks: tuple[float, ...] = (),
-        order: tuple[int, ...] | None = None,
-    ) -> None:
-        self.plan = Plan(
-            marks=marks, wake_on_clear=True, sight=max(detector_range, stopping_sight(site))
-        )
+        self, site: Site, detector_range: float, min_green: float, amber: float,
+        marks: tuple[float, ...] = (), order: tuple[int, ...] | None = None,
+    ) -> None:  # fmt: skip
+        sight = max(detector_range, stopping_sight(site))
+        self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
         self._order = full_order(order, site.intersection.n)
         self._heads = Heads(site)
         self._dt = site.dt

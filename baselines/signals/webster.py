@@ -45,17 +45,10 @@ def webster(
     Where Y > 0.95 the cycle is at most `max_cycle`, also where no optimum exists (Y ≥ 1).
     Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
     `min_green`. That lengthens the cycle; in a capped cycle the other lanes share the rest.
+    `rates` are the inflows of the lanes [veh/h]; L is `lost_time_per_phase` [s] times their number.
+    `equal_greens` divides the greens equally instead of in proportion to the inflows.
 
-    Args:
-        rates: inflow of each lane [veh/h].
-        saturation_flow: of a lane [veh/h].
-        lost_time_per_phase: [s]; L is this times the number of lanes.
-        equal_greens: divide the greens equally instead of in proportion to the inflows.
-        min_green: [s].
-        max_cycle: [s].
-
-    Raises:
-        InputError: a value out of range, or a `max_cycle` without room for the minimal greens.
+    Raises `InputError`: a value out of range, or no room for the minimal greens in `max_cycle`.
     """
     flows = numbers("rates [veh/h]", rates)
     if not flows:

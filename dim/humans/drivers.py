@@ -78,17 +78,11 @@ class Humans:
 
 
 class Driver(NamedTuple):
-    """One vehicle's driver.
+    """One vehicle's driver."""
 
-    Attributes:
-        human: whether a human drives; otherwise the vehicle follows DIM.
-        careless: 0 … 1; it signals no turn for which a larger share of drivers does not.
-        gap: factor on the critical gaps.
-    """
-
-    human: bool
-    careless: float
-    gap: float
+    human: bool  #: otherwise the vehicle follows DIM
+    careless: float  #: 0 … 1; it signals no turn for which a larger share of drivers does not
+    gap: float  #: factor on the critical gaps
 
 
 class Drivers:

@@ -158,7 +158,7 @@ class _Humans:
         humans, zones = mixed.humans, mixed.dim.zones
         self._humans, self._drivers, self._readings = humans, readings.drivers, readings
         self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
-        self._line = zones.hold_distance + LINE
+        self._line = zones.green + LINE
         self._yellow = zones.yellow_start + ROUNDING
         self._dt = site.dt
         longest = max(humans.critical_gaps) * (1.0 + 3.0 * humans.deviation)

@@ -59,8 +59,7 @@ class CheckedSession:
     def decide(self, view: View) -> Iterable[Command]:
         """DIM's commands, checked.
 
-        Raises:
-            ConformanceError: an event since the last view, or a command, is not possible.
+        Raises `ConformanceError`: an event since the last view, or a command, is not possible.
         """
         commands = list(self._session.decide(view))
         self._follow(view)

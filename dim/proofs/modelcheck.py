@@ -60,8 +60,7 @@ def explore(
 ) -> Exploration:
     """Visit every reachable state, nearest first, or stop after the nearest unsafe ones.
 
-    Raises:
-        InputError: there are more than `max_states`.
+    Raises `InputError` for more than `max_states`.
     """
     instance("protocol", protocol, Protocol)
     integer("max_states", max_states, low=1)

@@ -59,22 +59,16 @@ class Claim:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The result of all n^n − 1 cases of a matrix, by the rules of `dim.decide`.
-
-    Attributes:
-        sizes: cases by the number of vehicles that may go.
-        ties: cases by the number of cliques of the largest size.
-        worst: of the cases with the most such cliques, by that size: the first one, and their
-            number.
-    """
+    """The result of all n^n − 1 cases of a matrix, by the rules of `dim.decide`."""
 
     matrix: HarmonyMatrix
     order: str
     priorities: tuple[int, ...]
     cases: int
     claims: tuple[Claim, ...]
-    sizes: Mapping[int, int]
-    ties: Mapping[int, int]
+    sizes: Mapping[int, int]  #: cases by the number of vehicles that may go
+    ties: Mapping[int, int]  #: cases by the number of cliques of the largest size
+    #: Of the cases with the most such cliques, by that size: the first one, and their number.
     worst: Mapping[int, tuple[Movements, int]]
 
     @property
@@ -106,8 +100,7 @@ def analyse(
 ) -> Analysis:
     """Try all cases of a matrix; 6 arms (46,655 cases) take about 20 s.
 
-    Raises:
-        InputError: unknown order, priorities that are no permutation, or too many cases (8 arms).
+    Raises `InputError`: unknown order, no permutation, or too many cases (8 arms).
     """
     table = DecisionTable(matrix, order, priorities)
     if len(table) > MAX_CASES:
@@ -115,12 +108,37 @@ def analyse(
             f"{matrix.n} arms have {len(table)} cases, too many to try them all "
             f"(at most {MAX_CASES})"
         )
-    tally = _Tally(table)
+    checks = Case(table)
+    failures: Counter[str] = Counter()
+    examples: dict[str, Movements] = {}
+    sizes: Counter[int] = Counter()
+    ties: Counter[int] = Counter()
+    worst: dict[int, tuple[Movements, int]] = {}
     for case, movements in enumerate(table, start=1):
-        tally.add(case, movements)
+        cliques = brute_force(movements, matrix)
+        for name, holds in zip(Case.CLAIMS, checks.check(case, movements, cliques), strict=True):
+            if not holds:
+                failures[name] += 1
+                examples[name] = min(examples.get(name, movements), movements, key=len)
+        sizes[table.lanes(case).bit_count()] += 1
+        tied = len(cliques.largest)
+        if tied > max(ties, default=0):
+            worst = {}
+        ties[tied] += 1
+        if tied == max(ties):
+            size = cliques.largest[0].bit_count()
+            first, count = worst.get(size, (movements, 0))
+            worst[size] = first, count + 1
         if progress is not None and (case % 256 == 0 or case == len(table)):
             progress(case, len(table))
-    return tally.result()
+    claims = tuple(
+        Claim(name, text, len(table), failures[name], examples.get(name))
+        for name, text in Case.CLAIMS.items()
+    )
+    return Analysis(
+        matrix, table.order, table.priorities, len(table), claims,
+        dict(sorted(sizes.items())), dict(sorted(ties.items())), dict(sorted(worst.items())),
+    )  # fmt: skip
 
 
 def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
@@ -234,48 +252,6 @@ class Case:
                 sum(1 << m.origin for m in clique) == decision for clique in chosen
             )
         return self._same_order[graph]
-
-
-class _Tally:
-    """Counts over the cases."""
-
-    def __init__(self, table: DecisionTable) -> None:
-        self.table, self.case = table, Case(table)
-        self.failures: Counter[str] = Counter()
-        self.examples: dict[str, Movements] = {}
-        self.sizes: Counter[int] = Counter()
-        self.ties: Counter[int] = Counter()
-        self.worst: dict[int, tuple[Movements, int]] = {}
-
-    def add(self, case: int, movements: Movements) -> None:
-        cliques = brute_force(movements, self.table.matrix)
-        answers = self.case.check(case, movements, cliques)
-        for name, holds in zip(self.case.CLAIMS, answers, strict=True):
-            if not holds:
-                self.failures[name] += 1
-                self.examples[name] = min(self.examples.get(name, movements), movements, key=len)
-        self.sizes[self.table.lanes(case).bit_count()] += 1
-        tied = len(cliques.largest)
-        if tied > max(self.ties, default=0):
-            self.worst = {}
-        self.ties[tied] += 1
-        if tied == max(self.ties):
-            size = cliques.largest[0].bit_count()
-            first, count = self.worst.get(size, (movements, 0))
-            self.worst[size] = first, count + 1
-
-    def result(self) -> Analysis:
-        table, tried = self.table, self.sizes.total()
-        claims = tuple(
-            Claim(name, text, tried, self.failures[name], self.examples.get(name))
-            for name, text in Case.CLAIMS.items()
-        )
-        return Analysis(
-            table.matrix, table.order, table.priorities, tried, claims,
-            sizes=dict(sorted(self.sizes.items())),
-            ties=dict(sorted(self.ties.items())),
-            worst=dict(sorted(self.worst.items())),
-        )  # fmt: skip
 
 
 def most_cliques(k: int) -> int:

@@ -30,21 +30,15 @@ Table = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Lane:
-    """Intents of one approach lane.
+    """Intents of one approach lane."""
 
-    Attributes:
-        straight: the manoeuvre that needs no signal.
-        silent: of each manoeuvre, the probability that it is driven without a signal.
-        error, kind: how often, and how (see `KINDS`), a shown intent is misread.
-        doubt: of each manoeuvre, the share of its readings that are wrong if all are equally
-            frequent.
-    """
-
-    straight: int
-    silent: tuple[float, ...]
-    error: float
-    kind: str
-    doubt: tuple[float, ...]
+    straight: int  #: the manoeuvre that needs no signal
+    silent: tuple[float, ...]  #: probability of each manoeuvre to be driven without a signal
+    error: float  #: how often a shown intent is misread
+    kind: str  #: and how, see `KINDS`
+    doubt: tuple[
+        float, ...
+    ]  #: share of wrong readings of each manoeuvre, if all are equally frequent
 
     @classmethod
     def of(
@@ -119,12 +113,7 @@ def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float
     a·c^(a−1) on (0, 1), a = (1−e)/e. Their mean is 1−e, and they spread as a classifier's do.
     Calibration then multiplies the density by c/(1−e) for right readings and by (1−c)/e for wrong
     ones: Beta(a+1, 1), the distribution of U^e, and Beta(a, 2), that of U^e·V^(e/(1−e)), for
-    uniform U and V.
-
-    Args:
-        doubt: e, how likely such a reading is wrong.
-        right: whether this one is right.
-        chances: U and V.
+    uniform U and V. Here `doubt` is e, `chances` are U and V, and `right` says which of the two.
     """
     if doubt <= 0.0:
         return 1.0
@@ -133,18 +122,3 @@ def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float
     u, v = chances
     sure = math.pow(u, doubt)
     return sure if right else sure * math.pow(v, doubt / (1.0 - doubt))
-
-
-def leftover_error(doubt: float, threshold: float) -> float:
-    """The share of readings that are wrong and at least as sure as a threshold.
-
-    ∫ (1−c)·a·c^(a−1) dc from t to 1 = e − t^a + (1−e)·t^(a+1), see `confidence`.
-
-    Args:
-        doubt: e, the share of wrong readings, in [0, 1].
-        threshold: t, in [0, 1].
-    """
-    if doubt <= 0.0 or doubt >= 1.0:
-        return float(doubt >= 1.0 and threshold <= 0.0)
-    a = (1.0 - doubt) / doubt
-    return float(doubt - threshold**a + (1.0 - doubt) * threshold ** (a + 1.0))

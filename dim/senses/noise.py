@@ -30,9 +30,6 @@ CLASSIFIER = 0.15
 #: 2012-01-0261 (Ponziani) counts 25 % of all turns.
 UNSIGNALLED = (0.29, 0.25)
 
-#: How often sensors look [s]: 10 Hz, as rotating lidars and V2V safety messages do.
-FRAME = 0.1
-
 #: Stands for all observers, or for all time, where a draw asks for one.
 _ALL = -1
 
@@ -83,9 +80,9 @@ class NoisyPerception:
         "standard deviation of the others' speeds, drawn anew each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
-    # What happens between two looks is seen late: a vehicle that becomes committed, up to a frame
-    # later, 0.6 m at 20 km/h.
-    frame: float = real("time between two looks", "s", low=0.01, high=1, default=FRAME)
+    # 10 Hz, as rotating lidars and V2V safety messages. What happens between two looks is seen
+    # late: a vehicle that becomes committed, up to a frame later, 0.6 m at 20 km/h.
+    frame: float = real("time between two looks", "s", low=0.01, high=1, default=0.1)
 
     @property
     def misreads(self) -> bool:

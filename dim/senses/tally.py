@@ -24,12 +24,7 @@ from minisim.control import View
 
 
 class Tally:
-    """The counts of one run.
-
-    Args:
-        rules, reader: those of the vehicles.
-        start: how far before the junction the yellow zone begins [m].
-    """
+    """The counts of one run; the yellow zone begins `start` [m] before the junction."""
 
     def __init__(self, rules: Rules, reader: Reader, start: float) -> None:
         self._rules, self._reader, self._start = rules, reader, start
@@ -60,11 +55,8 @@ class Tally:
     ) -> None:
         """Count one look around.
 
-        Args:
-            true: what vehicles would see without an error.
-            sights: what each vehicle that follows DIM has seen, by its id.
-            table: the present one.
-            going: ids of the vehicles that now have the right of way.
+        `true` is what vehicles would see without an error, `sights` what each vehicle that follows
+        DIM has seen. Those in `going` now have the right of way.
         """
         passed, self._since = true.time - self._since, true.time
         self._disagreement += passed * self._disagree

@@ -39,14 +39,10 @@ class Region(NamedTuple):
     Rows are positions of the first vehicle's front past the entry; columns are those of the
     second's. A position before the entry counts as the entry. One past the grid is out of the
     region.
-
-    Attributes:
-        close: whether the bodies come closer than `CLOSE` within one step of the grid point.
-        ever: whether they come closer than `CLEARANCE` at this or a later position of the second.
     """
 
-    close: Bools
-    ever: Bools
+    close: Bools  #: whether bodies come closer than `CLOSE` within one step of the grid point
+    ever: Bools  #: and closer than `CLEARANCE` at this or a later position of the second
 
     def room(self, first: float, second: float) -> float:
         """How far the first may still go, wherever the second goes [m]; may be infinite."""
@@ -90,12 +86,8 @@ def passes(
 ) -> bool:  # fmt: skip
     """Whether a vehicle on one path can pass a vehicle that stands on another path.
 
-    All the way it needs a room of `CLOSE` by the grid or, measured, of more than `TIGHT`.
-
-    Args:
-        intersection, vehicle: where, and how large both are.
-        first, second: movements by index.
-        x, y: how far past the entry their fronts are [m].
+    All the way it needs a room of `CLOSE` by the grid or, measured, of more than `TIGHT`. Movements
+    are indices; `x` and `y` are how far past the entry the fronts are [m].
     """
     shared = region(intersection, vehicle, first, second)
     if shared is None or shared.way(x, y) == math.inf:

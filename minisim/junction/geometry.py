@@ -17,10 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from minisim.errors import InputError, instance, number, numbers
+from minisim.errors import InputError, number, numbers
 from minisim.junction.movements import ARM_NAMES, Movement, Movements, movements_of
 from minisim.junction.paths import ARC_SEGMENTS, Path, Way
-from minisim.parameters import checked, declared, real, word
+from minisim.parameters import checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
@@ -66,12 +66,6 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
     return bearings
 
 
-def _ways(name: str, value: Any) -> Any:
-    """Check that the curves are a tuple, which can be hashed."""
-    instance(name, value, tuple)
-    return value
-
-
 def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
     """Angles between neighbouring arms [deg], from the first arm on."""
     return (b - a for a, b in pairwise((*bearings, bearings[0] + 360.0)))
@@ -102,10 +96,10 @@ class Intersection:
     arm_length: float = real(
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
-    ways: tuple[Way, ...] | None = checked(
-        "another simulator's curves through the junction, in the order of `movements`; none is the "
-        "arcs",
-        _ways, "a Way a movement", optional=True, default=None,
+    ways: tuple[Way, ...] | None = part(
+        "another simulator's curves through the junction, a Way a movement, in their order; none "
+        "is the arcs",
+        tuple, optional=True, default=None,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -206,16 +200,10 @@ class Intersection:
             points[-1] = end
         entry = self.approach_length
         return Path(
-            movement=movement,
-            exit_arm=self.exit_arm(movement),
-            entry=entry,
-            exit=entry + length,
-            length=entry + length + entry,
-            radius=radius,
-            points=points,
-            heading_in=heading_in,
-            heading_out=heading_out,
-        )
+            movement, self.exit_arm(movement), entry=entry, exit=entry + length,
+            length=entry + length + entry, radius=radius, points=points,
+            heading_in=heading_in, heading_out=heading_out,
+        )  # fmt: skip
 
     def _check_ways(self) -> None:
         if self.ways is None:

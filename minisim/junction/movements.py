@@ -31,26 +31,18 @@ class Movements(tuple[Movement, ...]):
 
     A movement's place in this order is its index: its row and column in every table, and its bit
     in every integer that stands for a set of movements. `movements_of` makes them.
-
-    Attributes:
-        n: number of arms.
-        names: such as a1.
-        origins, manoeuvres, exits: arm of origin, manoeuvre and arm of exit by index, shape (m,).
-        apart: whether two movements come from different arms, shape (m, m).
-        index_of: index by lane and manoeuvre, shape (n, n); −1 for manoeuvre 0.
-        rows: the same as nested tuples, which are quicker for one look-up at a time.
-        bits: bit by lane and manoeuvre. Manoeuvre 0 stands for an unknown one and has the bits of
-            all movements of its lane.
     """
 
-    n: int
-    names: tuple[str, ...]
-    origins: Ints
-    manoeuvres: Ints
-    exits: Ints
-    apart: Bools
-    index_of: Ints
+    n: int  #: number of arms
+    names: tuple[str, ...]  #: such as a1
+    origins: Ints  #: arm of origin by index, shape (m,)
+    manoeuvres: Ints  #: likewise
+    exits: Ints  #: arm of exit, likewise
+    apart: Bools  #: whether two movements come from different arms, shape (m, m)
+    index_of: Ints  #: index by lane and manoeuvre, shape (n, n); −1 for manoeuvre 0
+    #: The same as nested tuples, which are quicker for one look-up at a time.
     rows: tuple[tuple[int, ...], ...]
+    #: Bit by lane and manoeuvre; manoeuvre 0 is an unknown one, with the bits of all of its lane.
     bits: tuple[tuple[int, ...], ...]
     _numbers: dict[Movement | str, int]
 
@@ -86,10 +78,6 @@ class Movements(tuple[Movement, ...]):
                 f"no movement {show(movement)} in an intersection of {self.n} arms: a lane a … "
                 f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.n - 1}, such as a1"
             ) from None
-
-    def of_lane(self, lane: int) -> tuple[int, ...]:
-        """Indices of a lane's movements, manoeuvre 1 first."""
-        return self.rows[lane][1:]
 
 
 @lru_cache

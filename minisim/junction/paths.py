@@ -24,17 +24,11 @@ ARC_SEGMENTS = 32
 
 
 class Way(NamedTuple):
-    """Another simulator's curve through the junction.
+    """Another simulator's curve through the junction."""
 
-    Attributes:
-        points: x, y of its polyline from entry to exit [m].
-        length: what a vehicle drives on it [m]; simulators round it.
-        wait: distance from the entry to the waiting position inside the junction, which SUMO gives
-            to some far turns [m]; 0 where there is none.
-    """
-
-    points: tuple[tuple[float, float], ...]
-    length: float
+    points: tuple[tuple[float, float], ...]  #: x, y of its polyline from entry to exit [m]
+    length: float  #: what a vehicle drives on it [m]; simulators round it
+    #: From the entry to the waiting position inside, which SUMO gives to some far turns [m], or 0.
     wait: float = 0.0
 
     def resampled(self, count: int) -> Floats:
@@ -53,26 +47,17 @@ def distances_along(points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The path of one movement: approach lane, arc, exit lane.
-
-    Attributes:
-        movement, exit_arm: the movement, and the index of the arm that it leaves by.
-        entry, exit: `s` of the junction's entry and exit [m].
-        length: `s` at the end of the exit lane [m].
-        radius: of the arc [m]; infinite when straight.
-        points: polyline from entry to exit, equally spaced [m], shape (ARC_SEGMENTS + 1, 2).
-        heading_in, heading_out: unit vectors on the approach and exit lane, shape (2,).
-    """
+    """The path of one movement: approach lane, arc, exit lane."""
 
     movement: Movement
-    exit_arm: int
-    entry: float
-    exit: float
-    length: float
-    radius: float
-    points: Floats
-    heading_in: Floats
-    heading_out: Floats
+    exit_arm: int  #: index of the arm that it leaves by
+    entry: float  #: `s` of the junction's entry [m]
+    exit: float  #: and of its exit [m]
+    length: float  #: `s` at the end of the exit lane [m]
+    radius: float  #: of the arc [m]; infinite when straight
+    points: Floats  #: from entry to exit, equally spaced [m], shape (ARC_SEGMENTS + 1, 2)
+    heading_in: Floats  #: unit vector on the approach lane, shape (2,)
+    heading_out: Floats  #: and on the exit lane
 
     @property
     def crossing(self) -> float:
@@ -125,16 +110,10 @@ class Path:
 def locate(
     points: Sequence[Sequence[float]], headings: Sequence[float], crossing: float, past: float
 ) -> tuple[float, float]:
-    """`Path.position` of one point, in plain floats.
+    """`Path.position` of one point, `past` the junction entry [m], in plain floats.
 
-    It takes lists and arrays alike: the kernel compiles it, and plain Python calls it millions of
-    times.
-
-    Args:
-        points: `Path.points`.
-        headings: `Path.heading_in` and `Path.heading_out`, four numbers.
-        crossing: `Path.crossing` [m].
-        past: distance past the junction entry [m].
+    `headings` are the four numbers of `Path.heading_in` and `Path.heading_out`. It takes lists and
+    arrays alike: the kernel compiles it, and plain Python calls it millions of times.
     """
     last = len(points) - 1
     if past <= 0.0:

@@ -37,9 +37,6 @@ RESERVED: Final = frozenset({
     "scenario", "seed", "side", "split", "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
 
-#: Phases of a trip: from insertion to leaving, and from demand to insertion.
-PHASES: Final = ("drive", "queue")
-
 
 def _name(title: str, value: Any) -> Any:
     if not isinstance(value, str) or not value.isidentifier() or value in RESERVED:
@@ -77,7 +74,7 @@ class Metric:
     )
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
-        PHASES, default="drive",
+        ("drive", "queue"), default="drive",
     )  # fmt: skip
     title: str = text("for headings and axes; empty is its name", default="")
     symbol: str = text("in equations", default="")
@@ -96,11 +93,7 @@ class Metric:
         return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
 
     def values(self, subject: Run | Trips, count: int) -> Floats:
-        """One value a trip, shape (count,), NaN where there is none.
-
-        Raises:
-            InputError: the function returned something else.
-        """
+        """One value a trip, shape (count,), NaN where there is none; `InputError` for others."""
         given = self._measured(subject)
         if METRICS.get(self.name) is self:
             return given  # type: ignore[no-any-return]  # ours are tested; each summary asks
@@ -113,11 +106,7 @@ class Metric:
         return np.asarray(values, dtype=float)
 
     def number(self, subject: Run | Trips) -> float | int | None:
-        """One number, or None where there is none.
-
-        Raises:
-            InputError: the function returned something else.
-        """
+        """One number, or None where there is none; raises `InputError` for anything else."""
         given = self._measured(subject)
         plain = given.item() if isinstance(given, np.generic) else given
         if plain is None or type(plain) is int:
@@ -144,12 +133,9 @@ def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 
 
     A vehicle is present from demand to arrival, so queues before the road count too. The numbers
     are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
-    needed. `scenarios.statistics.growing` tells which growth is more than chance.
-
-    Args:
-        demand_time, leave: of the trips [s], shape (k,); `leave` is infinite where not reached.
-        end: of the run [s].
-        start: end of the warm-up [s]; the quarters divide the time after it.
+    needed. `scenarios.statistics.growing` tells which growth is more than chance. Arrays have shape
+    (k,), all times are in s; `leave` is infinite where not reached. `start` ends the warm-up; the
+    quarters divide the time after it.
     """
     length = (end - start) / 4.0
     if length <= 0.0:  # the run was stopped during its warm-up
@@ -253,21 +239,17 @@ TABLE: Final = (
         )
         for name, limit in PETS.items()
     ),
-    Metric(
-        "crossings", _tally("crossings"), needs="counts", title="crossings",
-        meaning="vehicles that entered the junction, where perception errs",
-    ),
-    Metric(
-        "false_grants", _tally("false_grants"), needs="counts", title="false grants",
-        meaning="rights of way that the true view would not have given",
-    ),
-    Metric(
-        "disagreement_s", _tally("disagreement_s"), "s", needs="counts", title="disagreement",
-        meaning="time in which vehicles had chosen different cliques",
-    ),
-    Metric(
-        "deadlock_s", _tally("deadlock_s"), "s", needs="counts", title="deadlock",
-        meaning="time in which vehicles stood and none had the right of way",
+    *(
+        Metric(
+            name, _tally(name), "s" * name.endswith("_s"), needs="counts", meaning=meaning,
+            title=name.removesuffix("_s").replace("_", " "),
+        )
+        for name, meaning in (
+            ("crossings", "vehicles that entered the junction, where perception errs"),
+            ("false_grants", "rights of way that the true view would not have given"),
+            ("disagreement_s", "time in which vehicles had chosen different cliques"),
+            ("deadlock_s", "time in which vehicles stood and none had the right of way"),
+        )
     ),
 )  # fmt: skip
 
@@ -290,11 +272,7 @@ SPREAD: Final = ("p50", "p95", "max")
 
 
 def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
-    """The metrics that a caller asks for, by name or as its own `Metric`, each once.
-
-    Raises:
-        InputError: no sequence, an unknown name, or two metrics of one name.
-    """
+    """What a caller asks for, each once; `InputError` for no sequence, unknown or equal names."""
     asked: dict[str, Metric] = {}
     for metric in items("metrics", metrics, "names and Metrics"):
         if not isinstance(metric, Metric):

@@ -70,33 +70,21 @@ def environment() -> Mapping[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The result of a run.
-
-    Attributes:
-        scenario, controller, seed: what was run.
-        site, plan: what the controller knew and asked for.
-        collisions: each pair of vehicles once.
-        columns: all trips as arrays.
-        record: what was recorded of the trajectories: "junction", "all" or None.
-        trace, rows: the recording, and each row's vehicle id and path.
-        counts: what the controller's session counted.
-        kinds: kind of each vehicle by id; empty where all are of one kind.
-        host: what moved the vehicles, for the provenance: `host`, and perhaps its version.
-        environment: versions, for the provenance.
-    """
+    """The result of a run."""
 
     scenario: ScenarioLike
     controller: Controller
     seed: int
-    site: Site
-    plan: Plan
-    collisions: tuple[Collision, ...]
-    columns: Trips
-    record: str | None
-    trace: Records
-    rows: Records
-    counts: Mapping[str, float] = field(default_factory=dict)
-    kinds: tuple[str, ...] = ()
+    site: Site  #: what the controller knew
+    plan: Plan  #: what it asked for
+    collisions: tuple[Collision, ...]  #: each pair of vehicles once
+    columns: Trips  #: all trips as arrays
+    record: str | None  #: what was recorded of the trajectories: "junction", "all" or None
+    trace: Records  #: the recording
+    rows: Records  #: vehicle id and path of each of its rows
+    counts: Mapping[str, float] = field(default_factory=dict)  #: of the controller's session
+    kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty where all are of one kind
+    #: What moved the vehicles, for the provenance: `host`, and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
     environment: Mapping[str, str] = field(default_factory=environment)
 
@@ -144,21 +132,14 @@ class Run:
     @property
     def provenance(self) -> dict[str, str]:
         """Versions and parameters: all that is needed to run it again."""
-        return {
-            **self.environment,
-            "scenario": repr(self.scenario),
-            "controller": repr(self.controller),
-            "seed": str(self.seed),
-            **self.host,
-        }
+        what = {"scenario": repr(self.scenario), "controller": repr(self.controller)}
+        return {**self.environment, **what, "seed": str(self.seed), **self.host}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the run to one file; see `minisim.results.saved`.
 
-        Raises:
-            MissingExtraError: pyarrow is not installed.
-            InputError: the site is not made of our classes.
-            FileError: the file cannot be written; nothing is left behind.
+        Raises `MissingExtraError` without pyarrow, `InputError` for a site that is not made of our
+        classes, and `FileError` where the file cannot be written; then nothing is left behind.
         """
         from minisim.results.saved import save
 
@@ -168,9 +149,8 @@ class Run:
     def load(cls, path: str | os.PathLike[str]) -> Run:
         """Read a run that `save` has written.
 
-        Raises:
-            MissingExtraError: pyarrow is not installed.
-            FileError: no such file, no saved run, a damaged one, or one of another layout.
+        Raises `MissingExtraError` without pyarrow, and `FileError` for no such file, no saved run,
+        a damaged one, or one of another layout.
         """
         from minisim.results.saved import load
 
@@ -188,11 +168,7 @@ class Run:
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
-        """One row a vehicle and step, columns `minisim.results.trajectories.TRAJECTORY_COLUMNS`.
-
-        Raises:
-            InputError: nothing was recorded.
-        """
+        """One row a vehicle and step, columns `TRAJECTORY_COLUMNS`; `InputError` for no record."""
         import pandas as pd
 
         if self.record is None:

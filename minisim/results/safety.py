@@ -36,7 +36,7 @@ from minisim.results.trajectories import (
     TIME,
     VEHICLE,
     S,
-    check_trajectories,
+    check_columns,
     movement_index,
 )  # fmt: skip
 from minisim.results.trips import Ints
@@ -60,13 +60,10 @@ class Rows(NamedTuple):
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls of a recording; None where nothing of the kind happened.
 
-    Returns:
-        `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
-        `max_braking_mps2`, the number of encroachments `pets`, and the numbers of short ones
-        (`minisim.results.metrics.PETS`).
-
-    Raises:
-        InputError: a column is missing, or the site does not have a movement.
+    They are `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
+    `max_braking_mps2`, the number of encroachments `pets`, and the numbers of short ones
+    (`minisim.results.metrics.PETS`). Raises `InputError` for a missing column, or a movement that
+    the site does not have.
     """
     rows = _rows(frame, site)
     follow = following(rows, site)
@@ -97,9 +94,8 @@ def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
 def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Every follower and its leader at every step.
 
-    Returns:
-        Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN
-        while not closing, and 0 where bodies overlap. DRAC is NaN without a gap.
+    Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN while not
+    closing, and 0 where bodies overlap. DRAC is NaN without a gap.
     """
     rows = _rows(frame, site)
     in_lane, to_exit = _leaders_in_lane(rows, site), _leaders_to_exit(rows, site)
@@ -123,10 +119,8 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Every two vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle that is inside when its recording ends counts as leaving then. A vehicle whose entry
-    was not recorded does not count.
-
-    Returns:
-        Columns `time_s` (the second enters), `first, second, pet_s`, sorted by time.
+    was not recorded does not count. Columns `time_s` (the second enters), `first, second, pet_s`,
+    sorted by time.
     """
     rows = _rows(frame, site)
     areas = conflict_areas(site.intersection, site.vehicle)
@@ -154,11 +148,7 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
 
 
 def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
-    """Every step at which two vehicles with right of way are on a crossing course.
-
-    Returns:
-        Columns `time_s, first, second, ttc_s`.
-    """
+    """Every step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
     rows = _rows(frame, site)
     areas = conflict_areas(site.intersection, site.vehicle)
     clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
@@ -194,7 +184,7 @@ def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
     if isinstance(frame, Rows):
         return frame
     instance("site", site, Site)
-    check_trajectories(frame)
+    check_columns(frame)
     frame = frame.sort_values([TIME, VEHICLE])
     time, s, speed = (frame[name].to_numpy(dtype=float) for name in (TIME, S, SPEED))
     movement = movement_index(frame, site)

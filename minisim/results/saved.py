@@ -153,11 +153,7 @@ def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
 
 
 def written(value: object) -> Any:
-    """A value as JSON; `made` reads it.
-
-    Raises:
-        InputError: something that is no number, text, array, collection or object of our classes.
-    """
+    """A value as JSON, which `made` reads; raises `InputError` for what is not of our classes."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
@@ -182,11 +178,7 @@ def written(value: object) -> Any:
 
 
 def made(data: Any) -> Any:
-    """The value that `written` wrote.
-
-    Raises:
-        InputError: something else.
-    """
+    """The value that `written` wrote; raises `InputError` for anything else."""
     match data:
         case None | bool() | str() | int() | float():
             return data

@@ -64,9 +64,8 @@ def summarise(
             also gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
         by: more groups, "movement".
 
-    Raises:
-        InputError: an unknown metric or group; a metric that needs trajectories where none were
-            recorded; a metric whose function returns the wrong type or shape.
+    Raises `InputError` for an unknown metric or group, a metric that needs trajectories where none
+    were recorded, and a metric whose function returns the wrong type or shape.
     """
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]

@@ -46,12 +46,10 @@ _FCD_HEAD: Final = (
 def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     """Write `run.trajectories` as CSV or Parquet, by the suffix of `path`.
 
-    Raises:
-        InputError: a column is missing, or another suffix.
-        MissingExtraError: Parquet without pyarrow.
-        FileError: the file cannot be written; nothing is left behind.
+    Raises `InputError` for a missing column or another suffix, `MissingExtraError` for Parquet
+    without pyarrow, and `FileError` if it cannot be written; then nothing is left behind.
     """
-    check_trajectories(frame)
+    check_columns(frame)
     write_table(frame, path)
 
 
@@ -60,7 +58,7 @@ def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
 
     Raises as `write_trajectories`.
     """
-    _check_columns(frame, TRIP_COLUMNS)
+    check_columns(frame, TRIP_COLUMNS)
     write_table(frame, path)
 
 
@@ -71,12 +69,11 @@ def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> 
     from north, and `pos` is the front bumper's distance from the start of its lane [m]. Lanes are
     named `a_in_0` (approach), `:C_a1_0` (inside the junction, by movement) and `b_out_0` (exit).
 
-    Raises:
-        InputError: a column is missing, or a movement that the site does not have.
-        FileError: the file cannot be written; nothing is left behind.
+    Raises `InputError` for a missing column or a movement that the site does not have, and
+    `FileError` if it cannot be written; then nothing is left behind.
     """
     instance("site", site, Site)
-    check_trajectories(frame)
+    check_columns(frame)
     movement = movement_index(frame, site)
     with replacing(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(_FCD_HEAD)
@@ -84,17 +81,8 @@ def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> 
         file.write("</fcd-export>\n")
 
 
-def check_trajectories(frame: pd.DataFrame) -> None:
-    """Raise `InputError` unless `frame` is a DataFrame with all `TRAJECTORY_COLUMNS`."""
-    _check_columns(frame, TRAJECTORY_COLUMNS)
-
-
 def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
-    """Each row's movement as an index into `site.intersection.movements`, shape (rows,).
-
-    Raises:
-        InputError: a lane or manoeuvre that the site does not have.
-    """
+    """Each row's movement by index, shape (rows,); raises `InputError` for what is not there."""
     n = site.intersection.n
     codes, names = frame[LANE].factorize()
     index = {name: k for k, name in enumerate(ARM_NAMES[:n])}
@@ -112,7 +100,8 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
     return np.asarray(site.intersection.movements.index_of[lanes[codes], manoeuvre])
 
 
-def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
+def check_columns(frame: pd.DataFrame, columns: Iterable[str] = TRAJECTORY_COLUMNS) -> None:
+    """Raise `InputError` unless `frame` is a DataFrame with all these columns."""
     import pandas as pd
 
     instance("frame", frame, pd.DataFrame)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any
 
@@ -11,7 +10,7 @@ import typer
 
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.terminal import show_json
+from scenarios.cli.shared.terminal import show_json, wrapped
 
 
 @app.command(
@@ -37,7 +36,7 @@ def controllers(
             return
         width = max(map(len, meanings)) + 2
         for known, meaning in meanings.items():
-            typer.echo(_wrapped(f"{known:{width}}{meaning}", width))
+            typer.echo(wrapped(f"{known:{width}}{meaning}", width))
         return
     ours = name.partition(":")[0]
     make = maker_of(ours if ours in CONTROLLERS else name)
@@ -45,12 +44,12 @@ def controllers(
     if as_json:
         show_json({"name": name, "meaning": meaning, "parameters": parameters})
         return
-    typer.echo(_wrapped(f"{name}: {meaning}", 0))
+    typer.echo(wrapped(f"{name}: {meaning}", 0))
     _show_parameters(parameters)
     for parameter in parameters:
         for word, kind in parameter["kinds"].items():
             if kind["parameters"]:
-                typer.echo("\n" + _wrapped(f"{parameter['name']}={word}: {kind['meaning']}", 0))
+                typer.echo("\n" + wrapped(f"{parameter['name']}={word}: {kind['meaning']}", 0))
                 _show_parameters(kind["parameters"])
 
 
@@ -89,8 +88,4 @@ def _show_parameters(parameters: list[dict[str, Any]]) -> None:
         allowed = f"  ({it['allowed']})" if it["allowed"] else ""
         typer.echo(f"\n  {it['name']}{default}{unit}{allowed}")
         if it["meaning"]:
-            typer.echo(_wrapped(f"      {it['meaning']}", 6))
-
-
-def _wrapped(text: str, indent: int) -> str:
-    return textwrap.fill(text, 80, subsequent_indent=" " * indent, break_long_words=False)
+            typer.echo(wrapped(f"      {it['meaning']}", 6))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import typer
+
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.terminal import show, show_json
+from scenarios.cli.shared.terminal import show_json, wrapped
 
 #: What is printed about a metric.
 SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation", "usual")
@@ -20,9 +22,12 @@ SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation"
 def metrics(as_json: options.AsJson = False) -> None:
     """List what is measured: names, units, meanings and equations."""
     from minisim.results.metrics import TABLE
-    from scenarios.cli.shared.report import metrics_table
 
     if as_json:
         show_json([{key: getattr(metric, key) for key in SAID} for metric in TABLE])
-    else:
-        show(metrics_table(TABLE))
+        return
+    for it in TABLE:
+        unit = f" [{it.unit}]" if it.unit else ""
+        typer.echo(f"{it.name}{unit}, one per {it.per}, from the {it.needs}")
+        equation = " = ".join(filter(None, (it.symbol, it.equation)))
+        typer.echo(wrapped("; ".join(filter(None, (f"    {it.meaning}", equation))), 4))

@@ -21,9 +21,6 @@ from scenarios.sweep.keys import RESULTS, results_version
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Columns that differ when the same run is repeated.
-MEASURED = ("cpu_s",)
-
 Row = dict[str, Any]
 
 

@@ -39,8 +39,8 @@ def sweep(
 ) -> pd.DataFrame:
     """Run all recipes and return one row each, in their order.
 
-    The rows do not depend on the executor or the number of its workers, except for the columns
-    `MEASURED`.
+    The rows do not depend on the executor or the number of its workers, except for the column
+    `cpu_s`.
 
     Args:
         recipes: what to run.

@@ -90,17 +90,6 @@ def _run_columns(metrics: Sequence[Metric]) -> dict[str, str]:
     return columns or {name: METRICS[name].heading for name in RUN_COLUMNS}
 
 
-def metrics_table(metrics: Iterable[Metric]) -> Table:
-    """What is measured, in what unit and by which equation."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for title in ("name", "unit", "per", "needs", "meaning", "equation"):
-        table.add_column(title, no_wrap=title == "name")
-    for metric in metrics:
-        equation = " = ".join(filter(None, (metric.symbol, metric.equation)))
-        table.add_row(metric.name, metric.unit, metric.per, metric.needs, metric.meaning, equation)
-    return table
-
-
 def _safety(summary: Mapping[str, Any]) -> Text:
     collisions = summary["collisions"]
     line = Text.assemble(

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -74,6 +75,11 @@ def show(*renderables: Text | Table) -> None:
 def show_json(value: Any) -> None:
     """Print JSON and nothing else; a missing value is null."""
     typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def wrapped(text: str, indent: int) -> str:
+    """A text in lines of 80 columns, all but the first indented."""
+    return textwrap.fill(text, 80, subsequent_indent=" " * indent, break_long_words=False)
 
 
 def prepare_streams() -> None:

@@ -81,7 +81,7 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("dim:period=-1", r"dim: period \[s\] must be above 0, got -1"),
         ("dim:period=1e999", r"period \[s\] must be above 0 and finite, got inf"),
         ("dim:monitor=on(patience=100)", r"monitor=on: patience \[s\] must be .* at most 60"),
-        ("dim:monitor=onn", "unknown monitor 'onn'; allowed: on; did you mean 'on'"),
+        ("dim:monitor=onn", "unknown monitor 'onn'; allowed: on, off, none; did you mean 'on'"),
         ("dim:monitor=3", "monitor must be a Monitor, got 3"),
         ("dim:perception=noisy(knd=1)", "unknown perception=noisy parameter 'knd'.*mean 'kind'"),
         ("dim:gate=clear,gate=clear", "dim is given gate twice"),

@@ -143,7 +143,7 @@ def test_drivers_at_the_junction_look_five_times_a_second() -> None:
 
 def test_a_driver_stands_at_the_line() -> None:
     """Up to 1 m before it, at no more than 0.1 m/s; what it sees, it sees half a step early."""
-    line = MIXED.dim.zones.hold_distance
+    line = MIXED.dim.zones.green
     for distance, speed, goes in (
         (line + 0.99, 0.0, True), (line + 1.01, 0.0, False), (2.0, 0.09, True), (2.0, 0.11, False)
     ):  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dim.senses.intent import KINDS, Lane, confidence, confusion, doubts, leftover_error
+from dim.senses.intent import KINDS, Lane, confidence, confusion, doubts
 from dim.senses.noise import UNSIGNALLED
 from minisim.streams import Draws
 from minisim.testing import small_scenario
@@ -94,25 +94,6 @@ def test_confidence_is_calibrated(kind: str, unsignalled: tuple[float, float]) -
         assert abs(right - expected) <= Z * math.sqrt(variance) + 1e-9
 
 
-@pytest.mark.parametrize("threshold", [0.5, 0.8, 0.95])
-@pytest.mark.parametrize("error", [0.05, 0.15])
-def test_the_error_that_a_threshold_leaves(error: float, threshold: float) -> None:
-    subject, sure = lane(error, "symmetric"), 0
-    for vehicle in range(2 * COUNT):
-        read = subject.read(DRAWS, 1, vehicle)
-        if read != 1:
-            sure += subject.confidence(DRAWS, 1, read, vehicle) >= threshold
-    assert close(sure, leftover_error(error, threshold), 2 * COUNT)
-
-
-@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_no_threshold_adds_errors(error: float, threshold: float) -> None:
-    left = leftover_error(error, threshold)
-    assert -1e-12 <= left <= error + 1e-12
-    assert leftover_error(error, 0.0) == pytest.approx(error)
-    assert leftover_error(error, 1.0) == pytest.approx(0.0, abs=1e-12)
-
-
 def test_confidence_by_hand() -> None:
     """U^e where right, times V^(e/(1−e)) where wrong; e = 1/2 and e = 1/4."""
     assert confidence(0.5, True, (0.25, 0.125)) == pytest.approx(0.5)
@@ -130,14 +111,6 @@ def test_each_look_has_a_confidence_of_its_own(read: int) -> None:
     looks = [subject.confidence(DRAWS, 1, read, 7, observer, 3) for observer in range(20)]
     assert len(set(looks)) == 20
     assert looks[5] == subject.confidence(DRAWS, 1, read, 7, 5, 3)
-
-
-def test_what_a_threshold_leaves_by_hand() -> None:
-    """e = 1/2: 1/2 − t + t²/2; without errors none are left, without right readings all or none."""
-    assert leftover_error(0.5, 0.5) == pytest.approx(0.125)
-    assert leftover_error(0.0, 0.0) == leftover_error(0.0, 0.5) == 0.0
-    assert leftover_error(1.0, 0.0) == 1.0
-    assert leftover_error(1.0, 0.5) == 0.0
 
 
 def test_what_is_never_read_is_no_doubt() -> None:
