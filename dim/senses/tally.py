@@ -1,16 +1,17 @@
-"""What wrong perception does to a run of DIM: counts for its summary.
+"""What misperception does to a run of DIM: counts for its summary.
 
-A session of DIM whose perception errs, also among human drivers, adds to the summary of its run:
+A session of DIM whose perception errs, with or without human drivers, adds these to the summary of
+its run:
 
 - `crossings`: vehicles that entered the junction.
-- `false_grants`: how often a vehicle held the right of way where the same rules on the true view
-  had it wait, counted once each time it holds it.
-- `disagreement_s`: how long two participants had chosen different cliques [s].
+- `false_grants`: how often a vehicle held the right of way although the same rules, applied to the
+  true view, would have made it wait; counted once each time it holds the right of way.
+- `disagreement_s`: how long there were participants that had chosen different cliques [s].
 - `deadlock_s`: how long there were participants, but no vehicle crossed or had the right of way
   [s].
 
-They compare with the truth, which no vehicle knows. Where every reading is right, the last three
-are 0.
+The last three compare the run with the truth, which no vehicle knows. If every reading is right,
+they are 0.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ class Tally:
     def __init__(self, rules: Rules, reader: Reader, start: float) -> None:
         self._rules, self._reader, self._start = rules, reader, start
         self._going: set[int] = set()
-        self._blamed: set[int] = set()  # whose right of way has been counted as false
-        self._before: set[int] = set()  # which are about to cross
+        self._blamed: set[int] = set()  # vehicles whose right of way has been counted as false
+        self._before: set[int] = set()  # vehicles that are about to cross
         self._crossings = self._false_grants = 0
         self._disagreement = self._deadlock = 0.0
         self._since = 0.0
@@ -53,7 +54,7 @@ class Tally:
         table: DecisionTable,
         going: set[int],
     ) -> None:
-        """Count one look around.
+        """Add one look around to the counts.
 
         `true` is what vehicles would see without an error, `sights` what each vehicle that follows
         DIM has seen. Those in `going` now have the right of way.
@@ -62,7 +63,7 @@ class Tally:
         self._disagreement += passed * self._disagree
         self._deadlock += passed * self._stuck
         before = {v.id for v in true.vehicles if 0.0 <= v.distance <= self._start}
-        self._crossings += len(self._before - before)  # also those that came and left in between
+        self._crossings += len(self._before - before)  # also those that entered and left in between
         self._before = before
         truth = self._reader.read(true)
         should = self._rightly(true, sights, truth, table)
@@ -76,7 +77,7 @@ class Tally:
     def _rightly(
         self, true: View, sights: Mapping[int, View], truth: Percept, table: DecisionTable
     ) -> set[int]:
-        """The vehicles that would go by the same rules, and from the same state, on `true`."""
+        """The vehicles that would go if they saw `true`, with the same rules and the same state."""
         rightly = set()
         for vehicle in true.vehicles:
             if vehicle.id not in sights:

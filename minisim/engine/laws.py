@@ -1,7 +1,7 @@
-"""The car-following models of a run, and the bounds that limits and hold lines set.
+"""The car-following models of a run, and how limits and hold lines bound the acceleration.
 
-All that depends on `Law.model` is in this module. The equations are in `minisim.carfollowing`, the
-table of models in `minisim.vehicle`.
+Everything that depends on `Law.model` is in this module. The equations are in
+`minisim.carfollowing`, and the table of models is in `minisim.vehicle`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """How much a vehicle ahead counts for the law of this run: from 0, not at all, to infinity.
+    """How much weight this run's law gives a vehicle ahead: from 0, none at all, to infinity.
 
-    It is the ratio of the desired to the actual gap under the IDM, and the inverse of Krauß's safe
-    speed. Of several vehicles ahead, the one that counts most decides.
+    Under the IDM it is the ratio of the desired gap to the actual one; under Krauß's law it is the
+    inverse of the safe speed. If there are several vehicles ahead, the one with the most weight
+    decides.
     """
     if law.model == KRAUSS:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
@@ -43,10 +44,10 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def follow(v: float, v0: float, z: float, law: Law) -> float:
-    """Acceleration of the car-following law.
+    """The acceleration that the car-following law gives.
 
-    For a desired speed of 0 this is the IDM's limit from above: comfortable braking plus the
-    leader's share.
+    At a desired speed of 0, this is what the IDM tends to as the desired speed falls to 0:
+    comfortable braking plus the leader's share.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
@@ -62,10 +63,10 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
 
 @njit
 def insertable(gap: float, v_leader: float, law: Law) -> float:
-    """Highest speed at which the law of this run inserts a vehicle; negative when there is none.
+    """Highest speed at which this run's law allows insertion; negative when there is none.
 
-    A law without a rule of its own takes any speed, once the gap is that of standstill.
-    Source: SUMO's `insertionFollowSpeed` of each model.
+    A law without a rule of its own allows any speed once the gap is at least the one at standstill.
+    Source: `insertionFollowSpeed` of each of SUMO's models.
     """
     if law.model == IDM or law.model == IIDM:
         return insertion_speed(gap, v_leader, law.a, law.b, law.headway, law.min_gap)
@@ -78,13 +79,13 @@ def insertable(gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def braking_begins(v: float, distance: float, law: Law) -> bool:
-    """Whether what is `distance` ahead may matter to comfortable braking in this step."""
+    """Whether something `distance` ahead may call for comfortable braking in this step."""
     return 2.0 * law.b * distance <= v * v + 4.0 * law.b * v * law.dt
 
 
 @njit_inline
 def slow_down(v: float, acc: float, target: float, distance: float, law: Law) -> float:
-    """Bound on the acceleration that meets a lower limit ahead by comfortable braking."""
+    """Bound on the acceleration with which comfortable braking meets a lower limit ahead."""
     if v + acc * law.dt <= target:
         return acc
     if law.semi_implicit:
@@ -99,7 +100,7 @@ def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
     The hold line is like the end of the road: the vehicle brakes comfortably, and no earlier than
-    it must. If that no longer suffices, it stops before the junction, as hard as this needs.
+    it must. If that no longer suffices, it brakes as hard as it must to stop before the junction.
     """
     to_line = law.hold - s
     if law.semi_implicit:

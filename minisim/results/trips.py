@@ -1,6 +1,6 @@
 """All trips of a run as arrays. The definitions are SUMO's, so that results can be compared.
 
-They are those of SUMO's Simulation/Output/TripInfo; `minisim.results.metrics.TABLE` has them.
+They come from SUMO's page Simulation/Output/TripInfo; `minisim.results.metrics.TABLE` lists them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Trips(NamedTuple):
     """All trips of a run as columns in demand order, shape (k,) each; times in seconds.
 
     For a trip that has not ended, `waiting_time`, `travel_time`, `time_loss` and `depart_delay`
-    hold what it has gathered up to `end`. Means are over the trips demanded from `start` on.
+    hold what has accumulated up to `end`. Means are over the trips demanded from `start` on.
     """
 
     demand_time: Floats
@@ -57,7 +57,7 @@ TRIP_ARRAYS: Final = Trips._fields[:-2]
 def collect_trips(
     vehicles: Records, demand_time: Floats, movements: Movements, dt: float, end: float
 ) -> Trips:
-    """Build the trips of a run that has reached `end` [s] from its vehicle array."""
+    """Build, from its vehicle array, the trips of a run that has reached `end` [s]."""
     rows = vehicles[np.argsort(vehicles["id"], kind="stable")]
     departed = rows["status"] != WAITING
     arrived = rows["status"] == ARRIVED

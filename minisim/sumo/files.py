@@ -1,4 +1,4 @@
-"""SUMO's files: the vehicles and options that it reads, the trips that it writes."""
+"""SUMO's files: the vehicles and options that it reads, and the trips that it writes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
 def write_routes(
     folder: Path, site: Site, vehicles: Records, model: str, depart_speed: float | None
 ) -> None:
-    """Write the vehicle type, a route a movement, and the vehicles in order of demand."""
+    """Write the vehicle type, one route per movement, and the vehicles in order of demand."""
     write_xml(folder / ROUTES, "routes", _routes(site, vehicles, model, depart_speed))
 
 
@@ -89,8 +89,8 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
         "duration-log.disable": "true",
     }
     if not job.teleport:
-        # No vehicle is taken off the road, for waiting or for a collision. The action "none" would
-        # not even look for collisions.
+        # No vehicle is taken off the road, whether for waiting or for a collision. With the action
+        # "none", SUMO would not even look for collisions.
         options |= {
             "time-to-teleport": -1,
             "collision.action": "warn",
@@ -103,13 +103,14 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
 
 
 def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
-    """SUMO's trips of a run that has reached `end` [s], in demand order.
+    """SUMO's trips from a run that has reached `end` [s], in demand order.
 
-    Only the time loss is ours (`Ended.time_loss`). Since version 1.28 SUMO's own time loss leaves
-    out what a vehicle loses while it accelerates to a higher limit, and SUMO knows no markings.
+    Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own time loss
+    leaves out what a vehicle loses while it accelerates to a higher limit, and SUMO does not know
+    about markings.
 
     Raises:
-        SumoError: there are no trips, or not those of the arrivals.
+        SumoError: there are no trips, or they are not those of the arrivals.
     """
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
     # SUMO does not report vehicles that want to enter when the run is over.
@@ -119,12 +120,12 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
             values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
     except (OSError, ET.ParseError, LookupError, ValueError) as error:
         raise SumoError(f"SUMO's trips cannot be read: {error}") from error
-    # It does not report vehicles that would have come later either.
+    # Nor does it report vehicles that would have come later.
     missing = np.isnan(values).any(axis=1) & (arrivals.time < end - job.law.dt)
     if missing.any():
         raise SumoError(f"SUMO's trips lack vehicle {int(missing.argmax())}")
     depart, arrival, waiting = values.T
-    # SUMO still inserts at the very end. A vehicle that has not made a step is not on the road.
+    # SUMO still inserts vehicles at the very end. One that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
     arrived = departed & (arrival >= 0.0)
     travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)

@@ -1,6 +1,6 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell holds the runs that differ in their seed only.
+A cell holds the runs that differ only in their seed.
 """
 
 from __future__ import annotations
@@ -38,19 +38,20 @@ SUMS: Final = ("trips", "unfinished", "collisions")
 #: Other columns of runs that are not metrics.
 OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
 
-#: Prefixes of the columns of groups of trips.
+#: Prefixes of the columns for groups of trips.
 GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row a cell, in the order of the rows.
+    """One row per cell, in the order of `rows`.
 
     Returns:
-        `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
-        (sums); each of the columns `averaged` with the half widths of its 95 % confidence interval
-        (`…_ci95`) and of the 95 % prediction interval of one more run (`…_pi95`), NaN where
-        unknown; `growing`, whether the queues of all runs together kept growing; `too_short`,
-        whether the runs are too short to tell; `cpu_s`, mean processor time of a run.
+        `CELL`; `runs`, the number that succeeded, and `failed`, the number that did not; `trips`,
+        `unfinished` and `collisions` (sums); each of the columns `averaged`, with the half widths
+        of its 95 % confidence interval (`…_ci95`) and of the 95 % prediction interval for one more
+        run (`…_pi95`), NaN where unknown; `growing`, whether the queues of all runs together kept
+        growing; `too_short`, whether the runs are too short to tell; `cpu_s`, mean processor time
+        of a run.
     """
     import pandas as pd
 
@@ -77,20 +78,20 @@ def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _is_numeric(column: pd.Series[Any]) -> bool:
-    """Whether the values are numbers, at least one."""
+    """Whether there is at least one value and all of them are numbers."""
     values = column.dropna()
     return len(values) > 0 and all(isinstance(value, Real) for value in values)
 
 
 def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
-    """Mean difference of `metric`, a column or a `Metric`, between two controllers, run by run.
+    """Mean run-by-run difference between two controllers in `metric`, a column or a `Metric`.
 
     Returns:
-        One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` (the
+        One row per cell that both ran: `CELL` without the controller, `pairs`, `difference` (the
         first controller's value less the second's) and `difference_ci95`.
 
     Raises:
-        InputError: an unknown metric or controller, or two runs of one seed with other arrivals.
+        InputError: an unknown metric or controller, or two runs of one seed whose arrivals differ.
     """
     import pandas as pd
 
@@ -114,20 +115,20 @@ def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: st
 def pairs(
     rows: pd.DataFrame, metric: str, column: str, names: tuple[str, str], by: Sequence[str]
 ) -> dict[tuple[Any, ...], list[float]]:
-    """Differences of `metric` between two controllers: values of `by` -> one value a seed.
+    """Differences in `metric` between two controllers: values of `by` -> one value per seed.
 
     Runs are paired by seed. Both controllers met the same arrivals, so the variation that they
     share cancels.
 
     Args:
-        rows: of a sweep; failed runs and missing values are left out.
-        metric: a column; the first controller's less the second's.
+        rows: the rows of a sweep; failed runs and missing values are left out.
+        metric: a column; a difference is the first controller's value less the second's.
         column: the one that holds `names`, such as "controller".
-        names: of both controllers.
+        names: the names of both controllers.
         by: columns that name a cell.
 
     Raises:
-        InputError: two runs of one seed with other arrivals.
+        InputError: two runs of one seed whose arrivals differ.
     """
     good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
     one, other = (good[good[column] == name] for name in names)
@@ -154,16 +155,16 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
 
 
 def saturated(good: pd.DataFrame) -> bool:
-    """Whether the queues of a cell's runs kept growing; false where they are `too_short`."""
+    """Whether the queues of a cell's runs kept growing; false if the runs are `too_short`."""
     sums = good.filter(regex="(queue_growth|trips)$").sum()
     return not too_short(good) and grows(sums, int(good["arms"].iloc[0]))
 
 
 def too_short(good: pd.DataFrame) -> bool:
-    """Whether a cell's runs end before growing queues can be told from roads that fill.
+    """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
-    The travel time on a free road is travel time less time loss: of the trips that ended, or of
-    what was driven where none did.
+    The travel time on a free road is travel time less time loss, taken over the trips that ended
+    or, if none did, over what was driven.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

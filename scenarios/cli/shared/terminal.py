@@ -1,4 +1,4 @@
-"""Printing on stdout and progress on stderr."""
+"""Printing to stdout, and progress on stderr."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: Characters in place of those that the terminal's encoding lacks: one for one, so that tables keep
-#: their columns.
+#: Substitutes for characters that the terminal's encoding lacks: one for one, so that the columns
+#: of tables stay aligned.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
-#: How often a line of progress is printed where there is no terminal [s].
+#: Shortest time between two lines of progress where there is no terminal [s].
 SILENCE = 20.0
 
 
@@ -38,7 +38,7 @@ class Bar:
         self._said = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
-        """Show `done` of `total`; a line at most once in `SILENCE` seconds."""
+        """Show `done` of `total`; without a bar, print a line at most every `SILENCE` seconds."""
         if self._progress is not None and self._task is not None:
             self._progress.update(self._task, completed=done, total=total, description=self._label)
         elif (now := time.monotonic()) - self._said >= SILENCE:
@@ -52,7 +52,7 @@ class Bar:
 
 @contextmanager
 def bar(label: str) -> Iterator[Bar]:
-    """A progress bar on stderr that vanishes at the end; lines where stderr is no terminal."""
+    """A progress bar on stderr that vanishes at the end; lines if stderr is not a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield Bar(label, None)
@@ -63,7 +63,7 @@ def bar(label: str) -> Iterator[Bar]:
 
 
 def show(*renderables: Text | Table) -> None:
-    """Print on stdout; only text is wrapped, and only on a terminal."""
+    """Print to stdout; only text is wrapped, and only on a terminal."""
     console = Console(highlight=False, markup=False)
     for renderable in renderables:
         if isinstance(renderable, Table) or not console.is_terminal:
@@ -83,7 +83,10 @@ def wrapped(text: str, indent: int) -> str:
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text: in plainer characters if need be; lost if closed."""
+    """Let stdout and stderr take any text, in plainer characters if need be.
+
+    Text for a stream that is closed is discarded.
+    """
     codecs.register_error("minisim-plain", _plain)
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
