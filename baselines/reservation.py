@@ -115,7 +115,7 @@ class Slot:
 
 
 class Manager:
-    """Who holds which reservation, and which are possible; times in host steps."""
+    """Which vehicle holds which reservation, and which are possible; times in host steps."""
 
     def __init__(self, site: Site, buffer: float) -> None:
         if isinstance(site.vehicle, CruiseVehicle):
