@@ -2,8 +2,8 @@
 
 Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
 passage. The manager predicts how the vehicle would drive, and grants the passage if the space it
-needs is free at the time. They divide that space into a grid of tiles. We use the conflict zones of
-the movements (`minisim.junction.conflicts`): only pairs matter, and each pair's zones are exact.
+needs is free at the time. Dresner and Stone use a grid of tiles. We use the conflict zones of the
+movements (`minisim.junction.conflicts`): only pairs matter, and each pair's stretches are exact.
 
 The protocol:
 - From `reach` before the junction on, the first vehicle of a lane asks, and so does any vehicle

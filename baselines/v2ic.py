@@ -54,7 +54,7 @@ class V2IC:
 def time_to_cover(distance: float, speed: float, acceleration: float, limit: float) -> float:
     """Time to cover a distance [s], accelerating from a speed up to the limit (SI units).
 
-    Below the limit this is (v_des − v)/a with v_des = √(v² + 2·a·D), as in the authors' code.
+    While it accelerates, this is (v_des − v)/a with v_des = √(v² + 2·a·D), as in the authors' code.
     """
     if speed >= limit:
         return distance / speed
@@ -81,7 +81,7 @@ def advised_speed(distance: float, speed: float, time: float, limit: float) -> f
 class V2ICSession:
     """One run: the serving list, and what follows from it.
 
-    It is called where vehicles register and where they have left; in between, only while any wait.
+    It is called where vehicles register or have left; in between, only while any vehicle waits.
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:

@@ -152,7 +152,7 @@ class V2ICAsRunSession:
     """One run: reads the host's views, and commands what changes.
 
     It is called at insertion, where vehicles register, and where they leave the list; in between,
-    at every step while any wait.
+    at every step while any vehicle waits.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:

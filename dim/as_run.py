@@ -57,7 +57,7 @@ FREED = 506.0  #: distance driven at which a place in the action list is given u
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
 #: Distance driven at which a vehicle is told 20 m/s for good [m], so that a host need not show it
-#: for longer. The authors have no such limit, but in the three runs that we checked no vehicle is
+#: for longer. The authors have no such limit, but in the three runs that we checked, no vehicle is
 #: told anything after 531 m.
 FOLLOWED = 600.0
 

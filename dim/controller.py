@@ -205,7 +205,7 @@ class DimSession:
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What wrong perception has done so far (`dim.senses.tally`); empty if it is exact."""
+        """What wrong perception has done so far (`dim.senses.tally`); empty if exact."""
         return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:

@@ -22,7 +22,7 @@ Two vehicles that brake for each other must not stand for ever. Of two that stan
 in goes first (if equal, the one from the first lane), unless the other stands in its way. Both can
 see which one that is.
 
-Nor must vehicles that do not cross wait for each other for ever. Where they read each other
+Nor may vehicles that do not cross wait for each other for ever. Where they read each other
 differently, each may conclude that it is not its turn. But some vehicle always has the right of
 way. So if no vehicle crosses and all have stood for a while, some have misread. Then the first lane
 goes alone, since that takes no knowledge of intents (`Patience`).
@@ -206,7 +206,7 @@ class Monitors:
 
 
 class Patience:
-    """What ends a deadlock, when all vehicles stand and wait for each other.
+    """What ends a deadlock in which all vehicles stand and wait for each other.
 
     After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
     junction on; `deceleration` is comfortable braking [m/s²].

@@ -60,8 +60,8 @@ class FixedTime:
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
 
-        Raises `InputError` if the number of greens differs from that of lanes, if `max_cycle` is
-        too short, or if `order` does not list every lane once.
+        Raises `InputError` if the number of greens is not the number of lanes, `max_cycle` is too
+        short, or `order` does not list every lane once.
         """
         n = site.intersection.n
         if self.greens is None:

@@ -25,7 +25,7 @@ def check_greens(shortest: float, longest: float) -> None:
 class Verdict(NamedTuple):
     """What a rule says about the current phase."""
 
-    lane: int  #: which has its turn; a lane other than the current one ends the phase
+    lane: int  #: the lane whose turn it is; any lane but the current one ends the phase
     after: float  #: time until the next look [s]; ignored if the phase ends
 
 

@@ -48,7 +48,7 @@ def webster(
     `rates` are the inflows of the lanes [veh/h]; L is `lost_time_per_phase` [s] times their number.
     `equal_greens` divides the greens equally instead of in proportion to the inflows.
 
-    Raises `InputError` if a value is out of range, or `max_cycle` is too short for minimal greens.
+    Raises `InputError` if a value is out of range or `max_cycle` too short for the minimal greens.
     """
     flows = numbers("rates [veh/h]", rates)
     if not flows:

@@ -25,7 +25,7 @@ from minisim.junction.turns import Turn, turns
 from minisim.parameters import declared, real, reals, word
 from minisim.streams import stream
 
-#: What others trust about where a human is going. "motion": only what its place and heading show.
+#: What others go by to tell a human's way. "motion": only what its place and heading show.
 #: "signals": also a blinking indicator. "silence": also that a vehicle without one goes straight
 #: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")

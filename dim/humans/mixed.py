@@ -10,13 +10,13 @@ line as at an all-way stop (a junction of equal roads) and looks. After its reac
 
 It sees positions, speeds and indicators, never a right of way.
 
-No vehicles collide, unless some trust in silence (`dim.humans.drivers.TRUSTS`). When a human
+No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`). When a human
 starts, the DIM vehicles in conflict with it stand or are outside the yellow zone, and get no
 right of way until it has left. A standing DIM vehicle has none: with the junction empty, it would
 have moved off one step after being granted it, before a driver can look.
 
 No vehicles wait in a circle: DIM waits for humans, and no human waits for a DIM vehicle that
-stands. So drivers must be able to recognise DIM vehicles, as by marker lamps for automated driving
+stands. So drivers must be able to recognise DIM vehicles, say by marker lamps for automated driving
 (SAE J3134). Otherwise each would let the other go first.
 """
 
