@@ -1,9 +1,9 @@
-"""The all-way stop: every vehicle stops at the line, and they go in the order of stopping.
+"""The all-way stop: every vehicle stops at the line, and the first to stop is the first to go.
 
 The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), with one
 difference. SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
-for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it has left their way, so
-two vehicles cannot collide whatever it does there.
+for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it is out of their way,
+so no two vehicles can collide, whatever it does there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.parameters import Name, declared, real
 
-#: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
+#: A vehicle slower than this counts as standing [m/s]: SUMO's threshold for waiting.
 STANDING = 0.1
 #: A vehicle stands at the line when its front is at most this far before it [m].
 LINE = 1.0
@@ -27,11 +27,11 @@ SIGHT_MARGIN = 0.5
 class AllWayStop:
     """A junction where every vehicle stops, and the first to stop is the first to go.
 
-    The first vehicle of each lane queues from the moment when it stands at the line; equal times
-    go by arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle has
-    stood for longer, and every conflicting vehicle that was let go has left its way. So vehicles
-    that do not conflict go together, and may overtake in the queue. Each gets its turn, since a
-    waiting vehicle keeps back every later one that conflicts with it.
+    The first vehicle of each lane joins the queue when it stands at the line; ties are broken by
+    arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle has stood for
+    longer, and every conflicting vehicle that was let go is out of its way. So vehicles that do not
+    conflict go together, and may jump the queue. Each gets its turn, since a waiting vehicle holds
+    back every later one that conflicts with it.
     """
 
     name = Name("all-way-stop")
@@ -48,10 +48,11 @@ class AllWayStop:
 
 
 class AllWayStopSession:
-    """Since when each vehicle stands, and which were let go.
+    """When each vehicle came to a stand, and which vehicles have been let go.
 
     It is called when a vehicle comes to the line, when the junction clears, and at the earliest
-    time at which a vehicle at the line can stand, has stood long enough, or can find its way free.
+    time at which a vehicle at the line can be standing, has stood long enough, or can have a clear
+    way.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
@@ -109,8 +110,8 @@ class AllWayStopSession:
     ) -> float:
         """The earliest time at which a vehicle may go; infinite if another wake-up decides it [s].
 
-        That is now, if no conflicting vehicle has stood for longer or is in the way. A vehicle in
-        the way leaves it at full acceleration at the earliest.
+        It may go now if no conflicting vehicle has stood for longer or is in the way. A vehicle in
+        the way can clear it no sooner than full acceleration allows.
         """
         clearing = self._clearing[self._index(vehicle)]
         if any(clearing[self._index(other)] > 0.0 for other in waiting):

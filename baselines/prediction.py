@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class Following(NamedTuple):
-    """Car following of a site's vehicles, from `minisim.vehicle.VehicleType` (SI units)."""
+    """How a site's vehicles follow each other, from `minisim.vehicle.VehicleType` (SI units)."""
 
     dt: float
     a: float
@@ -44,7 +44,7 @@ class Following(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What a prediction needs of a path."""
+    """What a prediction needs to know about a path."""
 
     crossing: float  #: from entry to exit [m]
     turn: float  #: highest speed inside the junction [m/s]
@@ -64,7 +64,7 @@ def courses(site: Site) -> tuple[Course, ...]:
 class Leader(NamedTuple):
     """A vehicle with known motion, as its follower meets it."""
 
-    s: Floats  #: positions [m], one a step from now on; after the last it is gone
+    s: Floats  #: positions [m], one per step from now on; after the last it is gone
     v: Floats  #: speeds [m/s]
     until: float = math.inf  #: its rear matters up to this position on its own path [m]
     shift: float = 0.0  #: added to its position to measure it on the follower's path [m]
@@ -84,7 +84,7 @@ def predict(
     beyond: float = 0.0,
     horizon: float = 60.0,
 ) -> tuple[Floats, Floats] | None:
-    """Positions [m] and speeds [m/s] of a vehicle, one a step from now on, if it may drive on.
+    """Positions [m] and speeds [m/s] of a vehicle, one per step from now on, if it may drive on.
 
     It follows the vehicle ahead in its lane and the one that enters its exit lane before it, until
     its rear is `beyond` [m] past the exit. None if that takes longer than the horizon [s], or if a
@@ -108,7 +108,7 @@ def _drive(
     s_out: Floats,
     v_out: Floats,
 ) -> int:
-    """Fill `s_out` and `v_out`; the number of steps, or 0 if the vehicle does not get through."""
+    """Fill `s_out` and `v_out`; return the number of steps, 0 if the vehicle cannot get through."""
     s, v = position, speed
     end = course.crossing + law.length + beyond
     for k in range(len(s_out)):

@@ -1,28 +1,28 @@
 """Space-time reservation, first come first served, on pairwise conflict zones.
 
 Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
-passage. The manager predicts how it would drive, and grants the passage if the space that it needs
-is free at the time. Theirs is a grid of tiles. Ours are the conflict zones of the movements
-(`minisim.junction.conflicts`): only pairs matter, and for a pair their stretches are exact.
+passage. The manager predicts how the vehicle would drive, and grants the passage if the space it
+needs is free at the time. Dresner and Stone use a grid of tiles. We use the conflict zones of the
+movements (`minisim.junction.conflicts`): only pairs matter, and each pair's stretches are exact.
 
-The protocol
-- The first vehicle of a lane asks, and so does one behind a holder, from `reach` before the
-  junction on. Its passage is predicted at full acceleration up to the limits
+The protocol:
+- From `reach` before the junction on, the first vehicle of a lane asks, and so does any vehicle
+  directly behind a holder. Its passage is predicted at full acceleration up to the limits
   (`baselines.prediction`), behind the vehicle ahead in its lane and behind the last vehicle that
   enters its exit lane before it.
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
-  `buffer` seconds before the other enters its own. Into one exit lane holders go in the order of
+  `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
   their grants, so a later grant never slows down an earlier one.
-- A refused vehicle drives up to its stop line and slows down as late as is comfortable. Every
-  `period` it is considered again, in the order of first requests.
+- A refused vehicle drives up to its stop line and slows down as late as is comfortable. Refused
+  requests are considered again every `period`, in the order in which they were first made.
 
 Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
-their predictions. It predicts anew where they differ. A holder whose new passage no longer fits
+their predictions, and predicts anew where they differ. A holder whose new passage no longer fits
 loses its reservation if it can still stop, and so does a vehicle that follows it. So when a vehicle
-becomes unable to stop, its passage fits those of all others that cannot stop, and the rest yield.
+can no longer stop, its passage fits the passages of all others that cannot, and the rest yield.
 What remains is the error of a prediction over the last few seconds before the zones, from a state
-that is at most a period old. `buffer` covers it. In minisim it is small: up to 0.15 m beyond the
-point of no return (4 arms, 350 veh/h/lane), from leaders beyond the two that a prediction has.
+at most one period old. `buffer` covers it. In minisim this error is small: up to 0.15 m beyond the
+point of no return (4 arms, 350 veh/h/lane), due to leaders other than the two in a prediction.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from minisim.vehicle import CruiseVehicle
 #: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
 
-#: How far past the junction exit a rear is followed, for those behind it [m].
+#: How far past the junction exit a rear is predicted, for the vehicles behind it [m].
 BEYOND = 60.0
 
 
@@ -64,7 +64,7 @@ class Reservation:
 
     name = Name("reservation")
 
-    # Asking earlier keeps room for vehicles far away from those that are near: at 350 veh/h/lane
+    # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
     reach: float | None = real(
         "how far before the junction vehicles ask; none is the stopping distance at the limit and "
@@ -81,7 +81,7 @@ class Reservation:
     )
 
     def start(self, site: Site) -> ReservationSession:
-        """Begin a run; raises `InputError` for vehicles whose motion is not predicted."""
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
         return ReservationSession(self, site)
 
 
@@ -92,10 +92,10 @@ class Slot:
     vehicle: int
     movement: int  #: its index
     start: int  #: when the prediction was made [steps]
-    s: Floats  #: positions past the entry [m], one a step from `start` on
+    s: Floats  #: positions past the entry [m], one per step from `start` on
     v: Floats  #: speeds [m/s]
     enters: int  #: when its front is in the junction [steps]
-    #: Of each movement in conflict, the last step before and the first step past the conflict zone.
+    #: For each conflicting movement, the last step before and the first step past the zone.
     zones: dict[int, tuple[int, int]]
 
     @property
@@ -115,7 +115,7 @@ class Slot:
 
 
 class Manager:
-    """Which vehicles hold which reservation, and which are possible; times in steps of the host."""
+    """Which vehicle holds which reservation, and which are possible; times in host steps."""
 
     def __init__(self, site: Site, buffer: float) -> None:
         if isinstance(site.vehicle, CruiseVehicle):
@@ -172,7 +172,7 @@ class Manager:
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage is compatible with every other reservation.
 
-        Where it must be the `last`, it comes after those that share its exit lane.
+        If it must be the `last`, it comes after all others that share its exit lane.
         """
         exit_arm = self._ways[slot.movement].exit_arm
         for other in self.slots.values():
@@ -199,7 +199,7 @@ class Manager:
 
 
 class ReservationSession:
-    """One run: keeps reservations true to what is seen, and serves requests."""
+    """One run: keeps reservations in line with what is seen, and serves requests."""
 
     def __init__(self, controller: Reservation, site: Site) -> None:
         self.manager = Manager(site, controller.buffer)
@@ -237,7 +237,7 @@ class ReservationSession:
     def _revoke(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
     ) -> Iterator[int]:
-        """Renew what differs from its prediction; the ids of vehicles that lose their reservation.
+        """Renew outdated reservations; return the ids of vehicles that lose theirs.
 
         Vehicles that cannot stop come first and keep their reservation in any case. If one of them
         no longer fits, every reservation of a vehicle that can stop is checked again.
@@ -274,7 +274,7 @@ class ReservationSession:
     def _grant(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
     ) -> Iterator[int]:
-        """Grant what is possible; the ids of the new holders."""
+        """Grant what is possible; return the ids of the new holders."""
         slots = self.manager.slots
         for vehicle in list(self._requests):
             slot = self._predict(seen[vehicle], now, ahead[vehicle])

@@ -6,11 +6,11 @@ vehicle that conflicts with some ahead of it in the list is told to arrive when 
 leaves. We differ from the source for safety:
 
 - distances are to the true stop line, and a vehicle has left when its rear bumper is out of the
-  junction; the conflicts are those of the geometry, merging included;
-- a speed is advice: the vehicle accelerates and brakes as its car following does, never above the
+  junction; the conflicts follow from the geometry, merging included;
+- a speed is advice: the vehicle accelerates and brakes by its car-following law, never exceeds the
   limit, and stops at its line unless the unit has let it go;
 - a vehicle gets the right of way only when every conflicting vehicle ahead in the list *has* left,
-  even if the estimated time until then is 0, and never loses it. Later vehicles wait in the same
+  even if the estimated time until then is 0, and then keeps it. Later vehicles wait in the same
   way, so two vehicles in conflict never hold it at once;
 - leaving times are capped (`leaving_time`): distance over speed explodes at low speed, and a
   crawling vehicle would stop those behind it in the list far from the junction.
@@ -24,7 +24,7 @@ from collections.abc import Iterable
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
 from minisim.parameters import Name, declared, real
 
-#: Added to speeds that divide, as in the authors' code [m/s].
+#: Added to speeds used as divisors, as in the authors' code [m/s].
 CRAWL = 1e-5
 
 
@@ -39,7 +39,7 @@ class V2IC:
         "how far before the junction vehicles register", "m", low=1, high=2000, default=200.0
     )
     # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
-    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), for an eighth of the
+    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), at an eighth of the
     # work.
     period: float = real(
         "time between two pieces of advice while any vehicle waits", "s",
@@ -54,7 +54,7 @@ class V2IC:
 def time_to_cover(distance: float, speed: float, acceleration: float, limit: float) -> float:
     """Time to cover a distance [s], accelerating from a speed up to the limit (SI units).
 
-    While it accelerates this is (v_des − v)/a with v_des = √(v² + 2·a·D), as the authors have it.
+    While it accelerates, this is (v_des − v)/a with v_des = √(v² + 2·a·D), as in the authors' code.
     """
     if speed >= limit:
         return distance / speed
@@ -68,8 +68,8 @@ def time_to_cover(distance: float, speed: float, acceleration: float, limit: flo
 def advised_speed(distance: float, speed: float, time: float, limit: float) -> float:
     """Speed to command so that a vehicle covers `distance` in `time` [m/s], within [0, limit].
 
-    This is 2·D/M − v, where uniform braking ends: v − dec·M with dec = 2·(v·M − D)/M². A vehicle at
-    the line, or past it, stays. A time of 0 or less asks for no braking.
+    This is 2·D/M − v, the final speed of uniform braking: v − dec·M with dec = 2·(v·M − D)/M². For
+    a vehicle at or past the line it is 0. A time of 0 or less asks for no braking.
     """
     if distance <= 0.0:
         return 0.0
@@ -81,14 +81,14 @@ def advised_speed(distance: float, speed: float, time: float, limit: float) -> f
 class V2ICSession:
     """One run: the serving list, and what follows from it.
 
-    It is called where vehicles register and where they have left; in between only while any waits.
+    It is called where vehicles register or have left; in between, only while any vehicle waits.
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:
         self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
         paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
-        self.granted: set[int] = set()  #: of those with the right of way
+        self.granted: set[int] = set()  #: ids of those with the right of way
         self._period = controller.period
         self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
@@ -105,7 +105,7 @@ class V2ICSession:
             yield Wake(view.time + self._period)
 
     def _register(self, seen: dict[int, Observed]) -> None:
-        """Drop vehicles that have left, append new ones, nearest first."""
+        """Drop vehicles that have left, and append new ones, nearest first."""
         self.order = [vehicle for vehicle in self.order if vehicle in seen]
         known = set(self.order)
         self.granted &= known
@@ -114,7 +114,7 @@ class V2ICSession:
         self.order += [vehicle.id for vehicle in new]
 
     def _serve(self, seen: dict[int, Observed]) -> Iterable[Command]:
-        """One round through the list: the right of way for the free, advice for the rest."""
+        """Go through the list once: right of way if the way is free, advice for the rest."""
         latest = [0.0] * len(self._foes)  # leaving time of the last of each movement so far [s]
         for vehicle in self.order:
             me = seen[vehicle]
@@ -134,10 +134,10 @@ class V2ICSession:
             latest[p] = max(latest[p], leaving)
 
     def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
-        """Time until a vehicle has left, `distance` ahead at its present speed [s].
+        """Time that a vehicle needs to leave, `distance` ahead, at its present speed [s].
 
-        It is at most `blocked`, the time until it can be let go, and a start from rest at this
-        place. It is never 0, since a listed vehicle has not left.
+        It is at most `blocked`, the time until the vehicle can be let go, plus the time from rest
+        at its present place. It is never 0, since a listed vehicle has not left.
         """
         from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)

@@ -1,17 +1,17 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
-`baselines.v2ic` is the intended controller. This module holds what the comparison in the paper ran
-instead, quirk by quirk. No other module knows these quirks:
+`baselines.v2ic` is the intended controller. This module holds what was run for the paper's
+comparison instead, quirk by quirk. No other module knows these quirks:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
    junction begins at 488.7 m. So the "stop line" is 108.7 m before the junction, and vehicles
    leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
-2. *right-hand conflicts*: the conflicts are those of right-hand traffic, the network is
-   left-hand: of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
+2. *right-hand conflicts*: the conflicts are for right-hand traffic, but the network is left-hand:
+   of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
 3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
-4. *free for a moment is free*: at its release a vehicle is expected to leave after (v_des − v)/a,
-   though the speed is cut to 20 m/s: for one step 1.3 s instead of 11 s, for the vehicles behind
-   it in the list;
+4. *free for a moment is free*: on release a vehicle is expected to leave after (v_des − v)/a,
+   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list reckon with
+   1.3 s instead of 11 s;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
    so vehicles leave at 20 m/s;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
@@ -38,7 +38,7 @@ from minisim.parameters import Name, declared, real
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
 REGISTRATION = 100.0  #: length of the stretch on which they do [m]
-STOP_LINE = 20.0  #: of the "stop line" before the reference, and of what is cleared behind it [m]
+STOP_LINE = 20.0  #: from the "stop line" to the reference, and to be cleared beyond it [m]
 PLATOON = 4.0  #: length of a platoon of one vehicle [m]
 ACCELERATION = 2.6  #: of the release formula [m/s²]
 TOP_SPEED = 20.0  #: advice is cut to this [m/s]
@@ -50,10 +50,10 @@ LEFT = REFERENCE + PLATOON + STOP_LINE
 FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
-#: Room for rounding where a mark and a distance are compared [m].
+#: Rounding tolerance when a mark and a distance are compared [m].
 ROUNDING = 1e-9
-#: A junction radius at which opposite far turns do not meet, as on the junction of several lanes
-#: that the conflicts were written for [m].
+#: A junction radius at which opposite far turns do not meet, as at the multi-lane junction that
+#: the conflicts were written for [m].
 WIDE = 20.0
 
 
@@ -76,7 +76,7 @@ class V2ICAsRun:
 
 @lru_cache
 def right_hand_conflicts() -> tuple[frozenset[int], ...]:
-    """For each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
+    """For each movement of a wide 4-arm junction with right-hand traffic, the ones it meets.
 
     Movements are numbered as in `Intersection.movements`. Only centre lines count.
     """
@@ -93,7 +93,7 @@ def right_hand_conflicts() -> tuple[frozenset[int], ...]:
 
 
 class Platoon(NamedTuple):
-    """What the rules know of one vehicle at one moment."""
+    """What the rules know about one vehicle at one moment."""
 
     movement: int  #: its index
     driven: float  #: distance since insertion [m]
@@ -111,7 +111,7 @@ class AsRunList:
         self._conflicts = right_hand_conflicts()
 
     def step(self, platoons: dict[int, Platoon]) -> dict[int, float]:
-        """Update the list from what is on the road; the desired speeds that are set now [m/s]."""
+        """Update the list from what is on the road; return the desired speeds set now [m/s]."""
         self._register(platoons)
         speeds: dict[int, float] = {}
         leaving: list[tuple[int, float]] = []  # movement and leaving time of those ahead
@@ -135,7 +135,7 @@ class AsRunList:
         return speeds
 
     def _register(self, platoons: dict[int, Platoon]) -> None:
-        """Append vehicles that came, remove those that left; in most steps there are none."""
+        """Append vehicles that have come, remove those that have left; most steps have neither."""
         if any(v not in platoons or platoons[v].driven >= LEFT for v in self.order):
             self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
             self.granted.intersection_update(self.order)
@@ -151,8 +151,8 @@ class AsRunList:
 class V2ICAsRunSession:
     """One run: reads the host's views, and commands what changes.
 
-    It is called at insertion, where vehicles register, and where they leave the list; in between
-    at every step while any waits.
+    It is called at insertion, where vehicles register, and where they leave the list; in between,
+    at every step while any vehicle waits.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
@@ -195,7 +195,7 @@ class V2ICAsRunSession:
         return commands
 
     def _platoons(self, view: View) -> dict[int, Platoon]:
-        """The vehicles that may be in the list; the others are most of the view."""
+        """The vehicles that may be in the list; most of those in view cannot be."""
         platoons = {}
         for vehicle, lane, manoeuvre, distance, speed, _, demand_time in view.vehicles:
             driven = self._origin - distance + ROUNDING

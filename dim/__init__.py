@@ -1,4 +1,4 @@
-"""Decentralised intersection management: vehicles that decide alone, with the same answer."""
+"""Decentralised intersection management: vehicles that decide alone and reach the same answer."""
 
 from dim.as_run import AsRunDim
 from dim.controller import Dim

@@ -1,27 +1,27 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
 The paper describes one algorithm; the runs behind its figures followed another. This module holds
-all of what those runs did, so that they can be replayed vehicle by vehicle. An outsider cannot tell
+everything those runs did, so that they can be replayed vehicle by vehicle. An outsider cannot tell
 what was intended and what was a slip, so each difference is a quirk with a name:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
    road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
 2. *speeds by decree*: no vehicle slows down for a zone. When it enters one, its desired speed is
    replaced (14 m/s on the road, 10 in the red zone, 0 without and 10 with the right of way, 20
-   behind);
-3. *names decide*: vehicles are visited in the alphabetical order of their names, `v<second of
+   beyond);
+3. *names decide*: vehicles are visited in alphabetical order of their names, `v<second of
    demand>.<lane>_<manoeuvre>`, so that v100 comes before v99;
 4. *short action list*: only as many vehicles take part as there are arms, first visited, first
-   listed; a vehicle gives its place back 506 m after insertion;
+   listed; a vehicle gives up its place 506 m after insertion;
 5. *several of a lane*: the action list may hold two vehicles of one lane; of two with the same
-   movement only the later entry can be chosen;
+   movement, only the later entry can be chosen;
 6. *busy junction*: nothing is decided while any vehicle is between `bound` and 508 m;
 7. *green zone goes*: a vehicle in the action list and within 2 m of `bound` drives on without any
    right of way, at a desired speed of 50 m/s, and keeps the junction busy;
 8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then. A
    vehicle that loses it in the yellow zone is told 20 m/s for one step before it is held (the
    authors set 20 first, and 10 at the end of their loop for those that still have it);
-9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
+9. *lanes first*: of the maximal cliques, the one whose sorted movements come first in the
    alphabet wins, whatever its size (`order="size"` is the rule that the paper describes).
 
 All numbers are those of the authors' driver. Everything happens at the end of a step and takes
@@ -52,28 +52,28 @@ BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
 RED = {3: 20.0, 4: 20.0, 5: 25.0}
 
 YELLOW = 5.0  #: length of the yellow zone, up to the bound [m]
-GREEN = 2.0  #: of the stretch before the bound from which a vehicle goes regardless [m]
-FREED = 506.0  #: distance driven at which a place in the action list is given back [m]
+GREEN = 2.0  #: length of the stretch before the bound where a vehicle goes regardless [m]
+FREED = 506.0  #: distance driven at which a place in the action list is given up [m]
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
 #: Distance driven at which a vehicle is told 20 m/s for good [m], so that a host need not show it
-#: for longer. The authors have no such limit, but in the three runs that we checked no vehicle is
+#: for longer. The authors have no such limit, but in the three runs that we checked, no vehicle is
 #: told anything after 531 m.
 FOLLOWED = 600.0
 
-#: How much longer a vehicle stays in view, so that it is there when it has passed that [m].
+#: How much farther a vehicle stays in view, so that it is still seen after passing that mark [m].
 SEEN_BEYOND = 10.0
 
 RED_SPEED = 10.0  #: desired in the red zone [m/s]
 HELD_SPEED = 0.0  #: desired in the yellow zone without right of way [m/s]
 GO_SPEED = 10.0  #: desired with right of way [m/s]
 GREEN_SPEED = 50.0  #: desired in the green zone [m/s]
-EXIT_SPEED = 20.0  #: desired beyond, if nothing else is asked for [m/s]
+EXIT_SPEED = 20.0  #: desired beyond the bound, if nothing else is asked for [m/s]
 
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
 
-#: Room for rounding where a mark and a distance are compared [m].
+#: Rounding tolerance when a mark and a distance are compared [m].
 ROUNDING = 1e-9
 
 
@@ -129,7 +129,7 @@ class AsRunDim:
 
 
 class Car(NamedTuple):
-    """What the rules know of one vehicle: its name in the authors' driver, and how far it is."""
+    """What the rules know about a vehicle: its name in the authors' driver, and how far it is."""
 
     id: int
     name: str
@@ -147,14 +147,14 @@ class AsRunRules:
         self.yellow_start = self.bound - YELLOW
         self.red_start = self.yellow_start - RED[self.arms]
         self.green_start = self.bound - GREEN
-        self.serving: list[int] = []  #: ids, from the red zone on until they are clear
+        self.serving: list[int] = []  #: ids, from the red zone until the vehicles are clear
         self.action: list[int] = []  #: ids of the participants, in order of entry
         self.chosen: tuple[int, ...] = ()  #: ids of the vehicles with the right of way
 
     def step(self, cars: Mapping[int, Car]) -> dict[int, float]:
-        """Update the lists; the desired speeds that are set now [m/s].
+        """Update the lists; return the desired speeds set now [m/s].
 
-        `cars` are at least those from the start of the red zone on until they are clear.
+        `cars` must hold every vehicle from the start of the red zone until it is clear.
         """
         speeds: dict[int, float] = {}
         visited = sorted(cars.values(), key=lambda car: (car.name, car.id))
@@ -162,7 +162,7 @@ class AsRunRules:
         busy = self._visit(visited, speeds)
         busy |= self._green(cars, speeds)
         if not busy:
-            # Of one movement only the last entry counts.
+            # For each movement only the last entry counts.
             holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
             clique = winner(self.matrix, frozenset(holder), self.order, self.names)
             self.chosen = tuple(holder[movement] for movement in clique)
@@ -177,7 +177,7 @@ class AsRunRules:
         self.serving = [v for v in self.serving if v in cars and cars[v].driven <= CLEAR]
 
     def _visit(self, visited: list[Car], speeds: dict[int, float]) -> bool:
-        """Yellow zone and beyond, vehicle by vehicle; whether the junction is busy."""
+        """Yellow zone and beyond, vehicle by vehicle; return whether the junction is busy."""
         busy = False
         present = {car.id for car in visited}
         self.action = [v for v in self.action if v in present]
@@ -197,7 +197,7 @@ class AsRunRules:
         return busy
 
     def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
-        """Green zone: participants go regardless; whether there is one."""
+        """Green zone: participants go regardless; return whether there are any."""
         there = [v for v in self.serving if cars[v].driven >= self.green_start]
         going = [v for v in there if v in self.action]
         speeds.update(dict.fromkeys(going, GREEN_SPEED))

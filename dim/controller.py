@@ -1,7 +1,7 @@
 """DIM as a controller: one agent per vehicle, hosted.
 
-The vehicles of the paper look around all the time. The host calls at a few wake-ups only. These
-suffice, because between them no agent would change its mind:
+The vehicles of the paper look around all the time. The host calls only at a few wake-ups. These
+suffice because between them no agent would change its mind:
 
 - A new vehicle takes part when its front bumper passes the start of the yellow zone (a wake-up), or
   when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps every
@@ -9,19 +9,19 @@ suffice, because between them no agent would change its mind:
 - A participant begins to cross only when it holds the right of way, since a waiting vehicle can
   stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
   stays the same: without the vehicle that went, the best clique is the best among the movements in
-  harmony with it. Two cliques compare by the smallest lane rank that only one of them has, so a
-  lane that both have does not count.
+  harmony with it. Two cliques are compared by the smallest lane rank that only one of them has,
+  so a lane that both have does not count.
 - A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
 There are four exceptions:
 
-- Under `commit="paper"` a vehicle without the right of way may roll past half of the green zone and
-  is then granted it. That is another mark.
-- On a host with other brakes, a vehicle that loses its right of way may look committed until it
+- Under `commit="paper"` a vehicle without the right of way may roll past the middle of the green
+  zone and is then granted it. That point is another mark.
+- On a host with different brakes, a vehicle that loses its right of way may look committed until it
   stands. The session then looks again every step.
-- Where lane priorities change with time (`dim.priorities`), it looks again when they do.
-- Where perception errs, vehicles do not see the same, and none of this holds. They look around at
-  intervals (`Perception.period`).
+- Where lane priorities change with time (`dim.priorities`), the session looks again when they do.
+- Where perception errs, vehicles do not all see the same, and none of this holds. They look around
+  at intervals (`Perception.period`).
 """
 
 from __future__ import annotations
@@ -132,13 +132,13 @@ class Dim:
     def start(self, site: Site) -> DimSession:
         """Begin a run.
 
-        Raises `InputError`: a matrix or priorities for another number of arms, or roads too short
-        for the zones.
+        Raises `InputError` if the matrix or the priorities are for another number of arms, or the
+        roads are too short for the zones.
         """
         return DimSession(self, site)
 
     def ranks(self, site: Site) -> tuple[int, ...]:
-        """Rank of each lane here at time 0, 0 first; raises `InputError` for another n."""
+        """Rank of each lane here at time 0, 0 being first; raises `InputError` for another n."""
         n = site.intersection.n
         if self.priorities == "inflow":
             by_inflow = sorted(range(n), key=lambda lane: (-site.demand[lane], lane))
@@ -148,7 +148,7 @@ class Dim:
         return lane_ranks(self.priorities, n)
 
     def harmony(self, site: Site) -> HarmonyMatrix:
-        """The matrix in force at this site; raises `InputError` for a given one of another n."""
+        """The matrix in force at this site; raises `InputError` if a given one is for another n."""
         n = site.intersection.n
         if self.matrix is None:
             return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
@@ -162,8 +162,8 @@ class Dim:
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
-    Vehicles for whose id `follows` is false are seen, but have no agent. `takes` says how vehicles
-    take what they have seen of a true view: (true, seen) -> taken.
+    Vehicles whose id `follows` rejects are seen but have no agent. `takes` says how vehicles
+    interpret what they have seen of a true view: (true, seen) -> taken.
     """
 
     def __init__(
@@ -205,7 +205,7 @@ class DimSession:
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What wrong perception has done so far (`dim.senses.tally`); empty where it is exact."""
+        """What wrong perception has done so far (`dim.senses.tally`); empty if exact."""
         return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -250,7 +250,7 @@ class DimSession:
         return commands
 
     def table(self, view: View) -> tuple[DecisionTable, float]:
-        """The table of the present ranks, and until when they hold [s]."""
+        """The table for the current ranks, and the time until which they hold [s]."""
         base = self.rules.table
         if self._ranks is None:
             return base, math.inf
@@ -259,7 +259,7 @@ class DimSession:
 
 
 def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
-    """The ranks that all participants read from a view, or None where they never change."""
+    """The ranks that all participants read from a view, or None if they never change."""
     n = site.intersection.n
     if dim.priorities == "rotating":
         return lambda view: rotating(view.time, n, dim.turn_time)

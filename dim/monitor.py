@@ -1,31 +1,31 @@
-"""The safety monitor: a vehicle's last resort when others do not do what it reads them to want.
+"""The safety monitor: a vehicle's last resort when others do not do what it thinks they intend.
 
-The decision protects vehicles that read the others' intents right. A monitor does not decide. It
-belongs to one vehicle, uses what that vehicle sees, and watches the others that cross or can no
+The decision protects vehicles that read the others' intents correctly. A monitor does not decide.
+It belongs to one vehicle, uses what that vehicle sees, and watches the others that cross or can no
 longer stop:
 
-- *What another may do*: what it was read to want, as long as its motion does not contradict that.
-  A vehicle may do whatever its position still allows if it is beside every path of that reading, or
-  if it was read differently at different times.
+- *What another may do*: the intent that was read, as long as the motion does not contradict it.
+  If the other is off every path of that reading, or was read differently at different times, it may
+  do whatever its position still allows.
 - *Where it matters*: in the forbidden region of the two paths (`minisim.junction.coordination`).
-  The ego must be able to stop before it, however far the other goes, unless it leaves it in good
-  time.
-- *When it brakes*: as soon as this takes at least comfortable braking, and as hard as it takes.
-  Where it is too late to stop, the monitor compares whether going on or braking makes the two
-  touch.
+  The ego must be able to stop before that region, however far the other goes, unless it leaves the
+  region in good time.
+- *When it brakes*: as soon as stopping takes at least comfortable braking, and as hard as needed.
+  Where it is too late to stop, the monitor checks whether the two would touch if the ego goes on,
+  and if it brakes.
 
 Vehicles that cross by unanimous decisions are in harmony with each other (proved in
 `dim.proofs.protocol`). So with exact perception and `commit="stoppable"` a monitor never sees
 another vehicle in the way. It never brakes, and a run is the same as without it.
 
 Two vehicles that brake for each other must not stand for ever. Of two that stand, the one further
-in goes first, and of equals the one of the first lane, unless the other stands in its way. Both can
-see that.
+in goes first (if equal, the one from the first lane), unless the other stands in its way. Both can
+see which one that is.
 
-Vehicles that do not cross must not wait for each other for ever either. Where they read each other
-differently, each may conclude that it is not its turn. But there is always a right of way. So where
-no vehicle crosses and all have stood for a while, some have misread. Then the first lane goes
-alone, since that needs no intent (`Patience`).
+Nor may vehicles that do not cross wait for each other for ever. Where they read each other
+differently, each may conclude that it is not its turn. But some vehicle always has the right of
+way. So if no vehicle crosses and all have stood for a while, some have misread. Then the first lane
+goes alone, since that takes no knowledge of intents (`Patience`).
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
-#: What a vehicle that stops leaves between itself and where it must not be [m].
+#: The gap that a stopping vehicle leaves before the place where it must not be [m].
 ROOM = 0.25
 
 
 @declared
 class Monitor:
-    """A last resort for every vehicle, beside what it decides."""
+    """A last resort for every vehicle, in addition to its decisions."""
 
     # A shorter post-encroachment time is critical (Várhelyi, AAP 30(6), 1998).
     time_margin: float = real(
         "least time between leaving a conflict area and another's entering it", "s",
         default=1.0, low=0, high=10,
     )  # fmt: skip
-    # For where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
+    # Used where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
     look_ahead: float = real(
         "how far ahead motion is predicted", "s", default=4.0, low=0.5, high=30
     )
@@ -131,7 +131,7 @@ class Monitors:
         self._braking = braking
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
-        """How hard the ego must brake for another, whatever that one does [m/s²]; or 0."""
+        """How hard the ego must brake for another, whatever that does [m/s²]; 0 if not at all."""
         mine = self._rows[ego.lane][ego.manoeuvre]
         foes = (k for k in self._possible(other, readings) if self._conflict[mine, k])
         return max((self._asked_by(ego, mine, other, theirs) for theirs in foes), default=0.0)
@@ -164,11 +164,11 @@ class Monitors:
         if self._passes_first(ego, other, shared, mirrored):
             return 0.0
         if not first and stopping_distance(ego.speed, self._b_max) + ROOM <= ego.distance:
-            room = min(room, ego.distance)  # where it blocks no vehicle that clears the junction
+            room = min(room, ego.distance)  # where it blocks no vehicle clearing the junction
         return self._braking_for(ego, other, room - ROOM, shared)
 
     def _open(self, mine: int, x: float, other: Observed) -> bool:
-        """Whether the ego's way is free as long as the other stands where its body is."""
+        """Whether the ego's way is free as long as the other stands where it is."""
         body = self._rows[other.lane][other.manoeuvre]  # a path that it is on
         site = self._site
         return passes(site.intersection, site.vehicle, mine, x, body, -other.distance)
@@ -176,7 +176,7 @@ class Monitors:
     def _passes_first(
         self, ego: Observed, other: Observed, shared: Region, mirrored: Region
     ) -> bool:
-        """Whether the ego, as fast as now, is out of the region in good time before the other."""
+        """Whether the ego, at its present speed, leaves the region well before the other comes."""
         if ego.speed < STANDING:
             return False
         leaves = (shared.ends(-other.distance) + ego.distance) / ego.speed
@@ -197,7 +197,7 @@ class Monitors:
         return 0.0 if brakes and not self._touches(ego, a, other, shared) else self._b_max
 
     def _touches(self, ego: Observed, acceleration: float, other: Observed, shared: Region) -> bool:
-        """Whether the two come too near while the other goes on as it does."""
+        """Whether the two come too close if the other goes on as it does."""
         t = self._times
         stops = ego.speed / -acceleration if acceleration < 0.0 else math.inf
         driven = np.minimum(t, stops)
@@ -206,7 +206,7 @@ class Monitors:
 
 
 class Patience:
-    """How vehicles that all stand and wait for each other come to an end.
+    """What ends a deadlock in which all vehicles stand and wait for each other.
 
     After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
     junction on; `deceleration` is comfortable braking [m/s²].
@@ -249,7 +249,7 @@ class Patience:
         return True
 
     def remember(self, here: Collection[int]) -> bool:
-        """Forget all vehicles but these; whether any of them is waiting."""
+        """Forget all vehicles but these; return whether any of them is waiting."""
         self._alone.intersection_update(here)
         self._since = {vehicle: since for vehicle, since in self._since.items() if vehicle in here}
         return bool(self._since)

@@ -15,20 +15,20 @@ from minisim.control import Observed, Site, View, can_stop
 from minisim.junction.movements import movements_of
 from minisim.parameters import declared
 
-#: When a vehicle before the junction is committed. "stoppable": when comfortable braking no longer
-#: stops it before the junction. "paper": when it is past half of the green zone.
+#: When a vehicle before the junction is committed. "stoppable": when comfortable braking can no
+#: longer stop it before the junction. "paper": when it is past the middle of the green zone.
 COMMITS = ("stoppable", "paper")
 
 #: A host's rounding error [m]: a front bumper that has just passed a mark may seem to be before it.
 ROUNDING = 1e-6
 
-#: A slower vehicle stands [m/s]: SUMO's limit of waiting.
+#: A vehicle slower than this counts as standing [m/s]: SUMO's threshold for waiting.
 STANDING = 0.1
 
-#: The manoeuvre that an ego sees where it does not know the intent: it may be any.
+#: The manoeuvre that an ego sees if it does not know the intent, which may be any.
 UNKNOWN = 0
 
-#: Turns a view and an ego of it into the view that the ego sees. It sees itself exactly.
+#: Turns a view and an ego in it into the view that the ego sees. The ego sees itself exactly.
 See = Callable[[View, Observed], View]
 
 
@@ -38,9 +38,9 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None where the wake-ups of DIM suffice.
+        """How often vehicles must look [s]; None if DIM's wake-ups suffice.
 
-        They do as long as all vehicles see the same (`dim.controller`).
+        They suffice as long as all vehicles see the same (`dim.controller`).
         """
 
     def start(self, site: Site) -> See:
@@ -64,16 +64,16 @@ def see_all(view: View, ego: Observed) -> View:  # noqa: ARG001  (See's argument
 
 
 class Percept(NamedTuple):
-    """What Algorithm 1 needs to know of a view.
+    """What Algorithm 1 needs to know about a view.
 
     The front vehicle of a lane takes part between the start of the yellow zone and the junction,
     until it is committed. While it is committed, no vehicle of its lane takes part.
     """
 
     participants: tuple[int, ...]  #: ids of the vehicles that take part, by lane
-    crossing: tuple[int, ...]  #: of those that are committed, or partly in the junction
+    crossing: tuple[int, ...]  #: ids of those that are committed, or partly in the junction
     case: int  #: the participants' movements as an integer, see `DecisionTable`
-    #: The crossing vehicles' movements, bit k for the k-th; all of the lane for `UNKNOWN` intent.
+    #: The crossing vehicles' movements, bit k for the k-th; all of the lane's if `UNKNOWN`.
     occupied: int
     unknown: int = 0  #: lanes of participants with `UNKNOWN` intent, bit i for lane i; not in case
 
@@ -89,7 +89,7 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        A vehicle that brakes comfortably for the hold line never is, since the green zone is
+        One that brakes comfortably for the hold line is never committed, since the green zone is
         longer than the margin of `can_stop`.
         """
         if self.commit == "paper":

@@ -1,7 +1,7 @@
-"""The actuated signal: a green lasts until a gap in the traffic over a detector.
+"""The actuated signal: a green lasts until there is a gap in the traffic over a detector.
 
-The rule of SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
-has one successor; all constants are its defaults.
+It follows SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
+has one successor; all constants are SUMO's defaults.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from minisim.parameters import Name, declared, real
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
-#: Room for rounding where a mark is passed [m], and where an end is a whole second [s].
+#: Rounding tolerance for passing a mark [m], and for a green that ends on a whole second [s].
 ROUNDING = 1e-6
 
 
@@ -23,14 +23,14 @@ ROUNDING = 1e-6
 class Actuated:
     """A signal that prolongs a green while vehicles follow each other closely enough.
 
-    One phase an approach, in a fixed order; none is left out. Each lane has a loop before the
-    junction. While the last vehicle left it less than `max_gap` ago, the green goes on for the rest
-    of `detector_gap`, in which that vehicle reaches the line. It is rounded up to a whole second of
-    the phase and never goes beyond `max_green`. A vehicle that stands on the loop leaves no gap.
-    `min_green` is for the vehicles past the loop at the start of a green, which are not seen.
+    One phase per approach, in a fixed order; none is left out. Each lane has a loop before the
+    junction. If the last vehicle left it less than `max_gap` ago, the green goes on for the rest
+    of `detector_gap`, in which that vehicle reaches the line. The green is rounded up to a whole
+    second and never exceeds `max_green`. A vehicle that stands on the loop leaves no gap.
+    `min_green` serves the vehicles already past the loop when a green starts, which are not seen.
 
-    The time of a phase runs from the green that is really shown: a head waits until no vehicle
-    crosses its way.
+    A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
+    its way.
     """
 
     name = Name("actuated")
@@ -61,7 +61,7 @@ class Actuated:
         return min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
 
     def start(self, site: Site) -> GapSession:
-        """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
+        """Begin a run; raises `InputError` unless `order` lists every lane once."""
         return GapSession(self, site)
 
 
@@ -77,7 +77,7 @@ class GapSession(PhaseSession):
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Note vehicles that left a loop since the last view; each passes a mark within a step."""
+        """Note vehicles that have left a loop since the last view, at most a step ago."""
         free = self._detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
@@ -95,7 +95,7 @@ class GapSession(PhaseSession):
         return Verdict(lane, min(end, signal.max_green) - elapsed)
 
     def _gap(self, view: View, lane: int) -> float:
-        """For how long the lane's loop has been free [s]."""
+        """How long the lane's loop has been free [s]."""
         if any(
             v.lane == lane and v.distance <= self._detector and v.id not in self._passed
             for v in view.vehicles

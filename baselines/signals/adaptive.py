@@ -1,6 +1,6 @@
 """The adaptive signal: a phase lasts while delayed vehicles can still make use of it.
 
-The rule of SUMO's traffic light type `delay_based` (`MSDelayBasedTrafficLightLogic`; its
+It follows SUMO's traffic light type `delay_based` (`MSDelayBasedTrafficLightLogic`; its
 documentation cites Oertel & Wagner, TRB 2011).
 """
 
@@ -19,14 +19,14 @@ IDLE = 1.0
 class Adaptive:
     """A signal that prolongs a green for vehicles that have lost time before the junction.
 
-    One phase an approach, in a fixed order; none is left out. A vehicle that has lost more
+    One phase per approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
-    that it needs to the stop line at the speed limit, if that is before `max_green`. While the
-    other lanes are empty, a green goes on too.
+    it needs to reach the stop line at the speed limit, if that is before `max_green`. A green also
+    goes on while the other lanes are empty.
 
-    The time of a phase runs from the green that is really shown: a head waits until no vehicle
-    crosses its way. Time is lost against the speed limit, whatever a driver would like.
-    Defaults are SUMO's, greens and amber those of the authors' network.
+    A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
+    its way. Time loss is relative to the speed limit, whatever speed a driver would like.
+    Defaults are SUMO's, except for greens and amber, which are from the authors' network.
     """
 
     name = Name("adaptive")
@@ -52,7 +52,7 @@ class Adaptive:
         check_greens(self.min_green, self.max_green)
 
     def start(self, site: Site) -> DelaySession:
-        """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
+        """Begin a run; raises `InputError` unless `order` lists every lane once."""
         return DelaySession(self, site)
 
 
@@ -98,7 +98,7 @@ class DelaySession(PhaseSession):
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector at `entered`, `start` m away [s].
 
-    That is the time since then, less what the way since then takes at the limit [m/s]. So no look
-    is needed in between.
+    That is the time since then, less the time that the distance since then takes at the limit
+    [m/s]. So the vehicle need not be watched in between.
     """
     return now - entered - (start - distance) / limit

@@ -1,4 +1,4 @@
-"""The fixed-time signal: one phase an approach, in turn, with Webster's greens."""
+"""The fixed-time signal: one phase per approach, in turn, with Webster's greens."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
 from minisim.parameters import Name, checked, declared, real, switch
 
-#: What the head of a lane shows one after the other.
+#: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 
 
@@ -60,8 +60,8 @@ class FixedTime:
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
 
-        Raises `InputError`: as many greens as lanes are needed, `max_cycle` is too short, or
-        `order` is not all lanes, each once.
+        Raises `InputError` if the number of greens is not the number of lanes, `max_cycle` is too
+        short, or `order` does not list every lane once.
         """
         n = site.intersection.n
         if self.greens is None:
@@ -116,12 +116,12 @@ class Program:
         return self._start(self._stage(time) + 1)
 
     def _stage(self, time: float) -> int:
-        """The stage at `time`, counted from time 0 over all cycles; never one without duration."""
+        """The stage at `time`, counted from time 0 over all cycles; never one of zero duration."""
         before = max(math.floor(time / self.cycle) * len(self._starts) - 1, 0)
         return next(stage for stage in count(before) if self._start(stage + 1) > time)
 
     def _start(self, stage: int) -> float:
-        # From the number of the cycle, so that no rounding error adds up.
+        # Computed from the cycle number, so that rounding errors do not add up.
         cycle, k = divmod(stage, len(self._starts))
         return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
 

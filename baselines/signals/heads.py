@@ -1,6 +1,6 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
-A head turns green only when no vehicle on the junction conflicts with its lane, so safety does not
+A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
 depend on the length of an amber. At the end of a green, vehicles that can no longer stop
 comfortably keep their right of way; all others stop.
 """
@@ -35,7 +35,7 @@ SIGHT_MARGIN = 5.0
 
 
 class Colour(Enum):
-    """Of a signal head."""
+    """What a signal head can show."""
 
     RED = "red"
     AMBER = "amber"
@@ -63,9 +63,9 @@ class Heads:
         self.colours = [Colour.RED] * n
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
-        """Turn the heads to `wanted` as far as that is safe now; the commands for it.
+        """Turn the heads to `wanted` as far as that is safe now; return the commands for it.
 
-        Lanes are closed before others are opened, in one answer.
+        One answer closes lanes before it opens others.
         """
         commands: list[Command] = []
         self._let_go.intersection_update(v.id for v in view.vehicles)
@@ -112,7 +112,7 @@ def lane_order() -> Any:
 
 
 def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
-    """The order of n lanes; raises `InputError` if it is not all of them, each once."""
+    """The order of n lanes; raises `InputError` unless it lists each of them once."""
     if order is None:
         return tuple(range(n))
     if sorted(order) != list(range(n)):
@@ -123,8 +123,8 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
 def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
     """The vehicles before the junction that keep their right of way when their lane is closed.
 
-    Comfortable braking [m/s²] no longer stops them, or one behind them. `lane` holds the vehicles
-    of one lane, front to back.
+    Comfortable braking [m/s²] can no longer stop them, or a vehicle behind them, before the
+    junction. `lane` holds the vehicles of one lane, front to back.
     """
     approaching = [v for v in lane if v.distance >= 0.0]
     last = max((i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1)

@@ -1,8 +1,8 @@
-"""The longest-queue-first signal: max-pressure on one junction.
+"""The longest-queue-first signal: max-pressure at one junction.
 
 Max-pressure (Varaiya, Transp. Res. C 36 (2013): 177–195) gives green to the phase with the largest
-sum, over its movements, of what waits before the junction less what stands behind it. On a single
-junction whose exits flow freely nothing stands behind it, so the longest queue goes first.
+sum, over its movements, of the queue before the junction minus the queue beyond it. At a single
+junction whose exits flow freely there is no queue beyond it, so the longest queue goes first.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from minisim.parameters import Name, declared, real
 class LongestQueue:
     """A signal that turns to the approach with the most vehicles, every few seconds.
 
-    One phase an approach: since one lane carries all turns, any two approaches have movements that
-    conflict, and cannot be green together. Among equal queues the one whose last green is the
-    longest ago goes first, then in the order a, b, c…; an empty junction keeps its green. A lane
-    may wait for long while others always have more.
+    One phase per approach: since one lane carries all turns, any two approaches have movements that
+    conflict, and cannot be green together. Of equal queues, the one whose last green was longest
+    ago goes first; further ties go in the order a, b, c…. An empty junction keeps its green. A lane
+    may wait a long time while others always have more vehicles.
     """
 
     name = Name("longest-queue")
 
     # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
-    # several lanes. A change costs some 3 s, so that single lanes need the upper end.
+    # several lanes. A change costs some 3 s, so single lanes need the upper end.
     interval: float = real(
         "green between two looks, counted from the green that is really shown", "s",
         low=0.5, high=3600, default=10.0,
@@ -53,7 +53,7 @@ class QueueSession(PhaseSession):
         self._last_green = [-math.inf] * site.intersection.n  # [s]
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:  # noqa: ARG002  (PhaseSession's)
-        """The lane with the longest queue; looks again after another interval."""
+        """Choose the lane with the longest queue; look again after another interval."""
         self._last_green[lane] = view.time
         queues = [0] * len(self._last_green)
         for vehicle in on_detector(view, self._signal.detector_range):

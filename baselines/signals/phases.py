@@ -1,8 +1,8 @@
-"""What signals share whose phases last as long as a rule says: one phase an approach.
+"""What is common to signals that end their phases by a rule: one phase per approach.
 
-Between two phases the old lane shows amber. The new one turns green when no vehicle crosses its
-way any more (`Heads`). The time of a phase runs from the green that is really shown, so a
-shortest and a longest green mean what drivers see.
+Between two phases the old lane shows amber. The new one turns green once no vehicle crosses its
+way any more (`Heads`). A phase is timed from when its green is actually shown, so the shortest and
+longest greens are what drivers see.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from minisim.errors import InputError
 
 
 def check_greens(shortest: float, longest: float) -> None:
-    """Raise `InputError` for a longest green below the shortest [s]."""
+    """Raise `InputError` if the longest green is below the shortest [s]."""
     if longest < shortest:
         raise InputError(f"max_green must be at least min_green, {shortest:g} s, got {longest:g} s")
 
 
 class Verdict(NamedTuple):
-    """What a rule says of the present phase."""
+    """What a rule says about the current phase."""
 
-    lane: int  #: whose turn it is; another lane than now ends the phase
-    after: float  #: time until the next look [s]; it does not matter when the phase ends
+    lane: int  #: the lane whose turn it is; any lane but the current one ends the phase
+    after: float  #: time until the next look [s]; ignored if the phase ends
 
 
 class PhaseSession:
     """Shows green to one lane at a time; a subclass judges when a phase ends.
 
-    It is called when its rule asked for it, when a vehicle clears the junction, and when one
-    passes a mark. The rule sees `detector_range` [m] far before the junction, and is asked from
-    `min_green` after the start of a phase on. `marks` are where it must see front bumpers pass [m].
-    An `order` must be all lanes, each once (`InputError`); None is a, b, c….
+    It is called when its rule has asked for it, when a vehicle clears the junction, and when one
+    passes a mark. The rule sees the last `detector_range` [m] before the junction, and is asked
+    once a phase has lasted for `min_green`. `marks` are where it must see front bumpers pass [m].
+    An `order` must list every lane once (else `InputError`); None means a, b, c….
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class PhaseSession:
         """Take note of a view; called at every wake-up."""
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Say how the phase of `lane` goes on, which has been green for `elapsed` seconds."""
+        """Say how the phase of `lane`, green for `elapsed` seconds so far, goes on."""
         raise NotImplementedError
 
     def pass_on(self, lane: int) -> Verdict:
@@ -84,7 +84,7 @@ class PhaseSession:
         if self._began is None:  # the amber is over; the green comes when the way is clear
             self._lane, self._colour, self._due = self._next, Colour.GREEN, math.inf
             return
-        # Views tell the time to a microsecond.
+        # Times in views are exact to a microsecond.
         verdict = self.judge(view, self._lane, round(view.time - self._began, 6))
         if verdict.lane == self._lane:
             self._due = view.time + max(verdict.after, self._dt)

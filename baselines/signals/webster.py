@@ -14,8 +14,8 @@ from minisim.errors import InputError, instance, number, numbers
 
 #: Above this flow ratio the optimum cycle is useless (it is infinite at 1) and is capped.
 MAX_FLOW_RATIO = 0.95
-#: Green of a lane with hardly any traffic [s]. A vehicle at the line gets across it, and it leaves
-#: Webster's own greens at the paper's demands, at least 2.03 s, as they are.
+#: Green of a lane with hardly any traffic [s]. It lets a vehicle at the line across, and does not
+#: change Webster's own greens at the paper's demands, which are at least 2.03 s.
 MIN_GREEN = 2.0
 
 
@@ -40,15 +40,15 @@ def webster(
     min_green: float = MIN_GREEN,
     max_cycle: float = 180.0,
 ) -> SignalTiming:
-    """Webster's timing for one phase a lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
+    """Webster's timing for one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
 
-    Where Y > 0.95 the cycle is at most `max_cycle`, also where no optimum exists (Y ≥ 1).
+    If Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1).
     Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
     `min_green`. That lengthens the cycle; in a capped cycle the other lanes share the rest.
     `rates` are the inflows of the lanes [veh/h]; L is `lost_time_per_phase` [s] times their number.
     `equal_greens` divides the greens equally instead of in proportion to the inflows.
 
-    Raises `InputError`: a value out of range, or no room for the minimal greens in `max_cycle`.
+    Raises `InputError` if a value is out of range or `max_cycle` too short for the minimal greens.
     """
     flows = numbers("rates [veh/h]", rates)
     if not flows:
@@ -74,7 +74,7 @@ def webster(
 
 
 def optimal_cycle(flow_ratio: float, lost_time: float) -> float:
-    """Webster's cycle of least delay, (1.5L + 5)/(1 − Y) [s]; infinite for Y ≥ 1."""
+    """Webster's minimum-delay cycle, (1.5L + 5)/(1 − Y) [s]; infinite for Y ≥ 1."""
     return (1.5 * lost_time + 5.0) / (1.0 - flow_ratio) if flow_ratio < 1.0 else math.inf
 
 
@@ -107,8 +107,8 @@ def webster_delay(
 
     d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with cycle C [s], green
     g [s], λ = g/C, inflow `rate` q [veh/h in, veh/s here], saturation flow s [veh/h] and the degree
-    of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates the delay of a finite
-    run, whose queue has not had time to grow.
+    of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates the delay in a finite
+    run, where the queue has not had time to grow.
     """
     number("rate [veh/h]", rate, low=0, high=1e5)
     number("cycle [s]", cycle, above=0, high=1e5)

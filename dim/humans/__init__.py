@@ -1,1 +1,1 @@
-"""Human drivers among vehicles of DIM."""
+"""Human drivers among DIM vehicles."""

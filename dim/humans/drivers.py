@@ -1,11 +1,11 @@
 """Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
 The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20, two-way stop
-control, base values of a two-lane major street. They are for drivers that have stopped at a stop
-sign of the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
+control, base values for a two-lane major street. They are for drivers that have stopped at a stop
+sign on the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
 right-hand traffic. At an unsignalised junction of equal roads, an all-way stop (HCM chapter 21),
-all drivers stop and none accepts gaps. Drivers here do both: among themselves they go in the order
-of stopping, and they accept gaps between vehicles that need not stop.
+all drivers stop and none accepts gaps. Drivers here do both: among themselves, the first
+to stop goes first, and they accept gaps between vehicles that need not stop.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from minisim.junction.turns import Turn, turns
 from minisim.parameters import declared, real, reals, word
 from minisim.streams import stream
 
-#: What others believe about a human's way. "motion": only what its place and heading show.
-#: "signals": also an indicator that blinks. "silence": also that a vehicle without one goes
-#: straight on, which is false for the turns that no indicator announces.
+#: What others go by to tell a human's way. "motion": only what its place and heading show.
+#: "signals": also a blinking indicator. "silence": also that a vehicle without one goes straight
+#: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
 #: Bounds of a uniform draw whose normal quantile is taken.
@@ -81,7 +81,7 @@ class Driver(NamedTuple):
     """One vehicle's driver."""
 
     human: bool  #: otherwise the vehicle follows DIM
-    careless: float  #: 0 … 1; it signals no turn for which a larger share of drivers does not
+    careless: float  #: 0 … 1; it signals no turn that a larger share of drivers leaves unsignalled
     gap: float  #: factor on the critical gaps
 
 
@@ -116,7 +116,7 @@ class Drivers:
 
 
 class Readings:
-    """The ways that a vehicle's indicator and motion leave possible, for all that see it.
+    """The ways that a vehicle's indicator and motion leave open to it, as others see them.
 
     Where two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
     """
@@ -133,7 +133,7 @@ class Readings:
         return self._rows[vehicle.lane][vehicle.manoeuvre]
 
     def possible(self, vehicle: Observed, trust: str) -> list[int]:
-        """Movements, by index, that a vehicle may take as far as others can see.
+        """Movements, by index, that a vehicle might take, as far as others can tell.
 
         Vehicles that follow DIM announce every turn, so one without a signal goes straight on.
         """

@@ -1,23 +1,23 @@
 """Mixed autonomy: vehicles that follow DIM among human drivers.
 
-DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: a vehicle of
-DIM enters beside it only in harmony with everything that it may do. A human stops at the hold line
-as at an all-way stop (a junction of equal roads) and looks. After its reaction time it goes when
+DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: a DIM
+vehicle enters only if it is in harmony with everything the human may do. A human stops at the hold
+line as at an all-way stop (a junction of equal roads) and looks. After its reaction time it goes if
 
 - every human that stopped before it and is in its way has gone,
-- every vehicle inside has left its way,
-- no vehicle of DIM rolls through its yellow zone, and none will arrive within the critical gap.
+- every vehicle inside is out of its way,
+- no DIM vehicle is rolling through its yellow zone, and none arrives within the critical gap.
 
 It sees positions, speeds and indicators, never a right of way.
 
-No vehicles collide, unless some believe in silence (`dim.humans.drivers.TRUSTS`). When a human
-starts, the vehicles of DIM in conflict with it stand or are outside the yellow zone, and get no
-right of way until it has left. A standing vehicle of DIM has none: with the junction empty, it
-would have moved off one step after it was granted one, before a driver can look.
+No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`). When a human
+starts, the DIM vehicles in conflict with it stand or are outside the yellow zone, and get no
+right of way until it has left. A standing DIM vehicle has none: with the junction empty, it would
+have moved off one step after being granted it, before a driver can look.
 
-No vehicles wait in a circle: DIM waits for humans, and no human waits for a vehicle of DIM that
-stands. So drivers must recognise such vehicles, as with marker lamps for automated driving (SAE
-J3134). Otherwise each would let the other go first.
+No vehicles wait in a circle: DIM waits for humans, and no human waits for a DIM vehicle that
+stands. So drivers must be able to recognise DIM vehicles, say by marker lamps for automated driving
+(SAE J3134). Otherwise each would let the other go first.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Mixed:
 
     @property
     def name(self) -> str:
-        """That of the DIM, and the share: `dim+humans=0.2`."""
+        """The name of its DIM, and the share: `dim+humans=0.2`."""
         return f"{self.dim.name}+humans={self.share:g}"
 
     def start(self, site: Site) -> Session:
@@ -67,7 +67,7 @@ class Mixed:
     def human(self, seed: int, count: int) -> Bools:
         """Which of the first `count` vehicles of the run with this `seed` are human.
 
-        Vehicles count in the order of their demand times, as in a trip table; shape (count,).
+        Vehicles are in the order of their demand times, as in a trip table; shape (count,).
         """
         return Drivers(self.humans, self.share, seed).human(count)
 
@@ -84,7 +84,7 @@ class MixedSession:
         plan = self._dim.plan
         self.plan: Plan = replace(
             plan,
-            marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another comes first
+            marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another becomes first
             sight=max(plan.sight, self._humans.sight),
         )
 
@@ -94,7 +94,7 @@ class MixedSession:
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What wrong perception has done to the vehicles of DIM (`dim.senses.tally`)."""
+        """What wrong perception has done to the DIM vehicles (`dim.senses.tally`)."""
         return self._dim.counts
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -106,10 +106,10 @@ class MixedSession:
 
 
 def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, View], View]:
-    """How a vehicle of DIM takes what it has seen of a true view."""
+    """How a DIM vehicle interprets what it has seen of a true view."""
     drivers, movements = readings.drivers, site.intersection.movements
     start = mixed.dim.zones.yellow_start + ROUNDING
-    latest: list[View] = []  # what was seen last, and how it was taken
+    latest: list[View] = []  # what was seen last, and how it was interpreted
 
     def take(view: View, seen: View) -> View:
         if not latest or latest[0] is not seen:
@@ -132,9 +132,9 @@ def _taken(
     start: float,
     movements: Movements,
 ) -> Iterable[Observed]:
-    """The vehicles of a view as DIM takes them.
+    """The vehicles of a view as DIM interprets them.
 
-    A human at the front of a lane, from the yellow zone on, is taken for a vehicle that can no
+    A human at the front of a lane, from the yellow zone on, is treated as a vehicle that can no
     longer stop before the junction. `ways` are the movements that each human there may take.
     """
     lane = -1
@@ -152,7 +152,7 @@ def _taken(
 
 
 class _Humans:
-    """The human drivers of a run; they look `sight` [m] far before the junction."""
+    """The human drivers of a run; they see the last `sight` [m] before the junction."""
 
     def __init__(self, mixed: Mixed, site: Site, readings: Readings) -> None:
         humans, zones = mixed.humans, mixed.dim.zones
@@ -200,7 +200,7 @@ class _Humans:
         return [*commands, Wake(now + max(LOOK, self._dt))] if here else commands
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
-        """Whether the reaction and the follow-up time are over, but for half a step."""
+        """Whether the reaction and follow-up times are over, to within half a step."""
         humans, turn = self._humans, self._readings.turns[self._readings.index(vehicle)]
         looked = self._standing[vehicle.id] + humans.reaction
         followed = self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn]
