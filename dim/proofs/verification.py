@@ -68,7 +68,7 @@ class Analysis:
     claims: tuple[Claim, ...]
     sizes: Mapping[int, int]  #: cases by the number of vehicles that may go
     ties: Mapping[int, int]  #: cases by the number of cliques of the largest size
-    #: That size -> the first of the cases with the most such cliques, and the number of these cases.
+    #: That size -> the first of the cases with the most such cliques, and how many such cases.
     worst: Mapping[int, tuple[Movements, int]]
 
     @property
