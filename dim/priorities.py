@@ -1,18 +1,18 @@
 """Which lane comes first where cliques tie: priorities that all vehicles know without a message.
 
 Fixed ranks starve the last lane. The two rules here change the ranks as time passes. They need
-nothing that a vehicle cannot know by itself:
+nothing that a vehicle cannot know on its own:
 
-- "rotating" needs a shared clock, such as that of satellite navigation. Each lane in turn comes
-  first for some seconds, and the others follow clockwise.
-- "waiting" puts that lane first whose front vehicle passed the start of the yellow zone longest
-  ago. A vehicle that comes later has seen only what happened since the junction came into its
-  sensors' range. When it takes part itself, it has watched for at least `memory` = (range − yellow
-  zone's start) / speed limit, since no vehicle drives faster. So no wait counts more than `memory`,
-  and every participant knows all waits: a vehicle that passed before the late one began to watch
-  has waited for longer. Lanes that tie rank as by "rotating".
+- "rotating" needs a shared clock, such as the one from satellite navigation. Each lane in turn
+  comes first for some seconds, and the others follow clockwise.
+- "waiting" puts first the lane whose front vehicle passed the start of the yellow zone longest ago.
+  A vehicle that comes later has seen only what has happened since the junction came within range
+  of its sensors. By the time it takes part itself, it has watched for at least `memory` = (range −
+  yellow zone's start) / speed limit, since no vehicle drives faster. So no wait counts for more
+  than `memory`, and every participant knows all waits: a vehicle that passed before the latecomer
+  began to watch has waited longer than that. Lanes that tie are ranked as in "rotating".
 
-All vehicles that look at the same moment get the same ranks, whenever they came.
+All vehicles that look at the same moment get the same ranks, no matter when they came.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from dim.zones import Zones
 from minisim.control import Observed, Site
 from minisim.errors import InputError
 
-#: How long each lane comes first [s]. No vehicle takes as long to cross: from a stand 2 m before
-#: the junction, 22 m at 2.6 m/s² take 4.1 s. So there is a decision in every turn of a lane.
+#: How long each lane comes first [s]. No vehicle takes that long to cross: from a standstill 2 m
+#: before the junction, 22 m at 2.6 m/s² take 4.1 s. So every lane's turn includes a decision.
 TURN_TIME = 10.0
 
 #: How far vehicles see the others' approach lanes and yellow zones [m]. Manoeuvres have been read
@@ -34,12 +34,12 @@ TURN_TIME = 10.0
 #: prediction", IEEE IV 2017).
 SENSOR_RANGE = 100.0
 
-#: Times that differ by less are the same [s]: hosts round their clocks.
+#: Times that differ by less than this count as the same [s]: hosts round their clocks.
 SAME_TIME = 1e-6
 
 
 class Ranking(NamedTuple):
-    """The rank of each lane, 0 first, and until when they hold if nothing happens [s]."""
+    """Each lane's rank, 0 first, and the time until which the ranks hold if nothing happens [s]."""
 
     ranks: tuple[int, ...]
     until: float
@@ -54,10 +54,10 @@ def rotating(time: float, n: int, turn_time: float = TURN_TIME) -> Ranking:
 def longest_waiting(
     time: float, n: int, since: dict[int, float], memory: float, turn_time: float = TURN_TIME
 ) -> Ranking:
-    """Ranks of n lanes by waiting time, counted up to `memory`; rotating ranks break ties [s].
+    """Ranks of n lanes by waiting time, capped at `memory` [s]; rotating ranks break ties.
 
-    `since` is when the front vehicle of each lane passed the start of the yellow zone; any time at
-    least `memory` ago for a vehicle that was there before the observer.
+    `since` is when the front vehicle of each lane passed the start of the yellow zone; for a
+    vehicle that was there before the observer, any time at least `memory` ago will do.
     """
     turns = rotating(time, n, turn_time)
     waits = {lane: min(time - when, memory) for lane, when in since.items()}
@@ -68,7 +68,7 @@ def longest_waiting(
 
 
 def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> float:
-    """How long a vehicle has watched at least when it begins to take part [s]; or `InputError`."""
+    """The least time a vehicle has watched before it takes part [s]; may raise `InputError`."""
     room = sensor_range - zones.yellow_start
     if room <= 0.0:
         raise InputError(
@@ -79,16 +79,16 @@ def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> f
 
 
 class PassingTimes:
-    """When each vehicle passed `start`, that of the yellow zone [m], as one observer saw it."""
+    """When each vehicle passed `start`, the yellow zone's start [m], as one observer saw it."""
 
     def __init__(self, start: float) -> None:
         self._start = start
         self._passed: dict[int, float] = {}
 
     def look(self, time: float, vehicles: Iterable[Observed]) -> dict[int, float]:
-        """Note which vehicles have passed; lane -> when its front vehicle did [s].
+        """Note which vehicles have passed; return lane -> when its front vehicle passed [s].
 
-        A vehicle that is there at the first look counts as having just passed.
+        A vehicle already there at the first look counts as having just passed.
         """
         near = [v for v in vehicles if v.distance <= self._start]
         self._passed = {v.id: self._passed.get(v.id, time) for v in near}

@@ -1,4 +1,4 @@
-"""Figures and animations of decisions, runs and results: the only room that draws."""
+"""Figures and animations of decisions, runs and results: the only package that draws."""
 
 from figures.demo import performance_figure
 from figures.film.animate import write_animation

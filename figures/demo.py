@@ -1,4 +1,4 @@
-"""Waiting and travel time over density, one line a controller."""
+"""Waiting and travel time over density, one line per controller."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DODGE = 2.5
 
 
 def performance_figure(points: pd.DataFrame, title: str = "") -> Figure:
-    """Draw means with their confidence intervals, as `scenarios.demo.average` has them."""
+    """Draw means with their confidence intervals, as computed by `scenarios.demo.average`."""
     figure, panels = plots.panels(
         9.2, 4.5, len(PANELS), sharey=False, left=0.075, right=0.985, top=0.745, bottom=0.13,
         wspace=0.2,

@@ -14,12 +14,12 @@ from figures.tables import WRITERS, save_table
 from minisim.errors import choice
 from scenarios.studies import NAMES, module_name
 
-#: Study -> its section, in the order of the studies.
+#: Study -> its section, in the studies' order.
 STUDIES: dict[str, Section] = {
     name: import_module(f"figures.studies.{module_name(name)}").SECTION for name in NAMES
 }
 
-#: In the order of the report.
+#: All sections, in the report's order.
 SECTIONS = sorted((*STUDIES.values(), schematic.SECTION), key=lambda section: section.appendix)
 
 #: All figures and tables, by name.
@@ -27,12 +27,12 @@ GALLERY = {item.name: item for section in SECTIONS for item in section.items}
 
 
 def item_named(name: str) -> Item:
-    """A figure or table by name; `InputError` names the nearest one."""
+    """A figure or table by name; if there is none, `InputError` names the closest match."""
     return GALLERY[choice("figure", name, GALLERY)]
 
 
 def write(drawing: Drawing, folder: Path, name: str) -> list[Path]:
-    """Write a drawing in all its formats, each whole or not at all; returns the files."""
+    """Write a drawing in all its formats, each completely or not at all; return the files."""
     if isinstance(drawing, Figure):
         files = [folder / f"{name}.{suffix}" for suffix in FORMATS]
         for file in files:

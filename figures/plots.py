@@ -1,4 +1,4 @@
-"""Plots of means with intervals, their axes and legends, and the small print below."""
+"""Plots of means with intervals, their axes and legends, and the small print below them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
-#: Series are drawn side by side, so that their bars do not cover each other: over this share of
-#: the range of demands, or this share a series if that is more.
+#: Series are drawn side by side, so that their bars do not cover each other: spread over this share
+#: of the range of demands, or this share per series if that is more.
 DODGE, APART = 0.028, 0.0075
 DENSITY_LABEL = "demand [veh/h/lane]"
 #: Left edge of titles, legends and small print, as a share of the figure.
@@ -28,7 +28,7 @@ LEFT = 0.012
 #: Size of the small print [pt].
 FOOTNOTE_SIZE = 7.5
 
-#: A line with few points, see `draw_line`.
+#: Style of a line with few points, see `draw_line`.
 BOLD: dict[str, Any] = {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
 
 
@@ -53,7 +53,7 @@ def draw_line(
 ) -> None:  # fmt: skip
     """A line with intervals, and arrows at points whose queue was still growing.
 
-    `changes` are keywords of `Axes.errorbar`.
+    `changes` are keyword arguments of `Axes.errorbar`.
     """
     bars = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
     drawn: dict[str, Any] = {
@@ -71,9 +71,9 @@ def draw_line(
 
 
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
-    """One line a series over demand: mean over seeds, interval, arrows at growing queues.
+    """One line per series over demand: mean over seeds, interval, arrows at growing queues.
 
-    `rows` are of a study (`Results.good`); a series without rows is left out.
+    `rows` come from a study (`Results.good`); a series without rows is left out.
     """
     if rows.empty:
         axes.text(
@@ -92,7 +92,7 @@ def draw_over(
     axes: Axes, rows: pd.DataFrame, by: str, metric: str, look: style.Look,
     scale: float, shift: float,
 ) -> None:  # fmt: skip
-    """One line over the values of a column, which are scaled and shifted."""
+    """One line over the values of a column, scaled and shifted."""
     cells = list(rows.groupby(by))
     draw_line(
         axes, [scale * float(str(value)) + shift for value, _ in cells],
@@ -132,7 +132,7 @@ def offset(rows: pd.DataFrame, place: int, count: int) -> float:
 
 
 def density_axis(axes: Axes, densities: Iterable[float]) -> None:
-    """The demands that were run as ticks, six at most, with a margin around them."""
+    """Ticks at the demands that were run, six at most, with a margin around them."""
     shown = sorted(set(densities))
     step = math.ceil(len(shown) / 6)
     axes.set_xticks(shown[(len(shown) - 1) % step :: step], minor=False)
@@ -141,7 +141,7 @@ def density_axis(axes: Axes, densities: Iterable[float]) -> None:
 
 
 def paper_densities(axes: Axes) -> None:
-    """The paper's demands as ticks, with a margin around them."""
+    """Ticks at the paper's demands, with a margin around them."""
     axes.set_xticks(DENSITIES)
     axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
 
@@ -149,7 +149,7 @@ def paper_densities(axes: Axes) -> None:
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
     """A logarithmic time axis from `low` to `high` [s] with plain numbers.
 
-    Below `linear` it is linear, so that it can show 0.
+    Below `linear` the axis is linear, so that it can show 0.
     """
     if linear is None:
         axes.set_yscale("log")
@@ -161,19 +161,19 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.set_yticks(([0.0] if low == 0.0 else []) + [t for t in shown if t >= (linear or 0.0)])
     axes.set_yticks([], minor=True)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    # A marker at 0 is shown whole, and so is one at the lowest value.
+    # Show a marker at 0 whole, and one at the lowest value too.
     axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
 
 
 def scale_words(linear: float | None) -> str:
-    """The scale of an axis of `log_time`, for its label."""
+    """The scale of a `log_time` axis in words, for its label."""
     return "logarithmic" if linear is None else f"log., linear below {linear:g}"
 
 
 def panels(
     width: float, height: float, count: int, *, rows: int = 1, sharey: bool = True, **edges: float
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of inches with panels in rows; `edges` as in `Figure.subplots_adjust`."""
+    """A figure sized in inches, with panels in rows; `edges` as in `Figure.subplots_adjust`."""
     figure = style.new_figure(width, height)
     drawn = figure.subplots(rows, count // rows, sharey=sharey, squeeze=False)
     figure.subplots_adjust(**edges)
@@ -200,7 +200,7 @@ def looks_legend(
 
 
 def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:
-    """A legend of the markers of every series, with those of the paper's values or without."""
+    """A legend of every series' markers, with or without the markers of the paper's values."""
     handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
     labels = ["ours, mean and 95 % interval"]
     if paper:
@@ -222,7 +222,7 @@ def legend(
     figure: Figure, handles: Sequence[Any], labels: Sequence[str], top: float,
     ncols: int | None = None, **changes: Any,
 ) -> None:  # fmt: skip
-    """A legend in the quiet style; `changes` are keywords of `Figure.legend`."""
+    """A legend in the quiet style; `changes` are keyword arguments of `Figure.legend`."""
     drawn: dict[str, Any] = {
         "loc": "upper left", "bbox_to_anchor": (LEFT, top), "frameon": False, "fontsize": 9.5,
         "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
@@ -233,8 +233,8 @@ def legend(
 
 
 def footnote(figure: Figure, text: str) -> None:
-    """Small print along the lower edge, in as many lines as it takes."""
-    # A letter is about 0.54 of its size wide; an inch has 72 points.
+    """Small print along the lower edge, on as many lines as it needs."""
+    # A letter is about 0.54 times its size in width; an inch has 72 points.
     columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
     figure.text(
         LEFT, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,

@@ -1,4 +1,4 @@
-"""The report of a reproduction: one Markdown file for a reviewer."""
+"""The report on a reproduction: one Markdown file for a reviewer."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def write_report(
     archive: Archive, made: Sequence[Made], jobs: int, folder: Path,
     progress: Callable[[int, int], None], *, parts: Collection[str] = NAMES,
 ) -> int:  # fmt: skip
-    """Draw into `folder`/figures, then write `folder`/report.md; returns the number of drawings.
+    """Draw into `folder`/figures, then write `folder`/report.md; return the number of drawings.
 
-    `parts` are studies; unless they are all, the report has only figures that need one of them.
-    `progress` is called with the figures drawn and their number. Raises `FileError`.
+    `parts` are studies; unless all are given, the report has only figures that need one of them.
+    `progress` is called with the figures drawn and the total. Raises `FileError`.
     """
     pictures = make_folder(folder / "figures")
     drawn: dict[str, Drawing] = {}

@@ -1,1 +1,1 @@
-"""What is proved of DIM: the decision over all cases, the protocol over all states."""
+"""What is proved about DIM: the decision over all cases, the protocol over all states."""

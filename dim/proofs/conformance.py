@@ -1,8 +1,8 @@
-"""Runs checked against the protocol: their views and commands must be a path of the model.
+"""Runs checked against the protocol: their views and commands must form a path of the model.
 
     simulate(scenario, Checked(Dim()))
 
-behaves as `Dim()` on any host, but raises an error where the host or the session does something
+behaves like `Dim()` on any host, but raises an error where the host or the session does something
 that `dim.proofs.protocol` does not allow. So what was proved about the model holds for the run.
 """
 
@@ -59,7 +59,7 @@ class CheckedSession:
     def decide(self, view: View) -> Iterable[Command]:
         """DIM's commands, checked.
 
-        Raises `ConformanceError`: an event since the last view, or a command, is not possible.
+        Raises `ConformanceError` if an event since the last view, or a command, is not possible.
         """
         commands = list(self._session.decide(view))
         self._follow(view)
@@ -69,7 +69,7 @@ class CheckedSession:
         return commands
 
     def _follow(self, view: View) -> None:
-        """Take the model from the last view to this one: vehicles move on, leave and come."""
+        """Take the model from the last view to this one: vehicles move on, leave and arrive."""
         near = [v for v in view.vehicles if v.distance <= self._start]
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
         inside = {v.id: 1 << self.protocol.matrix.index(v.movement) for v in near if v.distance < 0}
@@ -91,7 +91,7 @@ class CheckedSession:
         self._fronts = {lane: v.id for lane, v in fronts.items()}
 
     def _move(self, view: View, vehicle: Observed) -> None:
-        """A front vehicle that is still before the junction."""
+        """Move on a front vehicle that is still before the junction."""
         front = self.state.fronts[vehicle.lane]
         if front is None:
             raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle.id} came unseen")
@@ -130,7 +130,7 @@ class CheckedSession:
         )
 
     def _compare(self, view: View, commands: Iterable[Command]) -> None:
-        """Raise unless the vehicles that go are those that the model lets go."""
+        """Raise unless the vehicles that go are exactly the ones that the model lets go."""
         for command in commands:
             if isinstance(command, Go):
                 self._going.add(command.vehicle)

@@ -1,8 +1,9 @@
-"""Whether the protocol is safe and live: all its states, visited one by one.
+"""Whether the protocol is safe and live, found by visiting all its states one by one.
 
-Safe: no two movements in conflict are inside at once. Live: whenever vehicles are there, one of
-them can go on once all have looked; and since every move but slowing down takes a vehicle on, the
-junction empties when no new ones come. Fair: no vehicle waits for ever while others come and cross.
+Safe: no two conflicting movements are inside at once. Live: whenever vehicles are there, one of
+them can go on once all have looked; and since every move except slowing down takes a vehicle
+forward, the junction empties if no new ones come. Fair: no vehicle waits forever while others
+come and cross.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ import networkx as nx
 from dim.proofs.protocol import TURN, WAITING, Event, Protocol, State
 from minisim.errors import InputError, instance, integer
 
-#: The most states that are visited: about a gigabyte of memory.
+#: The most states to visit: they take about a gigabyte of memory.
 MAX_STATES = 3_000_000
 
 Path = tuple[Event, ...]
 
-#: States, and what happens in each.
+#: States, and the event that happens in each.
 Steps = tuple[tuple[State, Event], ...]
 
-#: State -> the state that it was first reached from, and the event; nearest first.
+#: State -> the state from which it was first reached, and the event; nearest first.
 Reached = dict[State, tuple[State, Event] | None]
 
 #: Called with the number of states visited.
@@ -33,21 +34,21 @@ Visited = Callable[[int], object]
 
 @dataclass(frozen=True)
 class Exploration:
-    """The result of a search through the states. It ends with the nearest unsafe ones."""
+    """The result of a search through the states, which ends at the nearest unsafe ones."""
 
     protocol: Protocol
     states: int
     transitions: int
     complete: bool  # whether all states were visited
-    unsafe: tuple[Path, ...]  # the shortest way to each state with a conflict inside
-    stuck: Path | None  # the shortest way to a state in which no vehicle can go on
+    unsafe: tuple[Path, ...]  # the shortest path to each state with a conflict inside
+    stuck: Path | None  # the shortest path to a state in which no vehicle can go on
 
 
 @dataclass(frozen=True)
 class Lasso:
-    """How the front vehicle of a lane waits for ever: the events before, and those that repeat.
+    """How a lane's front vehicle waits forever: the events that lead there, then the repeated ones.
 
-    All vehicles look after each event, and a vehicle that can go on does so at some time.
+    All vehicles look after each event, and a vehicle that can go on eventually does.
     """
 
     lane: int
@@ -60,7 +61,7 @@ def explore(
 ) -> Exploration:
     """Visit every reachable state, nearest first, or stop after the nearest unsafe ones.
 
-    Raises `InputError` for more than `max_states`.
+    Raises `InputError` if there are more than `max_states`.
     """
     instance("protocol", protocol, Protocol)
     integer("max_states", max_states, low=1)
@@ -98,10 +99,10 @@ def is_stuck(protocol: Protocol, state: State) -> bool:
 
 
 def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
-    """For each lane, the shortest way in which its front vehicle waits for ever, or None.
+    """For each lane, the shortest way for its front vehicle to wait forever, or None.
 
     None is a proof over all states that it cannot. The proof assumes that all vehicles look between
-    two events, that a vehicle that can go on does so some day, and that a turn of the rotating
+    any two events, that a vehicle that can go on eventually does, and that a turn of the rotating
     priority is long enough for a decision.
     """
     instance("protocol", protocol, Protocol)
@@ -135,7 +136,7 @@ def _waits(state: State, lane: int) -> bool:
 
 
 def _reached(protocol: Protocol) -> Reached:
-    """All states of `prompt`."""
+    """All states that `prompt` can reach."""
     reached: Reached = {protocol.start: None}
     queue = deque([protocol.start])
     while queue:
@@ -171,7 +172,7 @@ def _shortest(
 
 
 def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Steps]:
-    """Closed walks of so many steps from `start`."""
+    """Closed walks of `length` steps from `start`."""
     trail: list[tuple[State, Event]] = []
 
     def walk(state: State, left: int) -> Iterator[Steps]:
@@ -188,10 +189,10 @@ def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Ste
 
 
 def is_fair(protocol: Protocol, steps: Steps) -> bool:
-    """Whether `steps`, repeated for ever, get somewhere and leave no other vehicle out.
+    """Whether `steps`, repeated forever, get somewhere and leave no other vehicle out.
 
-    A vehicle enters. One that could go on all the time does. One that is inside all the time leaves
-    (or others follow on the same movement). A turn that could end all the time ends.
+    A vehicle enters. One that can go on in every state does so. One that is inside in every state
+    leaves (or others follow on the same movement). A turn that can end in every state ends.
     """
     events = {event for _, event in steps}
     states = [state for state, _ in steps]

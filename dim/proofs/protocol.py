@@ -1,14 +1,14 @@
 """DIM as a transition system over discrete zones: all that its safety and liveness depend on.
 
 The protocol sees little of a vehicle's motion: it comes to the front of its lane, starts to roll,
-gets committed, enters, leaves. So a state holds the front vehicle of each lane before the junction
-(the only one of its lane that decides anything) and the set of movements inside. That set is
-enough, however many vehicles follow each other on one movement, so the model is finite without a
+becomes committed, enters, leaves. So a state holds the front vehicle of each lane before the
+junction (the only one in its lane that decides anything) and the set of movements inside. That is
+enough, however many vehicles follow each other on one movement, so the model is finite without any
 limit on traffic. There is no time: whatever can happen next may happen, in any order and after any
 delay. Every simulated run is a path of this model (`dim.proofs.conformance` checks it), but few
 paths are runs.
 
-All vehicles look at the same moment, as they do in `dim.controller`, but after any delay.
+All vehicles look at the same moment, as in `dim.controller`, but after an arbitrary delay.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from minisim.parameters import declared, part, word
 
 #: Which lane comes first where cliques tie. "fixed": the lanes' own order. "rotating": the lane
 #: whose turn it is, then the others clockwise; a turn ends after a decision at the earliest.
-#: "waiting": the lane whose front vehicle came first, as if every vehicle remembered that for ever.
+#: "waiting": the lane whose front vehicle came first, as if every vehicle remembered it forever.
 PRIORITIES = ("fixed", "rotating", "waiting")
 
-#: Phases of a front vehicle. It has waited since it came; or, with commit="paper" only, it has had
-#: the right of way and may be anywhere before it is committed, where it may roll on without the
-#: right of way; or it is committed.
+#: Phases of a front vehicle. It has been waiting since it came; or, with commit="paper" only, it
+#: has had the right of way and may be anywhere up to the point where it is committed, and may roll
+#: on there without the right of way; or it is committed.
 WAITING: Final = 0
 ROLLING: Final = 1
 COMMITTED: Final = 2
@@ -48,16 +48,16 @@ class Front(NamedTuple):
 class State(NamedTuple):
     """What the protocol depends on."""
 
-    fronts: tuple[Front | None, ...]  # of each lane
-    inside: int = 0  # movements in the junction, bit k for the k-th
+    fronts: tuple[Front | None, ...]  # one per lane
+    inside: int = 0  # movements in the junction, bit k for the k-th one
     turn: int = 0  # "rotating" only: the lane whose turn it is
     decided: bool = False  # "rotating" only: whether there was a decision in this turn
-    came: tuple[int, ...] = ()  # "waiting" only: lanes with a front vehicle, in order of coming
+    came: tuple[int, ...] = ()  # "waiting" only: lanes with a front vehicle, in order of arrival
 
 
 class Event(NamedTuple):
-    """What happens between two states: "arrive", "roll", "commit", "slow", "enter", "leave" of a
-    movement; "look" of all vehicles; "turn" of the rotating priority."""
+    """What happens between two states: "arrive", "roll", "commit", "slow", "enter" or "leave" for a
+    movement; "look" for all vehicles; "turn" for the rotating priority."""
 
     what: str
     lane: int = -1
@@ -75,7 +75,7 @@ Step = tuple[Event, State]
 
 @declared
 class Protocol:
-    """The rules of `dim.Dim` and `PRIORITIES`, and with them the states and what may happen."""
+    """The rules of `dim.Dim` and `PRIORITIES`, and the states and events that follow from them."""
 
     matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
     order: str = word("which clique is preferred", ORDERS, default="size")
@@ -87,7 +87,7 @@ class Protocol:
 
     @property
     def start(self) -> State:
-        """No vehicle is there."""
+        """The empty junction."""
         return State((None,) * self.matrix.n)
 
     def successors(self, state: State) -> Iterator[Step]:
@@ -143,9 +143,9 @@ class Protocol:
     def look(self, state: State) -> State:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
-        A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as it is,
-        and the gate "harmonious" keeps out those in conflict with a crossing one. Of the others
-        only the best clique goes.
+        A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
+        are, and the gate "harmonious" keeps out any that conflict with a crossing one. Of the
+        others, only the best clique goes.
         """
         n, movements = self.matrix.n, self.matrix.movements
         rows, bits = movements.rows, movements.bits
@@ -174,7 +174,7 @@ class Protocol:
         return state._replace(fronts=fronts, decided=decided)
 
     def conflict(self, state: State) -> tuple[Movement, Movement] | None:
-        """Two movements of different arms in conflict that are inside at once, or None: safe."""
+        """Two conflicting movements of different arms that are inside at once, or None if safe."""
         inside = state.inside
         while inside:
             k = inside.bit_length() - 1
@@ -196,7 +196,7 @@ class Protocol:
 
     @cached_property
     def _foes(self) -> tuple[int, ...]:
-        """For each movement, those of other arms in conflict with it, as bits."""
+        """For each movement, the movements of other arms that conflict with it, as bits."""
         movements, values = self.matrix.movements, self.matrix.values
         return tuple(
             sum(

@@ -1,9 +1,9 @@
-"""Every case that a junction can decide, checked one by one against brute force.
+"""Every case that can arise at a junction, checked one by one against brute force.
 
 The paper argues that each of the 255 cases of 4 arms has one solution, the same for every vehicle
-("Deadlock Analysis"). Here all cases of any matrix are tried. The right decision comes from the
+("Deadlock Analysis"). Here all cases of any matrix are tried. The right decision is found from the
 subsets of the participants, without a graph library. It agrees with `dim.decision` only if both are
-right, or wrong in the same way.
+right, or both wrong in the same way.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from dim.harmony import HarmonyMatrix
 from dim.perception import Percept
 from minisim.errors import InputError
 
-#: Up to this number of arms the participants are listed in every order (120 a case with 5 arms);
-#: beyond (720 with 6), only as each of them would: itself first, then the others around the
-#: junction, either way round.
+#: Up to this number of arms, the participants are listed in every order (120 per case with 5 arms);
+#: beyond it (720 with 6), only as each participant would list them: itself first, then the others
+#: around the junction, in either direction.
 ALL_ORDERS = 5
 
 #: A set of lanes, bit i for lane i.
 Lanes = int
 
-#: Called with the number of cases done, and of all.
+#: Called with the number of cases done and the total.
 Progress = Callable[[int, int], object]
 
 
@@ -47,9 +47,9 @@ class Claim:
 
     name: str
     statement: str
-    cases: int  # in which it was tried
-    failures: int  # cases in which it is false
-    example: Movements | None  # the first of these with the fewest participants
+    cases: int  # number of cases in which it was tried
+    failures: int  # number of cases in which it is false
+    example: Movements | None  # the first false case with the fewest participants
 
     @property
     def holds(self) -> bool:
@@ -68,7 +68,7 @@ class Analysis:
     claims: tuple[Claim, ...]
     sizes: Mapping[int, int]  #: cases by the number of vehicles that may go
     ties: Mapping[int, int]  #: cases by the number of cliques of the largest size
-    #: Of the cases with the most such cliques, by that size: the first one, and their number.
+    #: That size -> the first of the cases with the most such cliques, and how many such cases.
     worst: Mapping[int, tuple[Movements, int]]
 
     @property
@@ -100,7 +100,7 @@ def analyse(
 ) -> Analysis:
     """Try all cases of a matrix; 6 arms (46,655 cases) take about 20 s.
 
-    Raises `InputError`: unknown order, no permutation, or too many cases (8 arms).
+    Raises `InputError`: unknown order, not a permutation, or too many cases (8 arms).
     """
     table = DecisionTable(matrix, order, priorities)
     if len(table) > MAX_CASES:
@@ -142,7 +142,7 @@ def analyse(
 
 
 def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
-    """The cliques among participants (at most one a lane), from all 2^k subsets of them."""
+    """The cliques among participants (at most one per lane), from all 2^k subsets of them."""
     k = len(movements)
     rows = [matrix.index(m) for m in movements]
     friends = [sum(1 << j for j in range(k) if matrix.values[i, rows[j]]) for i in rows]
@@ -169,10 +169,10 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """The cliques that are left when the paper's words break the tie.
+    """The cliques that remain when the tie is broken by the paper's wording.
 
     "The clique with the highest priority lanes" is one that holds the first lane, if any does, then
-    the second, and so on. `by_priority` are the lanes, the highest priority first.
+    the second, and so on. `by_priority` lists the lanes, highest priority first.
     """
     left = tuple(cliques)
     for lane in by_priority:
@@ -192,9 +192,9 @@ def node_orders(movements: Movements, n: int) -> Iterator[Movements]:
 
 
 class Case:
-    """The checks of any case, by the rules of one table of decisions."""
+    """The checks of each case, by the rules of one table of decisions."""
 
-    #: Name -> statement, in the order of the answers of `check`.
+    #: Name -> statement, in the order in which `check` answers.
     CLAIMS: Mapping[str, str] = {
         "exists": "a vehicle may go",
         "harmony": "all that may go are in harmony, and take part",
@@ -214,7 +214,7 @@ class Case:
         self._same_order: dict[tuple[Lanes, tuple[int, ...]], bool] = {}
 
     def check(self, case: int, movements: Movements, cliques: Cliques) -> tuple[bool, ...]:
-        """Whether each claim is true of a case."""
+        """Whether each claim is true in a case."""
         decision = self.table.lanes(case)
         present = sum(1 << m.origin for m in movements)
         candidates = cliques.largest if self.table.order == "size" else cliques.maximal
@@ -232,7 +232,7 @@ class Case:
         )
 
     def _agents_say(self, case: int, movements: Movements) -> Lanes:
-        """The lanes whose agents go, each asked on its own while no vehicle crosses."""
+        """The lanes whose agents go when each is asked on its own while no vehicle crosses."""
         lanes = tuple(m.origin for m in movements)
         percept = Percept(participants=lanes, crossing=(), case=case, occupied=0)
         return sum(1 << lane for lane in lanes if self._agents[lane].decide(percept))
@@ -257,9 +257,9 @@ class Case:
 def most_cliques(k: int) -> int:
     """The most maximal cliques that any graph of k ≥ 1 nodes can have.
 
-    Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as near to it as
-    groups of 2, 3 and 4 nodes come. The graph that reaches it has cliques of one size only, so the
-    number also bounds the cliques that tie.
+    Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as close to it as
+    groups of 2, 3 and 4 nodes can come. The graph that reaches it has cliques of only one size, so
+    the number is also the bound for cliques that tie.
     """
     if k < 2:
         return 1

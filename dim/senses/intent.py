@@ -1,8 +1,8 @@
 """How a vehicle's intent is shown, how others read it, and how sure they are.
 
 A driver may turn without a signal, which no other vehicle can know. A shown intent may be misread,
-by each reader on its own or by all alike. A table of probabilities, true manoeuvre × read
-manoeuvre, describes both, and gives how likely a reading is right.
+by each reader independently or by all in the same way. A table of probabilities, true manoeuvre ×
+read manoeuvre, describes both, and tells how likely a reading is to be right.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from minisim.junction.turns import Turn, lane_turns, straightest
 from minisim.streams import Draws
 
 #: How a shown intent is misread. "missed": a turn's signal is not seen, so the turn is taken for
-#: straight on; straight on is always read right. "symmetric": a manoeuvre is taken for any other
-#: one alike, as classifiers of manoeuvres err.
+#: straight on; straight on is always read correctly. "symmetric": a manoeuvre is equally likely to
+#: be taken for any other one, as manoeuvre classifiers err.
 KINDS = ("missed", "symmetric")
 
-#: Probabilities of an error that are worth comparing, from none to that of a missing turn signal.
+#: Error probabilities worth comparing, from zero to that of a missing turn signal.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
 
 #: What a draw is for.
@@ -33,18 +33,18 @@ class Lane:
     """Intents of one approach lane."""
 
     straight: int  #: the manoeuvre that needs no signal
-    silent: tuple[float, ...]  #: probability of each manoeuvre to be driven without a signal
+    silent: tuple[float, ...]  #: probability that each manoeuvre is driven without a signal
     error: float  #: how often a shown intent is misread
-    kind: str  #: and how, see `KINDS`
+    kind: str  #: in what way it is misread, see `KINDS`
     doubt: tuple[
         float, ...
-    ]  #: share of wrong readings of each manoeuvre, if all are equally frequent
+    ]  #: how often a reading of each manoeuvre is wrong, if all are equally frequent
 
     @classmethod
     def of(
         cls, site: Site, lane: int, error: float, kind: str, unsignalled: tuple[float, float]
     ) -> Lane:
-        """The lane of a site; `unsignalled` is the share of turns to the near and the far side."""
+        """A lane of a site; `unsignalled` is the share of turns to the near and the far side."""
         straight = straightest(site.intersection, lane)
         near, far = unsignalled
         share = {Turn.NEAR: near, Turn.THROUGH: 0.0, Turn.FAR: far}
@@ -55,7 +55,7 @@ class Lane:
     def read(self, draws: Draws, manoeuvre: int, vehicle: int, *when: int) -> int:
         """What is read; the same for the same vehicle and `when`, such as observer and moment.
 
-        A vehicle that is misread at a small error is also misread at a larger one.
+        A vehicle that is misread at a small error rate is also misread at a larger one.
         """
         shown = manoeuvre
         if draws.uniform(_SIGNAL, vehicle) < self.silent[manoeuvre - 1]:
@@ -97,7 +97,7 @@ def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str)
 
 
 def doubts(table: Table) -> tuple[float, ...]:
-    """How likely each reading is wrong, by Bayes' rule for equally frequent manoeuvres."""
+    """How likely each reading is to be wrong, by Bayes' rule for equally frequent manoeuvres."""
     columns = list(zip(*table, strict=True))
     return tuple(
         1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
@@ -106,14 +106,14 @@ def doubts(table: Table) -> tuple[float, ...]:
 
 
 def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:
-    """A calibrated confidence: of all readings with confidence c, the share c is right.
+    """A calibrated confidence: of all readings with confidence c, a share c is right.
 
     Calibration: Guo, Pleiss, Sun, Weinberger, "On calibration of modern neural networks", ICML
     2017, eq. 1. For readings that are wrong with probability e, let confidences have the density
-    a·c^(a−1) on (0, 1), a = (1−e)/e. Their mean is 1−e, and they spread as a classifier's do.
+    a·c^(a−1) on (0, 1), a = (1−e)/e. Their mean is 1−e, and they spread like a classifier's.
     Calibration then multiplies the density by c/(1−e) for right readings and by (1−c)/e for wrong
     ones: Beta(a+1, 1), the distribution of U^e, and Beta(a, 2), that of U^e·V^(e/(1−e)), for
-    uniform U and V. Here `doubt` is e, `chances` are U and V, and `right` says which of the two.
+    uniform U and V. Here `doubt` is e, `chances` are U and V, and `right` says which case applies.
     """
     if doubt <= 0.0:
         return 1.0

@@ -2,8 +2,8 @@
 
     simulate(scenario, Dim(perception=NoisyPerception(intent_error=0.15)))
 
-An ego always sees itself exactly, and the order of the vehicles in a lane. Its view lacks the
-vehicles that it does not see, and never holds one that is not, or was not, there.
+An ego always sees itself, and the order of the vehicles in each lane, exactly. Its view lacks the
+vehicles that it does not see, and never holds one that neither is nor was there.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from minisim.control import Observed, Site, View
 from minisim.parameters import declared, real, reals, switch, word
 from minisim.streams import Draws
 
-#: Error of published classifiers of manoeuvres: Phillips, Wheeler, Kochenderfer (IEEE IV 2017),
-#: more than 85 % right on 3 and 4 arms; tail lights, Sensors 24(16), 5162 (2024), 85.2 %.
+#: Error of published manoeuvre classifiers: Phillips, Wheeler, Kochenderfer (IEEE IV 2017), more
+#: than 85 % right on 3 and 4 arms; tail lights, Sensors 24(16), 5162 (2024), 85.2 %.
 CLASSIFIER = 0.15
 
-#: Shares of near and of far turns that are driven without a signal: 29 % of right
+#: Shares of near and far turns that are driven without a signal: 29 % of right
 #: and 25 % of left turns in right-hand traffic (Sullivan, Bao, Goudy, Konet, "Characteristics of
 #: turn signal use at intersections in baseline naturalistic driving", AAP 74, 2015). SAE
-#: 2012-01-0261 (Ponziani) counts 25 % of all turns.
+#: 2012-01-0261 (Ponziani) found 25 % of all turns.
 UNSIGNALLED = (0.29, 0.25)
 
-#: Stands for all observers, or for all time, where a draw asks for one.
+#: Stands for all observers, or for all moments, where a draw asks for one.
 _ALL = -1
 
-#: What a draw is for; above those of `dim.senses.intent`.
+#: What a draw is for; numbered above the purposes in `dim.senses.intent`.
 _POSITION, _SPEED = 8, 9
 
 
@@ -69,7 +69,7 @@ class NoisyPerception:
         "how far a vehicle sees, from centre to centre; none has no end", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
-    # Views do not hold vehicles that have left the junction, so these block nothing.
+    # Views do not hold vehicles that have left the junction, so such vehicles block nothing.
     occlusion: bool = switch("whether bodies block the line of sight", default=False)
     delay: float = real("age of what is seen of the others", "s", low=0, high=10, default=0.0)
     position_noise: float = real(
@@ -80,8 +80,8 @@ class NoisyPerception:
         "standard deviation of the others' speeds, drawn anew each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
-    # 10 Hz, as rotating lidars and V2V safety messages. What happens between two looks is seen
-    # late: a vehicle that becomes committed, up to a frame later, 0.6 m at 20 km/h.
+    # 10 Hz, like rotating lidars and V2V safety messages. What happens between two looks is seen
+    # late: that a vehicle is committed, up to one frame late, or 0.6 m at 20 km/h.
     frame: float = real("time between two looks", "s", low=0.01, high=1, default=0.1)
 
     @property
@@ -91,13 +91,13 @@ class NoisyPerception:
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look, see `Perception`."""
+        """The time between two looks [s], see `Perception`."""
         moved = max(self.delay, self.position_noise, self.speed_noise) > 0.0
         errs = self.misreads or moved or self.occlusion or self.sensor_range is not None
         return self.frame if errs else None
 
     def start(self, site: Site) -> See:
-        """Begin a run; without any error, perception is exact."""
+        """Begin a run; if nothing errs, perception is exact."""
         return see_all if self.period is None else _Senses(self, site).see
 
 
@@ -144,7 +144,7 @@ class _Senses:
     def _visible(
         self, seen: View, vehicles: Iterable[Observed], ego: Observed
     ) -> Iterator[Observed]:
-        """The ego and the vehicles in range and in line of sight, in their order."""
+        """The ego and the vehicles within range and line of sight, in their order."""
         if seen.time != self._at_time:
             self._at_time = seen.time
             self._at = {v.id: self._bodies.body(v) for v in seen.vehicles}
@@ -162,7 +162,7 @@ class _Senses:
                 yield vehicle
 
     def _sense(self, vehicle: Observed, ego: int, moment: int) -> Observed:
-        """One vehicle as the ego reads it."""
+        """One vehicle as the ego perceives it."""
         recipe, draws = self._recipe, self._draws
         observer = _ALL if recipe.shared else ego
         id, lane, manoeuvre, distance, speed, length, demand_time = vehicle
@@ -186,7 +186,7 @@ class _Senses:
 
 
 def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """An older view's vehicles with the ego as it is now; a new ego is the last of its lane."""
+    """An older view's vehicles with the ego as it is now; a new ego is the last in its lane."""
     if any(v.id == ego.id for v in vehicles):
         return vehicles
     behind = next((k for k, v in enumerate(vehicles) if v.lane > ego.lane), len(vehicles))
@@ -194,9 +194,9 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 
 
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """Vehicles, by lane and in their true order, without the overtaking that noise has caused.
+    """Vehicles by lane and in their true order, without the overtaking that noise has caused.
 
-    No vehicle is put before one that it follows. The ego keeps its place.
+    No vehicle is put ahead of one that it follows. The ego keeps its place.
     """
     ordered: list[Observed] = []
     at = next(k for k, v in enumerate(vehicles) if v.id == ego.id)

@@ -1,6 +1,6 @@
 """What can be seen from where: bodies near the junction, and lines of sight between them.
 
-It uses plain floats, since every vehicle asks about every other one ten times a second.
+Plain floats are used, since every vehicle asks about every other one ten times a second.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Body(NamedTuple):
 
 
 class Bodies:
-    """Where observed vehicles are. Bodies are seen right even where the intent is misread."""
+    """Where observed vehicles are. Bodies are seen correctly even when the intent is misread."""
 
     def __init__(self, site: Site) -> None:
         self._rows = site.intersection.movements.rows
@@ -39,7 +39,7 @@ class Bodies:
         self.half_width = site.vehicle.width / 2.0
 
     def body(self, vehicle: Observed) -> Body:
-        """A vehicle's body: the chord of its way between its bumpers (as `Path.pose`)."""
+        """A vehicle's body: the chord of its path between its bumpers (like `Path.pose`)."""
         way = self._ways[self._rows[vehicle.lane][vehicle.manoeuvre]]
         x, y = locate(*way, -vehicle.distance)
         rear_x, rear_y = locate(*way, -vehicle.distance - self._length)

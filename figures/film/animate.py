@@ -1,7 +1,7 @@
 """Animations of a run: GIF, MP4 or a web page that plays by itself.
 
 The still ground is drawn once. Each frame restores it and draws only what moves, which takes a few
-milliseconds; a full figure needs fifty.
+milliseconds; drawing a full figure takes fifty.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from minisim.files import replacing
 from minisim.junction.paths import Floats
 from minisim.results.run import Run
 
-#: Picture in inches and its resolution: 720 × 880 pixels. Video needs even numbers.
+#: Picture size in inches, and its resolution: 720 × 880 pixels. Video needs even numbers.
 WIDTH, HEIGHT, DPI = 7.2, 8.8, 100
 #: Inches of legend below the junction.
 FOOT = 0.8
-#: Zones in the legend.
+#: What the zones mean, for the legend.
 MEANINGS = {"red": "red: slow down", "yellow": "yellow: decide", "green": "green: buffer"}
 
 
@@ -41,8 +41,8 @@ def write_animation(
 ) -> None:  # fmt: skip
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
-    The run was recorded with `record="all"` over the time shown. There are `fps` frames a second,
-    at most one a step; `progress` is called with the frames done and their number.
+    The run must have been recorded with `record="all"` over the time shown. There are `fps` frames
+    per second, at most one per step; `progress` is called with the frames done and the total.
 
     Raises:
         InputError: an unknown suffix, nothing recorded, or a number out of range.
@@ -78,7 +78,7 @@ def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
 
 
 class Picture:
-    """The junction of one run at any recorded time; served vehicles count from `start` [s] on."""
+    """The junction at any recorded time of one run; served vehicles count from `start` [s] on."""
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run
@@ -86,7 +86,7 @@ class Picture:
         self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection
-        # All markings and a little more [m].
+        # Far enough to show all markings and a little more [m].
         zone = max((marking.start for marking in plan.markings), default=0.0)
         self._reach = reach = max(40.0, intersection.junction_radius + zone + 4.0)
         self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
@@ -115,7 +115,7 @@ class Picture:
         return Image.frombuffer("RGBA", size, self._canvas.buffer_rgba()).convert("RGB")
 
     def palette(self) -> Image.Image:
-        """An indexed image with every colour of the picture, since the legend shows them all."""
+        """An indexed image with every colour of the picture; the legend shows them all."""
         return palette_of(self.draw(self._film.busiest))
 
     def _add_moving(self) -> tuple[Artist, ...]:
@@ -158,7 +158,7 @@ class Picture:
         self._key(middle - 0.17, zones, pointed=False)
 
     def _key(self, y: float, entries: Sequence[tuple[str, str]], *, pointed: bool) -> None:
-        """One line of the legend, `y` inches from below: swatches and what they mean."""
+        """One line of the legend, `y` inches from the bottom: swatches and what they mean."""
         x = 0.03
         for colour, name in entries:
             tip = 0.012 if pointed else 0.0
@@ -175,7 +175,7 @@ class Picture:
     def _text(
         self, x: float, y: float, size: float, align: str, *, colour: str = style.INK, **font: Any
     ) -> Text:
-        """An empty text, `y` inches from below."""
+        """An empty text, `y` inches from the bottom."""
         return style.write(self._figure, x, y / HEIGHT, "", size, colour=colour, ha=align, **font)
 
     def _move(self, time: float) -> None:
@@ -201,7 +201,7 @@ class Picture:
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:
-        """Write clock and counters into the ground if they have changed, because text is slow."""
+        """Write the clock and counters into the ground only if they have changed: text is slow."""
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
         counts = f"waiting {film.waiting(film.at(time))}   served {film.served(time)}"

@@ -1,6 +1,6 @@
 """Frames into files: GIF, MP4 and a web page that plays by itself.
 
-Frames are images of one size that arrive one by one. Only the one before is kept, so a long film
+Frames are images of one size that arrive one by one. Only the previous one is kept, so a long film
 needs no more memory than a short one.
 """
 
@@ -35,7 +35,7 @@ COLOURS = 127
 
 
 def animation_format(path: str | os.PathLike[str]) -> str:
-    """The format by its suffix, one of `FORMATS`; .mp4 without ffmpeg is a `MissingExtraError`."""
+    """The suffix as one of `FORMATS`; .mp4 without ffmpeg raises `MissingExtraError`."""
     suffix = Path(path).suffix.lower().removeprefix(".")
     if suffix not in FORMATS:
         allowed = ", ".join(f".{name}" for name in FORMATS)
@@ -49,15 +49,15 @@ def animation_format(path: str | os.PathLike[str]) -> str:
 
 
 def palette_of(frame: Image) -> Image:
-    """An indexed image with the colours of `frame`, to index others with."""
+    """An indexed image with the colours of `frame`, for indexing other frames."""
     return frame.quantize(COLOURS, method=Quantize.MEDIANCUT)
 
 
 def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -> None:
-    """Write a GIF that loops for ever.
+    """Write a GIF that loops forever.
 
-    Each frame holds only the rectangle that changed, with transparent pixels that did not (GIF89a,
-    §18 screen, §20 image, §23 control; the loop is Netscape's extension).
+    Each frame holds only the rectangle that changed; pixels in it that did not are transparent
+    (GIF89a, §18 screen, §20 image, §23 control; the loop is Netscape's extension).
     """
     size_code = COLOURS.bit_length() - 1
     milliseconds = max(20, round(100.0 / fps) * 10)
@@ -78,7 +78,7 @@ def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -
 
 
 def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
-    """Pipe the frames into ffmpeg; raises `FileError` with ffmpeg's own words if it fails."""
+    """Pipe the frames into ffmpeg; raises `FileError` with ffmpeg's own message if it fails."""
     first = next(frames)
     command = [
         "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
@@ -103,7 +103,7 @@ def write_html(frames: Iterator[Image], palette: Image, path: Path, fps: float, 
     """Write a web page that needs no other file: a player with the frames inside.
 
     Each frame holds only its differences from the first one. So the page stays small, and each
-    frame can be shown without those before it.
+    frame can be shown without the ones before it.
     """
     template = Path(__file__).with_name("player.html").read_text(encoding="utf-8")
     fields = {
@@ -129,7 +129,7 @@ def _indexed(frame: Image, palette: Image) -> Image:
 
 
 def _colours(palette: Image) -> bytes:
-    """Red, green and blue of every index, also of the transparent one."""
+    """Red, green and blue of every index, including the transparent one."""
     return bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
 
 

@@ -1,4 +1,4 @@
-"""What `animate` draws at a time: the recorded trajectories of a run, as arrays."""
+"""What `animate` draws at a given time: the recorded trajectories of a run, as arrays."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Rows = npt.NDArray[np.int64]
 
 #: States of a vehicle.
 DRIVING, STANDING, RELEASED = 0, 1, 2
-#: A collision is marked for this time [s] by a ring of this radius [m].
+#: A collision is marked for this long [s] by a ring of this radius [m].
 COLLISION_SHOWN, RING = 3.0, 5.0
 
 
 class Frames:
-    """The recorded trajectories as arrays, one row a vehicle and step."""
+    """The recorded trajectories as arrays, one row per vehicle and step."""
 
     def __init__(self, run: Run, start: float) -> None:
         frame = run.trajectories
@@ -72,7 +72,7 @@ class Frames:
         return np.asarray(rows[inside])
 
     def waiting(self, now: slice) -> int:
-        """How many vehicles stand."""
+        """How many vehicles are standing."""
         return int(self.still[now].sum())
 
     def served(self, time: float) -> int:
@@ -91,7 +91,7 @@ class Frames:
         return {lane for lane, row in first.items() if self.state[row] == RELEASED}
 
     def ways(self, rows: Rows) -> list[Floats]:
-        """The rest of the path, up to the exit, of each vehicle with right of way."""
+        """The rest of the path, up to the exit, of each vehicle with the right of way."""
         plan, paths = self.run.plan, self.run.site.intersection.paths
         begin = self.entry - max(plan.hold_distance, 1.0)
         rests = []
@@ -104,7 +104,7 @@ class Frames:
         return rests
 
     def lamps(self, rows: Rows) -> list[Floats]:
-        """Turn indicators of vehicles that turn and have not left the junction."""
+        """Turn indicators of turning vehicles that have not left the junction."""
         vehicle = self.run.site.vehicle
         half, size = vehicle.width / 2.0, 0.36
         front = np.array([(0.1, -size), (0.1, size), (-2 * size, size), (-2 * size, -size)])

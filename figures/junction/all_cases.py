@@ -17,12 +17,12 @@ from figures.junction import drawing
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 
-#: One colour for each tied clique; further ones repeat them, dashed.
+#: One colour for each tied clique; further cliques repeat the colours, dashed.
 CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 
 
 def verification_figure(analysis: Analysis, intersection: Intersection) -> Figure:
-    """Draw `dim.proofs.verification.analyse`; the arms give the nodes their places."""
+    """Draw `dim.proofs.verification.analyse`; the arms determine where the nodes go."""
     worst = list(analysis.worst.items())
     figure = style.new_figure(4.2 * (2 + len(worst)), 4.4)
     panels = figure.subplots(1, 2 + len(worst))
@@ -55,7 +55,7 @@ def _draw_counts(axes: Axes, counts: Mapping[int, int], title: str, xlabel: str)
 def _draw_worst(
     axes: Axes, analysis: Analysis, movements: Movements, intersection: Intersection
 ) -> None:
-    """The harmony graph of a case, one colour a tied clique; the thick one has the right of way."""
+    """A case's harmony graph, one colour per tied clique; the thick one has the right of way."""
     explanation = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
     places = {m: np.array(intersection.arms[m.origin].outward) for m in movements}
     axes.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")

@@ -22,7 +22,7 @@ APPROACH = 17.0
 
 
 def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
-    """Draw which vehicles may cross, and why; markings and hold line are those of the plan."""
+    """Draw which vehicles may cross, and why; the plan gives the markings and hold line."""
     figure = style.new_figure(10.0, 6.0)
     left = figure.add_axes((0.02, 0.13, 0.462, 0.77))
     right = figure.add_axes((0.518, 0.13, 0.462, 0.77))
@@ -64,7 +64,7 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
         goes = movement in explanation.right_of_way
         colour = style.RIGHT_OF_WAY if goes else style.WAITING
         front = path.entry - plan.hold_distance
-        end = path.exit + (3.0 if goes else 5.5)  # arrowheads in one exit lane stay apart
+        end = path.exit + (3.0 if goes else 5.5)  # keep arrowheads in one exit lane apart
         drawing.draw_way(axes, path, front, end, colour, strong=goes)
         drawing.draw_vehicle(axes, path, front - 0.15, vehicle, colour)
         middle = plan.hold_distance + vehicle.length / 2.0

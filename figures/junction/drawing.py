@@ -20,12 +20,12 @@ from minisim.junction.geometry import Arm, Intersection
 from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
-#: Points of the kerb between two arms.
+#: Number of points on the kerb between two arms.
 KERB_POINTS = 24
 
 
 def outline(intersection: Intersection, reach: float) -> Floats:
-    """Edge of the asphalt, shape (k, 2) [m]; the arms are `reach` long from the centre."""
+    """Edge of the asphalt, shape (k, 2) [m]; the arms reach `reach` from the centre."""
     width, arms = intersection.lane_width, intersection.arms
     points = []
     for arm, following in zip(arms, (*arms[1:], arms[0]), strict=True):
@@ -45,7 +45,7 @@ def lane_strip(intersection: Intersection, arm: int, start: float, end: float) -
 
 
 def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: float) -> None:
-    """Draw all that does not move, `reach` metres around the centre."""
+    """Draw everything that does not move, `reach` metres around the centre."""
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_axis_off()
     far = 1.5 * reach
@@ -79,13 +79,13 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
 
 
 def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
-    """Where vehicles without right of way stop: one line a lane, shape (n, 2, 2) [m]."""
+    """Where vehicles without the right of way stop: one line per lane, shape (n, 2, 2) [m]."""
     at = plan.hold_distance
     return np.array([lane_strip(intersection, i, at, at)[:2] for i in range(intersection.n)])
 
 
 def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
-    """Body (8, 2) and windscreen (4, 2) of a vehicle at the origin that heads east [m].
+    """Body (8, 2) and windscreen (4, 2) of a vehicle at the origin, heading east [m].
 
     The origin is the middle of the front bumper, as in `Run.trajectories`.
     """
@@ -136,7 +136,7 @@ def draw_way(
 
 
 def draw_hold_lines(axes: Axes, intersection: Intersection, plan: Plan) -> LineCollection:
-    """Draw the hold lines; recolour what is returned to show which lanes are open."""
+    """Draw the hold lines; recolour the returned collection to show which lanes are open."""
     lines = LineCollection(
         list(hold_lines(intersection, plan)), colors=style.INK, linewidths=3.0, zorder=4,
         capstyle="butt",
@@ -148,7 +148,7 @@ def draw_hold_lines(axes: Axes, intersection: Intersection, plan: Plan) -> LineC
 def draw_node(
     axes: Axes, place: Floats, radius: float, label: str, size: float, below: float, *, goes: bool
 ) -> None:
-    """Draw a vehicle of a harmony graph, its label of `size` points a little `below` the middle."""
+    """Draw a node of a harmony graph, its label at `size` points, a little `below` the middle."""
     x, y = place
     axes.add_patch(Circle(
         (x, y), radius, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
@@ -172,8 +172,8 @@ def _keep(intersection: Intersection) -> float:
 def _kerb(arm: Arm, following: Arm, width: float, radius: float) -> Floats:
     """The kerb from one arm to the next clockwise, shape (k, 2): an arc tangent to both.
 
-    It meets both road edges at the distance `radius` from the centre. If the edges cross farther
-    out, it is their crossing.
+    It meets both road edges at distance `radius` from the centre. If the edges cross farther out,
+    it shrinks to the point where they cross.
     """
     ahead, clockwise = _axes_of(arm)
     next_ahead, next_clockwise = _axes_of(following)

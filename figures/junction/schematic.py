@@ -23,26 +23,26 @@ from figures.tables import Table
 from scenarios.library import MAKERS, four_way
 from scenarios.scenario import Scenario
 
-#: Number of arms -> the case of its picture; on four arms, the paper's.
+#: Number of arms -> the case shown in its picture; for four arms, the paper's.
 DECISIONS = {3: ("a1", "b1", "c1"), 4: ("a1", "b2", "c2", "d2"), 5: ("a1", "b2", "c2", "d2", "e2")}
 #: Metres shown around each junction of the map.
 MAP_REACH = 48.0
 
-#: Tied cliques, told apart by colour, width and dashes.
+#: Styles of tied cliques, told apart by colour, width and dashes.
 CLIQUES = (
     (style.BLUE, "-"), (style.VERMILLION, "--"), (style.GREEN, "-."), (style.PURPLE, ":"),
 )  # fmt: skip
 
 
 def decision(arms: int) -> Figure:
-    """Junction and harmony graph of a decision (paper, figure "solution" on four arms)."""
+    """Junction and harmony graph of a decision (for four arms, the paper's figure "solution")."""
     site = MAKERS[arms]().site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     return decision_figure(explain(DECISIONS[arms], matrix), site, Dim().start(site).plan)
 
 
 def maps() -> Figure:
-    """The paper's three junctions from above, with lanes, zones and the ways of one lane."""
+    """The paper's three junctions from above, with lanes, zones and the paths from one lane."""
     figure = style.new_figure(11.0, 4.55)
     for k, (arms, make) in enumerate(MAKERS.items()):
         axes = figure.add_axes((0.008 + 0.331 * k, 0.115, 0.322, 0.78))
@@ -76,15 +76,15 @@ def _draw_map(axes: Axes, scenario: Scenario) -> None:
                 axes, path, path.entry - plan.hold_distance, path.exit + 6.0, style.BLUE,
                 strong=False,
             )  # fmt: skip
-    left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # no junction of the paper has a road there
+    left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # no junction in the paper has a road there
     axes.plot([left, left + 20.0], [top, top], color=style.INK, linewidth=2.2, zorder=9,
               solid_capstyle="butt")  # fmt: skip
 
 
 def worst_case() -> Figure:
-    """Four participants with the most tied cliques, and with one harmony more.
+    """Four participants with the most tied cliques, and with one more pair in harmony.
 
-    The paper's figure "worst case" draws an abstract graph; these are two real cases of its
+    The paper's figure "worst case" draws an abstract graph; these are two real cases at its
     four-way junction, the second with five of six pairs in harmony.
     """
     site = four_way().site()
@@ -135,7 +135,7 @@ def _draw_cliques(axes: Axes, told: Explanation) -> None:
 
 
 def webster_table() -> Table:
-    """Green times of the fixed-time signal: ours from Webster's formula, and the printed ones."""
+    """Green times of the fixed-time signal: ours by Webster's formula, and the printed ones."""
     file = resources.files("scenarios") / "data" / "webster_table.csv"
     rows = []
     for row in csv.DictReader(file.read_text(encoding="utf-8").splitlines()):
@@ -162,7 +162,7 @@ def webster_table() -> Table:
 
 
 def harmony_table(arms: int) -> Table:
-    """The published harmony matrix, and whether the geometry gives the same."""
+    """The published harmony matrix, and whether the geometry yields the same one."""
     site = MAKERS[arms]().site()
     ours = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     paper = HarmonyMatrix.paper(arms)
