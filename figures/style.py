@@ -45,14 +45,14 @@ ARMS = {
     "dim-5": Look("5 arms", "vermillion", "p", "-."),
 }
 
-#: Type of an axis label.
+#: Font of an axis label.
 LABEL: dict[str, Any] = {"fontsize": 9.5, "color": INK}
-#: Formats of a figure file.
+#: Formats for figure files.
 FORMATS = ("png", "pdf", "svg")
 
 
 def look(series: str) -> Look:
-    """The look of a series, with its colour as matplotlib takes it; grey for an unknown one."""
+    """The look of a series, with its colour in matplotlib's form; grey for an unknown one."""
     variant = VARIANTS.get(series)
     known = ARMS.get(series) or (variant and variant.look) or Look(series, "grey", "h", "-")
     return known._replace(colour=COLOURS[known.colour])
@@ -75,7 +75,7 @@ def write(
 
 
 def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
-    """Give a plot its quiet frame: light horizontal grid, no box, title on the left."""
+    """Give a plot its quiet frame: a light horizontal grid, no box, title on the left."""
     axes.set_title(title, loc="left", fontsize=11, color=INK, fontweight="bold", pad=10)
     axes.set_xlabel(xlabel, **LABEL)
     axes.set_ylabel(ylabel, **LABEL)

@@ -16,9 +16,9 @@ class Table:
     """A table of text cells."""
 
     title: str  # one line
-    headings: tuple[str, ...]  # of the columns; those after the first `labels` are numbers
+    headings: tuple[str, ...]  # of the columns; those after the first `labels` hold numbers
     rows: tuple[tuple[str, ...], ...]  # cells as they are printed
-    labels: int = 1  # how many columns from the left are words
+    labels: int = 1  # how many columns from the left hold words
     notes: tuple[str, ...] = ()  # small print below
 
     def __post_init__(self) -> None:
@@ -32,7 +32,7 @@ class Table:
         return f"**{self.title}**\n\n{table}\n{notes}"
 
     def csv(self) -> str:
-        """As CSV; no notes."""
+        """As CSV, without notes."""
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([self.headings, *self.rows])
         return text.getvalue()

@@ -7,7 +7,7 @@
     run = minisim.simulate(four_way(density=350), Dim(), seed=1)
     run.trips, run.summary(), run.collisions
 
-The names below are loaded when first used, so `import minisim` is quick.
+The names below are loaded on first use, so `import minisim` is quick.
 """
 
 from __future__ import annotations

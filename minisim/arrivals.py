@@ -29,9 +29,9 @@ MODELS = ("poisson", "exponential", "shifted")
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
 #: Words for equal shares of the lanes and of the manoeuvres.
 BALANCED, UNIFORM = "balanced", "uniform"
-#: More than any lane can carry: a higher density is a typing error.
+#: More than any lane can carry: a higher density is a typo.
 MAX_DENSITY = 3600.0
-#: Shares as callers may give them.
+#: The forms in which callers may give shares.
 Shares = Sequence[float] | str | None
 #: The longest duration and the latest demand time [s].
 MAX_TIME = 1e7
@@ -68,7 +68,7 @@ class Arrivals:
         return len(self.time)
 
     def check(self, n: int) -> None:
-        """Raise `InputError` for a lane or manoeuvre that n arms do not have."""
+        """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
         for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
             name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
             raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
@@ -76,21 +76,21 @@ class Arrivals:
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
-        """Mean inflow of each lane in the first `horizon` seconds [veh/h]."""
+        """Mean inflow of each lane over the first `horizon` seconds [veh/h]."""
         counts = np.bincount(self.lane[self.time < horizon], minlength=n)
         return tuple(float(c) * 3600.0 / horizon for c in counts)
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers or as a text such as "4:3:2:1"; None where they are equal.
+    """Shares given as numbers or as text such as "4:3:2:1"; None if they are equal.
 
     Args:
         name: what messages call them.
-        value: the shares; None and the word `equal` stand for equal ones.
+        value: the shares; None and the word `equal` both mean equal shares.
         equal: that word.
 
     Raises:
-        InputError: no finite numbers, a negative one, or only zeros.
+        InputError: not finite numbers, a negative one, or only zeros.
     """
     if value is None:
         return None
@@ -113,9 +113,9 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
 class Demand:
     """How many vehicles come, from where, and where to.
 
-    Shares may be given as numbers or as a text such as "4:3:2:1"; they are kept as a tuple of
-    floats, or None where they are equal. All models of arrivals have the same mean headway. The
-    paper's is Poisson: it counts the arrivals of every second.
+    Shares may be given as numbers or as text such as "4:3:2:1"; they are kept as a tuple of
+    floats, or None if they are equal. All models of arrivals have the same mean headway. The
+    paper's is Poisson: it draws a count of arrivals for every second.
     """
 
     density: float = real(
@@ -151,11 +151,11 @@ class Demand:
         return rates
 
     def draw(self, n: int, duration: float, seed: int) -> Arrivals:
-        """Draw the arrivals of `duration` seconds on n lanes.
+        """Draw the arrivals on n lanes over `duration` seconds.
 
         Manoeuvres are drawn independently. (The authors drew them without replacement within a
         second, which ends the run when more vehicles come than there are manoeuvres; at 350
-        veh/h/lane that touches 0.4 % of the lane-seconds.)
+        veh/h/lane that affects 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
@@ -187,11 +187,11 @@ class Demand:
 
 
 def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:
-    """Read an arrival table from a CSV file with the columns `COLUMNS`; lanes by letter.
+    """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
 
     Raises:
-        FileError: unreadable, a column missing, or a broken line (named by its number), or a lane
-            or manoeuvre that n arms do not have.
+        FileError: unreadable, a missing column, a broken line (named by its number), or a lane
+            or manoeuvre that does not exist with n arms.
     """
     instance("arrivals file", path, (str, os.PathLike))
     if n is not None:
@@ -215,7 +215,7 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
 
 
 def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
-    """Write an arrival table as `read_arrivals` reads it; raises `FileError`."""
+    """Write an arrival table in the form that `read_arrivals` reads; raises `FileError`."""
     instance("arrivals file", path, (str, os.PathLike))
     instance("arrivals", arrivals, Arrivals)
     arrivals.check(len(ARM_NAMES))
@@ -257,10 +257,10 @@ def _parse_row(
 
 
 def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, ...]:
-    """Shares of so many things, with the sum 1."""
+    """Shares of `count` things, summing to 1."""
     if given is None:
         return (1.0 / count,) * count
-    shares = tuple(map(float, given))  # `Demand` has already turned a text into numbers
+    shares = tuple(map(float, given))  # `Demand` has already turned text into numbers
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     total = sum(shares)

@@ -11,11 +11,11 @@ import math
 
 from minisim.jit import njit, njit_inline
 
-#: A vehicle that has less than this to go has arrived [m]: an approach that slows down with the
-#: distance would never end (SUMO's `NUMERICAL_EPS`, in the same place).
+#: A vehicle with less than this to go has arrived [m]: an approach that gets slower as the distance
+#: shrinks would never end (SUMO's `NUMERICAL_EPS`, in the same place).
 STILL = 1e-3
 
-#: A next speed below this, times dt, is standstill [m/s²] (`NUMERICAL_EPS_SPEED`).
+#: A next speed below this, times dt, counts as standstill [m/s²] (`NUMERICAL_EPS_SPEED`).
 STANDSTILL = 1e-4
 
 
@@ -23,7 +23,7 @@ STANDSTILL = 1e-4
 def free_road(v: float, v0: float, a: float, b: float, delta: float) -> float:
     """IDM acceleration on an empty road, a·(1 − (v/v0)^δ) [m/s²].
 
-    Above the desired speed (a limit that begins late) it brakes at b at most.
+    Above the desired speed (when a limit begins late), a vehicle brakes at b at most.
     Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 3 without interaction.
     """
     r = v / v0
@@ -42,8 +42,8 @@ def gap_ratio(
 ) -> float:
     """Desired over actual gap, z = s*/gap, with s* = s0 + max(0, vT + v·Δv / (2√(ab))).
 
-    Infinite for a gap ≤ 0: that is a collision, and no floor hides it. Of several leaders the
-    one with the largest z decides, in the IDM as in the improved one.
+    Infinite for a gap ≤ 0: that is a collision, and no floor hides it. Among several
+    leaders, the one with the largest z decides, in both the IDM and the improved IDM.
     Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 4; Δv = v − v_leader.
     """
     if gap <= 0.0:
@@ -63,7 +63,7 @@ def idm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> floa
 
 @njit_inline
 def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> float:
-    """Improved IDM acceleration [m/s²]: the equilibrium gap is s0 + vT up to v0 itself.
+    """Improved IDM acceleration [m/s²]: the equilibrium gap is s0 + vT at all speeds up to v0.
 
     Source: Treiber, Kesting, Traffic Flow Dynamics, 2013, ch. 11.3.7.
     """
@@ -82,12 +82,12 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
 def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float) -> float:
     """Krauß's safe speed: the highest at which a leader that brakes at b causes no collision.
 
-    A vehicle that keeps it for `headway` and then slows by b·dt a step uses up `gap` and the
-    leader's braking distance. So the gap of equilibrium is v·headway for any step. For dt → 0 this
+    A vehicle that keeps it for `headway` and then slows by b·dt per step uses up `gap` plus the
+    leader's braking distance. So the equilibrium gap is v·headway for any step. For dt → 0 this
     is Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
     Source: Krauß 1998, Microscopic Modeling of Traffic Flow, §3.1 (eq. 3.7, leader and follower
-    alike); in whole steps of braking as SUMO's `MSCFModel::maximumSafeFollowSpeed` without the
-    ballistic rule. `gap` is measured beyond the gap at standstill, as there.
+    alike); in whole braking steps, as in SUMO's `MSCFModel::maximumSafeFollowSpeed` without
+    the ballistic rule. `gap` is measured beyond the gap at standstill, as there.
     """
     room = gap - STILL
     if room < 0.0:
@@ -102,7 +102,7 @@ def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float)
 
 @njit
 def braking_distance(v: float, b: float, dt: float) -> float:
-    """Distance to standstill when each step, this one included, is driven b·dt slower [m].
+    """Distance to standstill when each step, including this one, is b·dt slower than the last [m].
 
     Source: SUMO's `MSCFModel::brakeGap` without the ballistic rule.
     """
@@ -114,8 +114,8 @@ def braking_distance(v: float, b: float, dt: float) -> float:
 def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> float:
     """`speed_towards` for `semi_implicit`: the highest next speed that still allows `v_target`.
 
-    The vehicle drives one step at that speed and then slows by b·dt a step down to `v_target`; all
-    of this takes `distance`.
+    The vehicle drives one step at that speed and then slows by b·dt per step to `v_target`; all of
+    this takes `distance`.
     Source: SUMO's `MSCFModel::freeSpeed`, and `stopSpeed` for v_target = 0.
     """
     if distance <= v_target * dt:
@@ -130,9 +130,9 @@ def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> f
 
 @njit
 def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) -> float:
-    """Next speed [m/s]: the lowest of the desired, the attainable and the safe one.
+    """Next speed [m/s]: the lowest of the desired, attainable and safe speeds.
 
-    Above the desired speed (a limit that begins late) it brakes at b at most.
+    Above the desired speed (when a limit begins late), a vehicle brakes at b at most.
     Source: Krauß 1998, §3.1, without the random part (SUMO's sigma = 0).
     """
     v_new = min(v + a * dt, max(v0, v - b * dt), v_safe)
@@ -172,7 +172,7 @@ def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
 def semi_implicit(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
     """Position and speed after one step of SUMO's default rule, s + v'·dt with the new speed v'.
 
-    A vehicle that would reverse stands. Source: SUMO's `step-method` (semi-implicit Euler).
+    A vehicle that would reverse stands still. Source: SUMO's `step-method` (semi-implicit Euler).
     """
     v_new = max(v + acc * dt, 0.0)
     return s + v_new * dt, v_new
@@ -182,10 +182,10 @@ def semi_implicit(s: float, v: float, acc: float, dt: float) -> tuple[float, flo
 def insertion_speed(
     gap: float, v_leader: float, a: float, b: float, headway: float, min_gap: float
 ) -> float:
-    """Highest speed whose desired gap s* is not above `gap`; negative when there is none.
+    """Highest speed whose desired gap s* does not exceed `gap`; negative if there is none.
 
     SUMO's insertion rule for the IDM: the gap must be the law's own secure gap
-    (`MSCFModel_IDM::getSecureGap`), so that a vehicle never starts with hard braking.
+    (`MSCFModel_IDM::getSecureGap`), so that a vehicle never starts by braking hard.
     Solves s0 + vT + v·(v − v_leader) / (2√(ab)) = gap for v.
     """
     room = gap - min_gap
@@ -200,7 +200,7 @@ def insertion_speed(
 def cruise_control(v: float, v0: float, gain: float, a: float, b: float) -> float:
     """Acceleration that a cruise control asks of the engine, gain·(v0 − v) within [−b, a] [m/s²].
 
-    Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without integral term; SUMO's
+    Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without the integral term; SUMO's
     `MSCFModel_CC::_cc`.
     """
     u = gain * (v0 - v)

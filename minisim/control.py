@@ -4,12 +4,12 @@ Besides this module, `dim` and `baselines` may import `minisim.junction` (geomet
 movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
 and their checks), `minisim.files` (writers), `minisim.streams` (random numbers), and
 `minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
-engine, the hosts or the results; `make lint` proves it.
+engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
 The host then advances alone until one of the plan's wake-ups, shows the session a `View`, and
-carries out the commands that it answers with. No session is called every step unless its plan
+carries out the commands that the session returns. No session is called every step unless its plan
 has a period.
 """
 
@@ -28,18 +28,18 @@ from minisim.parameters import checked, declared, part, real, reals, switch, tex
 from minisim.vehicle import VehicleType
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
-#: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
+#: `--junctions.limit-turn-speed`, so that turn speeds are comparable with SUMO's.
 LATERAL_ACCELERATION = 5.5
 
-#: Margin before a vehicle counts as unable to stop [m]. A held vehicle leaves more before its line
-#: (`minisim.engine.state.STOP_MARGIN`), so a vehicle that brakes for the junction entry is never
-#: committed. The margin is more than rounding, so a vehicle that can stop always does.
+#: A vehicle counts as able to stop only with this distance to spare [m]. A held vehicle keeps more
+#: before its line (`minisim.engine.state.STOP_MARGIN`), so one braking for the junction entry is
+#: never committed. The margin exceeds rounding errors, so a vehicle that can stop always does.
 COMMIT_MARGIN = 0.1
 
 
 @declared
 class Site:
-    """What a controller may know before the first vehicle comes."""
+    """What a controller may know before the first vehicle arrives."""
 
     intersection: Intersection = part("its geometry", Intersection)
     vehicle: VehicleType = part("the vehicles' type", VehicleType)
@@ -64,9 +64,9 @@ class Site:
 
     @cached_property
     def conflicts(self) -> Bools:
-        """Whether two movements of different arms must not be driven at once, shape (m, m).
+        """Whether two movements from different arms must not be driven at once, shape (m, m).
 
-        Movements of one arm share their lane: they follow each other and are no conflict here.
+        Movements from one arm share their lane: one follows the other, which is no conflict here.
         """
         return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
 
@@ -120,8 +120,8 @@ class View(NamedTuple):
     Attributes:
         time: [s].
         vehicles: every vehicle from `Plan.sight` before the junction until its rear bumper has
-            left it (and it is `Plan.reach` past the entry); ordered by lane, then front to back
-            (vehicles inside the junction first).
+            left it (and its front is `Plan.reach` past the entry); ordered by lane, then front to
+            back (vehicles inside the junction first).
     """
 
     time: float
@@ -137,10 +137,10 @@ class Go:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Take one vehicle's right of way: it stops at its hold line.
+    """Take away one vehicle's right of way: it stops at its hold line.
 
-    Where comfortable braking no longer reaches the hold line, it stops before the junction if
-    its brakes can; inside the junction a hold has no effect.
+    If comfortable braking can no longer stop it at the hold line, it stops before the junction if
+    its brakes can; inside the junction, a hold has no effect.
     """
 
     vehicle: int
@@ -155,7 +155,7 @@ class Open:
 
 @dataclass(frozen=True, slots=True)
 class Close:
-    """Take it back; vehicles with a `Go` of their own keep that."""
+    """Take a lane's right of way back; vehicles with a `Go` of their own keep theirs."""
 
     lane: int
 
@@ -170,10 +170,10 @@ class Advise:
 
 @dataclass(frozen=True, slots=True)
 class Brake:
-    """Make one vehicle brake at least at `deceleration` [m/s²] until told otherwise; 0 lifts it.
+    """Make one vehicle brake at `deceleration` [m/s²] or harder until told otherwise; 0 lifts this.
 
-    It acts everywhere, inside the junction too, and never exceeds what the brakes can do. A vehicle
-    that stands keeps standing. The command ends when the vehicle leaves the view for good, since no
+    It acts everywhere, even inside the junction, and never exceeds what the brakes can do. A
+    standing vehicle stays put. The command ends when the vehicle leaves the view for good, since no
     session could lift it after that.
     """
 
@@ -219,7 +219,7 @@ def _markings(title: str, value: tuple[Marking, ...]) -> tuple[Marking, ...]:
 
 @declared(kw_only=True)
 class Plan:
-    """What a session needs of its host."""
+    """What a session needs from its host."""
 
     hold_distance: float = real(
         "the hold line's distance before the junction entry", "m", default=0.0, low=0, high=1000
@@ -253,7 +253,7 @@ class Session(Protocol):
 
     @property
     def plan(self) -> Plan:
-        """What it needs of its host; read once, after `start`."""
+        """What it needs from its host; read once, after `start`."""
 
     def decide(self, view: View) -> Iterable[Command]:
         """Answer a view with commands; all are collected before any is carried out.
@@ -268,7 +268,7 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far; the names are none of a summary's own."""
+        """Name -> count so far; no name may be one of a summary's own."""
 
 
 @runtime_checkable

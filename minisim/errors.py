@@ -1,7 +1,7 @@
 """What minisim raises, and the checks that turn bad input into one clear sentence.
 
-A message names the value, what is allowed and where it came from, so that the command line can
-print it as it is.
+A message names the value, where it came from and what is allowed, so that the command line can
+print the message as it is.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched, and the caller did not ask to record that and go on.
+    """Two bodies touched, and the caller did not ask to record it and go on.
 
     Attributes:
         collisions: the `minisim.engine.collision.Collision`s of the step at which the run stopped.
-        replay: a function that runs again until a little later and returns a `Run` with the
+        replay: a function that repeats the run until a little later and returns a `Run` with the
             trajectories of the last seconds, 10 by default. None on a copy from another process.
     """
 
@@ -57,7 +57,7 @@ class MissingExtraError(MinisimError):
 
 
 class ExecutorError(MinisimError):
-    """An executor gave up runs. They have not failed and may be tried again."""
+    """An executor gave up on runs. They have not failed and may be tried again."""
 
 
 class SumoError(MinisimError):
@@ -78,7 +78,7 @@ def number(
     Raises:
         InputError: not a real number, not finite, or out of range.
     """
-    # The usual case first, since every command is checked and `isinstance` of Real is slow.
+    # The usual case first, since every command is checked and `isinstance` with Real is slow.
     if type(value) is float and low <= value <= high and above < value < below:
         return value
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -107,7 +107,7 @@ def integer(name: str, value: object, *, low: int, high: int | None = None) -> i
 
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> str:
-    """Return `value` when it is one of `allowed`; otherwise raise with the nearest ones."""
+    """Return `value` if it is one of `allowed`; otherwise raise, suggesting the nearest one."""
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
@@ -120,7 +120,7 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
     """Raise `InputError` unless `value` is a `kind`.
 
-    A class is refused where an object of it belongs, though it has the methods of a protocol.
+    A class is refused where an instance belongs, even if it has the methods of a protocol.
     """
     if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
@@ -134,7 +134,7 @@ def items(name: str, value: object, of: str) -> list[Any]:
     if not isinstance(value, str | bytes) and isinstance(value, Iterable):
         try:
             return list(value)
-        except TypeError:  # an array without dimensions says that it is iterable
+        except TypeError:  # a zero-dimensional array claims to be iterable
             pass
     raise InputError(f"{name} must be a sequence of {of}, got {show(value)}")
 

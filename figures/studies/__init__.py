@@ -1,1 +1,1 @@
-"""Figures and tables of the studies, one module a study, which exports its `SECTION`."""
+"""Figures and tables of the studies, one module per study, which exports its `SECTION`."""

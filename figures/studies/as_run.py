@@ -1,4 +1,4 @@
-"""Every value of the paper beside ours, for both studies of its grid, and the causes."""
+"""Every value of the paper beside ours, for both studies of its grid, with the causes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from scenarios.studies.shared.paper_comparison import (
 )
 from scenarios.studies.shared.study import Results
 
-#: Series -> why its published rules collide.
+#: Series -> why its published rules lead to collisions.
 COLLIDING = {
     "dim": "the published five-arm table has pairs in harmony, such as c3 and e4, whose ways pass "
            "1.48 m apart, less than a vehicle is wide; and by the published rule a decision may "
@@ -69,7 +69,7 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
 
 
 def ending(archive: Archive) -> str:
-    """The known causes of differences, each once: where it holds, and what shows it."""
+    """The known causes of differences, each listed once, with where it holds and what shows it."""
     holding: dict[tuple[int, str], list[str]] = {}
     for known in discrepancies():
         holding.setdefault((known.number, known.cause), []).append(_where(known))

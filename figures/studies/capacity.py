@@ -25,7 +25,7 @@ LOOKS = {
 
 
 def needed_capacities(results: Results) -> list[Capacity]:
-    """Every capacity that is known; raises `MissingRunsError` if there is none."""
+    """Every known capacity; raises `MissingRunsError` if there is none."""
     known = capacities(results)
     if not known:
         raise MissingRunsError(
@@ -63,7 +63,7 @@ def capacity_figure(results: Results) -> Figure:
 
 
 def capacity_table(results: Results) -> Table:
-    """Capacities in numbers [veh/h/lane]."""
+    """Capacities as numbers [veh/h/lane]."""
     known = needed_capacities(results)
     texts = {(c.series, c.arms): str(c) for c in known}
     arms = sorted({c.arms for c in known})

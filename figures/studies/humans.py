@@ -1,4 +1,4 @@
-"""Delays of human drivers and of vehicles of DIM on the same roads."""
+"""Delays of human drivers and of DIM's vehicles on the same roads."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from scenarios.studies.humans import DENSITIES, SHARES, STOP, delays
 from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import TOTAL_DELAY, Results, with_total_delay
 
-#: (group of vehicles, gate) -> look: colour and marker tell the group, the line tells the gate.
+#: (group of vehicles, gate) -> look: colour and marker show the group, the line shows the gate.
 LOOKS = {
     ("human", GATES[0]): style.Look("human drivers, gate clear", style.VERMILLION, "s", "-"),
     ("automated", GATES[0]): style.Look("vehicles of DIM, gate clear", style.BLUE, "o", "-"),
     ("human", GATES[1]): style.Look("human drivers, gate harmonious", style.VERMILLION, "s", ":"),
     ("automated", GATES[1]): style.Look("vehicles of DIM, gate harmonious", style.BLUE, "o", ":"),
 }
-#: Sideways shift between the gates [%], so that bars do not cover each other.
+#: Sideways shift between the gates [%], so that error bars do not overlap.
 SHIFT = 1.2
 
 
 def human_figure(results: Results) -> Figure:
-    """Delay of human drivers and of vehicles of DIM over the share of humans."""
+    """Delay of human drivers and of DIM's vehicles against the share of humans."""
     rows = results.good
     run = [density for density in DENSITIES if (rows["density"] == density).any()]
     figure, panels = plots.panels(

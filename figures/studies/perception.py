@@ -1,4 +1,4 @@
-"""Effects of misread intents, over the probability of an error."""
+"""Effects of misread intents against the probability of an error."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ LOOKS = {
     (False, True): style.Look(MANNERS[False, True], style.VERMILLION, "s", "--"),
     (False, False): style.Look(MANNERS[False, False], style.ORANGE, "^", "-."),
 }
-#: Turns that are not signalled, at the published rates.
+#: Unsignalled turns, at the published rates.
 SILENT = style.Look("turns without signal, published rates", style.INK, "", ":")
 
 
 def perception_figure(results: Results, series: str) -> Figure:
-    """Collisions, false grants and delay under a controller, over the probability of an error."""
+    """Collisions, false grants and delay under a controller against the probability of an error."""
     rows = outcomes.select(with_total_delay(results.good), series=series)
     parts = list(product(KINDS, outcomes.OUTCOMES))
     figure, panels = plots.panels(
@@ -45,7 +45,7 @@ def perception_figure(results: Results, series: str) -> Figure:
         for place, ((shared, persistent), look) in enumerate(LOOKS.items()):
             line = outcomes.select(signalled, kind=kind, shared=shared, persistent=persistent)
             cells = [exact, *(outcomes.select(line, rate=rate) for rate in RATES[1:])]
-            # Side by side, so that bars do not cover each other. The ticks are even, the rates not.
+            # Side by side, so that error bars do not overlap. Ticks are evenly spaced; rates not.
             places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
             outcomes.draw(axes, places, cells, outcome, look)
         level = outcomes.estimated(silent, outcome)

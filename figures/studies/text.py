@@ -1,4 +1,4 @@
-"""The paper's figures and its table of lanes: its values beside ours, from both studies."""
+"""The paper's figures and its lane table: its values beside ours, from both studies."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _grid_figure(
     both: tuple[Results, ...], measure: Measure, what: str, series: tuple[str, ...],
     chosen: Callable[[pd.DataFrame], pd.DataFrame], wanted: Callable[[Point], bool],
 ) -> Figure:  # fmt: skip
-    """One panel a study; `chosen` takes the figure's rows from a table, ours or the paper's."""
+    """One panel per study; `chosen` takes the figure's rows from a table, ours or the paper's."""
     figure, panels = plots.panels(
         9.2, 4.9, len(BOTH), left=0.07, right=0.988, top=0.735, bottom=0.15, wspace=0.07
     )

@@ -8,10 +8,10 @@ from minisim.engine.state import DRIVING, Floats, Law, Records, Road
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import locate
 
-#: Bodies this close may touch within rounding [m]; the exact check follows in pymunk.
+#: Bodies this close may be touching, given rounding [m]; the exact check follows in pymunk.
 TOUCH_MARGIN = 0.02
 
-#: Where the front of a vehicle is, compiled.
+#: `locate`, compiled: where the front of a vehicle is.
 place = njit_inline(locate)
 
 
@@ -19,8 +19,8 @@ place = njit_inline(locate)
 def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
-    It tests rectangles a little larger than the bodies by separating axes, which is exact. So it
-    never misses a touch that pymunk would find.
+    It applies the separating-axis test, which is exact, to rectangles a little larger than the
+    bodies, so it never misses a touch that pymunk would find.
     """
     ends, shape, headings = road.ends, road.shape, road.headings
     count = 0
@@ -74,7 +74,7 @@ def rectangles_meet(
     half_length: float,
     half_width: float,
 ) -> bool:
-    """Separating-axis test of two equal rectangles, centres (dx, dy) apart, headings u and w."""
+    """Separating-axis test of equal rectangles with headings u and w, centres (dx, dy) apart."""
     cos = abs(ux * wx + uy * wy)
     sin = abs(ux * wy - uy * wx)
     along = half_length + half_length * cos + half_width * sin

@@ -52,7 +52,7 @@ class Collision(NamedTuple):
 
 
 def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> list[Collision]:
-    """All collisions at this moment: near the junction pymunk decides, within a lane the gap."""
+    """All collisions at this moment: pymunk decides near the junction, the gap within a lane."""
     rows, bodies = near_bodies(vehicles, site)
     pairs = [(rows[i], rows[j]) for i, j in touching(bodies)]
     pairs += _overlaps_in_lane(vehicles, road, site.vehicle.length)
@@ -87,7 +87,7 @@ def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
 
 
 def _overlaps_in_lane(vehicles: Records, road: Road, length: float) -> list[tuple[int, int]]:
-    """Rows of the vehicles whose front has reached the rear of the one ahead."""
+    """Row pairs (j, i) in which the front of vehicle i has reached the rear of j ahead of it."""
     s, path, lane = vehicles["s"], vehicles["path"], vehicles["lane"]
     driving = vehicles["status"] == DRIVING
     exits, branch = road.ends[:, 0], road.branch

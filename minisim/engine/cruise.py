@@ -1,27 +1,26 @@
 """Vehicles under cruise control: the law of the published runs, SUMO's CC model.
 
-All that is special about this law is in this module: its leaders, what it remembers of each vehicle
+Everything special about this law is in this module: its leaders, what it remembers of each vehicle
 and how it chooses accelerations. The kernel calls `accelerate` in place of its own, and `look`
 after every step. The equations are in `minisim.carfollowing`.
 
 A vehicle obeys the hardest braking that any of its leaders asks for
 (`MSVehicle::planMoveInternal`, with the model's radar). The leaders are:
 
-- the vehicle ahead on the stretch of road that it is on (approach, way through the junction, exit);
+- the vehicle ahead on its own stretch of road (approach, way through the junction, exit);
 - the last vehicle on every later stretch, from any lane and at any distance;
-- a vehicle inside the junction on a way that begins or ends with its own
-  (`minisim.junction.meetings`) and that was there before it, as long as there is room to the place
-  where the ways meet;
-- the radar's leader: where no vehicle is ahead on its own lane or way, the nearest one that will
-  leave by the same exit. Where there is no room left, it counts as if it were just ahead.
+- a vehicle that was inside the junction before it, on a way that begins or ends with its own
+  (`minisim.junction.meetings`), as long as there is room up to the place where the ways meet;
+- the radar's leader: where no vehicle is ahead on its own lane or way, the nearest one bound for
+  the same exit. If there is no room left, it counts as if it were just ahead.
 
-A vehicle that only crosses its way is no leader. SUMO asks only whether the vehicle could stop
+A vehicle that only crosses its way is not a leader. SUMO asks only whether the vehicle could stop
 before the crossing (`adaptToJunctionLeader`), and the CC model answers with the radar's leader,
 whichever vehicle SUMO asked about.
 
-One rule is left out: inside the junction, SUMO's vehicles also follow a vehicle that crosses before
-them while there is room up to the crossing. `docs/fidelity.md` shows the only replay in which that
-happened.
+One rule is left out: inside the junction, SUMO's vehicles also follow a vehicle that crosses ahead
+of them while there is room up to the crossing. `docs/fidelity.md` shows the only replay in which
+this happened.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ from minisim.jit import njit, njit_inline
 from minisim.junction.meetings import Meeting, meetings, sagittas
 from minisim.vehicle import CruiseVehicle
 
-#: Vehicles inside the junction at once, at most.
+#: The most vehicles inside the junction at once.
 INSIDE = 64
 
 NOWHERE, JOIN, PART = int(Meeting.NOWHERE), int(Meeting.JOIN), int(Meeting.PART)
@@ -55,13 +54,13 @@ MEMORY = np.dtype(
     [
         ("entered", np.int64),  # tick of entering the junction
         ("left", np.int64),  # its front has left the junction
-        ("stopping", np.int64),  # it was advised to stand in the step before
+        ("stopping", np.int64),  # it was advised to stand still in the previous step
     ]
 )
 
 
 class Cruise(NamedTuple):
-    """What a run of `minisim.vehicle.CruiseVehicle` needs beside `Law` (SI units).
+    """What a run of `minisim.vehicle.CruiseVehicle` needs besides `Law` (SI units).
 
     Attributes:
         meetings: (p, p, 2), see `minisim.junction.meetings.meetings`.
@@ -87,7 +86,7 @@ class Cruise(NamedTuple):
 
 
 def build_cruise(site: Site, count: int) -> Cruise | None:
-    """Collect what a run of `count` vehicles needs; None where they have no cruise control."""
+    """Collect what a run of `count` vehicles needs; None if they have no cruise control."""
     vehicle, intersection = site.vehicle, site.intersection
     if not isinstance(vehicle, CruiseVehicle):
         return None
@@ -172,9 +171,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
 
 @njit
 def look(vehicles: Records, lanes: Records, road: Road, cruise: Cruise, tick: int) -> None:
-    """Note after a step which vehicles have entered the junction, and which an exit lane.
+    """Note after a step which vehicles have entered the junction, and which ones an exit lane.
 
-    The vehicle ahead on an exit lane is the one that entered that lane before.
+    The vehicle ahead on an exit lane is the one that entered that lane just before.
     """
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
@@ -191,7 +190,7 @@ def look(vehicles: Records, lanes: Records, road: Road, cruise: Cruise, tick: in
 
 @njit
 def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, inside: Ints) -> int:
-    """Fill `inside` with the rows of vehicles at least partly in the junction; their number."""
+    """Fill `inside` with the rows of vehicles at least partly in the junction; returns how many."""
     count = 0
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
@@ -272,7 +271,7 @@ def meet(
         stops = gap + braking_distance(other["v"], law.b_max, law.dt)  # if the other brakes hard
         if kind == JOIN and leads and not led and stops < shortest:
             shortest = stops
-            to_part = law.entry + waits[p, 0] - s  # of its way that the other can meet
+            to_part = law.entry + waits[p, 0] - s  # to the part of its way that the other can meet
             shown = follow(v, gap if gap >= 0.0 else max(to_part, 0.0), other["v"], cruise)
         if not approaching and gap >= 0.0:
             u = min(u, follow(v, gap, other["v"], cruise))
@@ -281,7 +280,7 @@ def meet(
 
 @njit_inline
 def before(vehicles: Records, cruise: Cruise, i: int, j: int) -> bool:
-    """Whether j entered the junction before i; if both at once, the faster, then the later row."""
+    """Whether j entered the junction before i; a tie goes to the faster, then to the later row."""
     mine, other = cruise.memory[i]["entered"], cruise.memory[j]["entered"]
     if mine != other:
         return bool(other < mine)
@@ -300,9 +299,9 @@ def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
 
 @njit_inline
 def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
-    """Acceleration of this step: the engine's answer to `u`, which never goes below standstill.
+    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
 
-    From the step after a desired speed of 0 on, SUMO asks for standstill within one step.
+    Starting one step after a desired speed of 0, SUMO asks for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
     a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -law.b_max)

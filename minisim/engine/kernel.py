@@ -1,8 +1,8 @@
-"""Advance every vehicle until something happens that the caller must know.
+"""Advance every vehicle until something happens that the caller must know about.
 
 Functions over the arrays of `minisim.engine.state`; numba compiles them where it is installed, and
-the same source runs as plain Python. A step is: insert, choose every acceleration from the state at
-its beginning, then move every vehicle.
+the same source runs as plain Python. A step inserts vehicles, chooses every acceleration from
+the state at its beginning, then moves every vehicle.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
 #: SUMO's limit below which a vehicle counts as waiting [m/s].
 WAITING_SPEED = 0.1
 
-#: The data of a law of motion that has leaders of its own. There is one such law.
+#: The data of a law of motion with leaders of its own. There is one such law.
 Motion = cruise.Cruise
 
 
 def build_motion(site: Site, vehicles: Records) -> Motion | None:
-    """The data that the law of these vehicles needs beside `Law`, or None."""
+    """The data that the law of these vehicles needs besides `Law`, or None."""
     return cruise.build_cruise(site, len(vehicles))
 
 
@@ -46,17 +46,17 @@ def advance(
     tick: int,
     until: int,
 ) -> tuple[int, int, int, int]:
-    """Advance from `tick` to `until` at most; stop at the end of a step with a reason.
+    """Advance from `tick` to `until` at most; stop after any step that gives a reason to return.
 
     Args:
-        motion: of a law with leaders of its own; None under a plain car-following law.
+        motion: the data of a law with leaders of its own; None under a plain car-following law.
         trace: the recording, filled from line `traced` on.
-        bodies: scratch, (k, 5), for the k vehicles that can be in and near the junction at once.
+        bodies: scratch space (k, 5) for the k vehicles that can be in or near the junction at once.
         observed: filled with what a view shows at the end, see `observe`.
 
     Returns:
-        The tick reached, the reasons (bits, 0 at `until`), the lines recorded, the vehicles
-        observed.
+        The tick reached, the reasons (bits, 0 at `until`), and the numbers of lines recorded and
+        vehicles observed.
     """
     reasons = 0
     while tick < until and reasons == 0:
@@ -79,7 +79,7 @@ def step(
     bodies: Floats,
     tick: int,
 ) -> int:
-    """Make one step, from `tick` to the next; returns the reasons to return, as bits."""
+    """Take one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
     if insert(vehicles, lanes, road, law, tick):
         reasons |= MARK
@@ -179,7 +179,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                     break
                 j -= 1
 
-            # From the junction on, the last vehicle before it that is bound for the same exit lane.
+            # From the junction on, also the last vehicle before it bound for the same exit lane.
             # Both positions are measured from that lane, so a vehicle that is still on another arc
             # counts as if it were on this one.
             j = -1
@@ -203,7 +203,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 k += 1
             if not released and s < law.entry:
                 acc = min(acc, hold(v, s, law))
-            brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # it does not start
+            brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # stays standing
             me["a"] = max(min(acc, brake), -law.b_max)
     return overlap
 
@@ -280,7 +280,7 @@ def record(
     traced: int,
     tick: int,
 ) -> int:
-    """Write one line for every vehicle in the recorded stretch; returns the lines so far."""
+    """Write one line for every vehicle in the recorded stretch; returns the count so far."""
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
@@ -300,7 +300,7 @@ def record(
 
 @njit
 def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> int:
-    """Fill `observed` with the vehicles of a view (`minisim.control.View`); their number."""
+    """Fill `observed` with the vehicles of a view (`minisim.control.View`); returns how many."""
     count = 0
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["uncleared"], lanes[lane]["next"]):

@@ -1,7 +1,7 @@
 """The arrays that a run consists of.
 
-Vehicles are one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-the row before. Lanes are another array. `Road` and `Law` hold what never changes during a run. Few
+Vehicles form one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
+the row before. Lanes form another array. `Road` and `Law` hold what never changes during a run. Few
 arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
 """
 
@@ -25,8 +25,8 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
-#: A held vehicle aims at this distance before its hold line [m]. It may stop up to 0.3 m before the
-#: line. This is more than `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
+#: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
+#: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
 STOP_MARGIN = 0.25
 
 #: Values of the field `status`.
@@ -129,20 +129,20 @@ class Law(NamedTuple):
     min_gap: float
     delta: float
     model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
-    semi_implicit: bool  # how positions follow from speeds: by `semi_implicit`, or ballistic
+    semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
     length: float
     width: float
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
-    leave: float  # s until which a vehicle stays in view at least
+    leave: float  # s up to which a vehicle at least stays in view
     margin: float  # see `minisim.vehicle.Model`
     sight: float  # how far before the entry a view reaches
-    depart_speed: float  # negative: the highest safe one
+    depart_speed: float  # negative means the highest safe speed
     wake_on_clear: bool
     record_from: int  # ticks
     record_to: int
     record_start: float  # s where recording starts
-    record_past: float  # how far past the junction exit it goes on
+    record_past: float  # how far past the junction exit recording continues
 
 
 def build_road(site: Site, plan: Plan) -> Road:
@@ -231,7 +231,7 @@ def build_law(
     )
 
 
-#: Reach of a recording of the junction alone, before its entry and past its exit [m].
+#: How far a recording of the junction alone reaches before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
 
 #: A tick that never comes.
@@ -244,7 +244,7 @@ def first_tick(time: float, dt: float) -> int:
 
 
 def time_of(tick: int, dt: float) -> float:
-    """Simulated time at a tick [s], free of rounding."""
+    """Simulated time at a tick [s], free of rounding errors."""
     return round(tick * dt, 6)
 
 
@@ -275,7 +275,7 @@ def _speed_factors(site: Site, count: int) -> Floats:
 
 
 def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
-    """The lanes, with their rows of the vehicle array."""
+    """The lanes, with their rows in the vehicle array."""
     n = site.intersection.n
     starts = np.searchsorted(vehicles["lane"], np.arange(n + 1))
     lanes = np.zeros(n, LANE)

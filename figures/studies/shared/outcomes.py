@@ -16,7 +16,7 @@ KIND_LOOKS = {
     "missed": style.Look("missed signals", style.BLUE, "o", "-"),
     "symmetric": style.Look("symmetric errors", style.VERMILLION, "s", "--"),
 }
-#: Title of a panel -> column, and what its axis counts.
+#: Panel title -> column, and what its axis counts.
 OUTCOMES = {
     "Collisions": ("collisions", f"in {CROSSINGS:,} crossings"),
     "False grants": ("false_grants", ""),
@@ -30,7 +30,7 @@ NOTE = (
 
 
 def estimated(rows: pd.DataFrame, outcome: str) -> plots.Estimate | None:
-    """One of `OUTCOMES` of all runs together; None if there is nothing to estimate it from."""
+    """One of `OUTCOMES` over all runs together; None if there is nothing to estimate it from."""
     if rows.empty:
         return None
     column, _ = OUTCOMES[outcome]
@@ -51,7 +51,7 @@ def draw(
     axes: Axes, places: Iterable[float], cells: Iterable[pd.DataFrame], outcome: str,
     look: style.Look,
 ) -> None:  # fmt: skip
-    """One of `OUTCOMES` over cells of runs; cells without it are left out."""
+    """Draw one of `OUTCOMES` for each cell of runs; cells without it are left out."""
     known = {
         x: estimate
         for x, cell in zip(places, cells, strict=True)
@@ -62,7 +62,7 @@ def draw(
 
 
 def dress(axes: Axes, outcome: str, title: str, xlabel: str, ticks: Sequence[str]) -> None:
-    """Frame and scales of a panel of `OUTCOMES`."""
+    """Set the frame and scales of a panel of `OUTCOMES`."""
     column, words = OUTCOMES[outcome]
     style.plot_axes(axes, title, xlabel, "")
     if column == TOTAL_DELAY:

@@ -21,7 +21,7 @@ EXPLAINED = (
 
 
 def agreement(results: Results) -> str:
-    """How many of the paper's values lie inside our intervals, in all and by controller."""
+    """How many of the paper's values lie inside our intervals, in total and by controller."""
     name, effort = results.study.name, results.effort
     if results.good.empty:
         return f"- `{name}`: not run (`{effort.command(name)}`)."
@@ -41,12 +41,12 @@ def agreement(results: Results) -> str:
 
 
 def marked(row: Mapping[Any, Any]) -> str:
-    """The paper's value; † if it is not the run that its label says."""
+    """The paper's value; with † if it is not from the run that its label names."""
     return f"{row['paper']:.2f}" + ("" if row["comparable"] == "yes" else " †")
 
 
 def range_words(row: Mapping[Any, Any], *, mean: bool = False) -> str:
-    """Our prediction interval, after our mean if asked for; ↑ if queues still grew."""
+    """Our prediction interval, preceded by our mean on request; ↑ if queues were still growing."""
     arrow = " ↑" if row["saturated"] else ""
     words = f"{two_digits(row['low'])} … {two_digits(row['high'])}{arrow}"
     if not mean:

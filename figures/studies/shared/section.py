@@ -18,9 +18,9 @@ Drawing = Figure | Table
 class Item:
     """A figure or table that can be made."""
 
-    name: str  # on the command line, and of its files
+    name: str  # on the command line and in file names
     title: str  # in one line
-    #: Makes it from the results of the studies that it needs, one argument each.
+    #: Makes it from the results of the studies that it needs, one argument per study.
     draw: Callable[..., Drawing]
     needs: tuple[str, ...] = ()  # those studies
     in_report: bool = True  # whether the report shows it; otherwise it is a file only
