@@ -1,7 +1,7 @@
 """Files on disk: whether they can be written, and writers that never leave half a file.
 
-A writer writes beside its target and then renames. A reader sees the old file or the whole new
-one, whatever happens in between.
+A writer writes beside its target and then renames. Whatever happens in between, a reader
+sees the old file or the whole new one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from minisim.errors import FileError, InputError, MissingExtraError, choice, ins
 if TYPE_CHECKING:
     import pandas as pd
 
-#: A file as a caller may name it.
+#: What a caller may pass as a file.
 AnyPath = str | os.PathLike[str]
 
 #: Suffixes of the formats in which tables are written.
@@ -34,11 +34,11 @@ CSV_DECIMALS: Final = 6
 def replacing(path: AnyPath) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, and put it in place at the end.
 
-    When the block raises, `path` stays as it was and the temporary file goes. A symbolic link
-    stays a link: the file that it names is replaced.
+    If the block raises, `path` stays as it was and the temporary file is removed. A symbolic
+    link stays a link: the file that it points to is replaced.
 
     Raises:
-        FileError: the folder cannot be written, or `path` is no ordinary file.
+        FileError: the folder is not writable, or `path` is not an ordinary file.
     """
     target = _target(path)
     temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
@@ -53,16 +53,16 @@ def replacing(path: AnyPath) -> Iterator[Path]:
 
 
 def write_text(path: AnyPath, text: str) -> None:
-    """Write a text in UTF-8, whole or not at all; raises `FileError`."""
+    """Write text in UTF-8, whole or not at all; raises `FileError`."""
     with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def write_table(frame: pd.DataFrame, path: AnyPath) -> None:
-    """Write a table as CSV or Parquet, by the suffix of `path`, whole or not at all.
+    """Write a table, whole or not at all, as CSV or Parquet depending on the suffix of `path`.
 
     Raises:
-        InputError: another suffix.
+        InputError: `path` has another suffix.
         MissingExtraError: Parquet without pyarrow.
         FileError: the file cannot be written; nothing is left behind.
     """
@@ -79,7 +79,7 @@ def markdown_table(
 ) -> str:
     """A Markdown table in which each cell stays in its column, whatever it holds.
 
-    `words` are the indices of the columns aligned to the left; the others are aligned to the right.
+    `words` are the indices of the left-aligned columns; the others are right-aligned.
     """
     rule = ["---" if k in words else "---:" for k in range(len(headings))]
     cells = ([" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows)
@@ -87,15 +87,15 @@ def markdown_table(
 
 
 def check_file(path: AnyPath, *suffixes: str) -> Path:
-    """Return `path` when a file can be written there; leaves no trace.
+    """Return `path` if a file can be written there; leave no trace.
 
     Args:
-        path: of the file.
-        suffixes: that it may have; any where none is given.
+        path: path of the file.
+        suffixes: the suffixes that it may have; if none is given, any.
 
     Raises:
-        InputError: another suffix.
-        FileError: its folder is missing or not writable, or the path is no ordinary file.
+        InputError: `path` has another suffix.
+        FileError: its folder is missing or not writable, or it is not an ordinary file.
     """
     if suffixes:
         _check_suffix(path, suffixes)
@@ -114,15 +114,15 @@ def check_file(path: AnyPath, *suffixes: str) -> Path:
 
 
 def check_table(path: AnyPath) -> Path:
-    """`check_file` for a table; raises also as `write_table`."""
+    """`check_file` for a table; also raises what `write_table` raises."""
     _table_suffix(path)
     return check_file(path)
 
 
 def check_apart(files: Mapping[str, Path | None]) -> None:
-    """Raise `InputError` when two options (name -> file) mean one file: it would be overwritten.
+    """Raise `InputError` if two options (name -> file) name the same file.
 
-    Links are followed.
+    One would overwrite the other. Links are followed.
     """
     seen: dict[str, str] = {}
     for option, path in files.items():
@@ -134,7 +134,7 @@ def check_apart(files: Mapping[str, Path | None]) -> None:
 
 
 def make_folder(path: AnyPath) -> Path:
-    """Make a folder, with its parents, that files can be written to; raises `FileError`."""
+    """Make a writable folder, along with its parents; raises `FileError`."""
     folder = Path(path)
     try:
         if folder.exists() and not folder.is_dir():
@@ -174,7 +174,7 @@ def _target(path: AnyPath) -> Path:
 
 
 def _probe(folder: Path) -> None:
-    """Write and remove a temporary file; permissions alone do not tell whether that works."""
+    """Write and remove a temporary file; permissions alone do not show whether that works."""
     with tempfile.TemporaryFile(dir=folder):
         pass
 

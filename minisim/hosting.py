@@ -1,4 +1,4 @@
-"""What all hosts share: how a run begins, how a session is woken and asked, how a run stops."""
+"""What all hosts share: how a run begins and stops, and how a session is woken and asked."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
 )  # fmt: skip
 
-#: Commands by what they address. Building a union of types for each check would be slow.
+#: Commands grouped by what they address. Building a union of types at each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
@@ -54,7 +54,7 @@ AFTERMATH = 2.0
 
 
 class Alarm:
-    """When the clock wakes a session: at the period of its plan, and once when it asks for it."""
+    """When the clock wakes a session: periodically, as its plan says, and once whenever it asks."""
 
     def __init__(self, period: float | None, dt: float) -> None:
         self._dt = dt
@@ -64,24 +64,24 @@ class Alarm:
 
     @property
     def tick(self) -> int:
-        """The next tick at which it rings."""
+        """The next tick at which the alarm rings."""
         return min(self._asked, self._due)
 
     def reset(self, tick: int) -> None:
-        """The session is awake at `tick`: what was due until then has been served."""
+        """The session is awake at `tick`: everything due by then has been served."""
         if tick >= self._asked:
             self._asked = NEVER
         if tick >= self._due:
             self._due = tick + self._every
 
     def set(self, command: Wake) -> None:
-        """Ring once at the time of the command, in place of an earlier one."""
+        """Ring once at the command's time; this replaces any earlier request."""
         self._asked = first_tick(command.time, self._dt)
 
 
 @dataclass(frozen=True, eq=False)
 class Hosted:
-    """A run in any host: its arguments are checked and its session has started."""
+    """A run in any host, with its arguments checked and its session started."""
 
     scenario: ScenarioLike
     controller: Controller
@@ -95,10 +95,10 @@ class Hosted:
     plan: Plan
 
     def ask(self, view: View, tick: int) -> list[Command]:
-        """Show the session its view at `tick`; returns its commands.
+        """Show the session its view at `tick` and return its commands.
 
         Raises:
-            ControllerError: it answered with something that cannot be carried out.
+            ControllerError: the session answered with something that cannot be carried out.
         """
         commands = list(self.session.decide(view))
         try:
@@ -145,12 +145,12 @@ def begin(
     on_collision: str,
     reactions: Sequence[str] = ON_COLLISION,
 ) -> Hosted:
-    """Check what is to be run, draw the arrivals and start the controller's session.
+    """Check the arguments, draw the arrivals and start the controller's session.
 
     Raises:
-        InputError: an argument that is not allowed (`reactions`: to a collision), or a scenario
-            that the controller cannot serve.
-        ControllerError: the controller gave no session.
+        InputError: an argument is not allowed (`reactions` are those to a collision), or the
+            controller cannot serve the scenario.
+        ControllerError: the controller returned no session.
     """
     if record is not None:
         choice("record", record, RECORDS)

@@ -5,7 +5,7 @@ which a debugger can follow.
 
 Compiled code is cached on disk. It includes all functions that it calls and all constants that it
 reads, from any module, but numba only checks the file of the function itself. Our cache also checks
-all sources beside the function and beside this file, and compiles again when one of them changes.
+all sources in the function's folder and in this one, and recompiles when any of them changes.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ COMPILED = _enabled()
 
 
 def njit(function: _F) -> _F:
-    """Compile `function` (cached on disk), or return it as it is."""
+    """Compile `function` (cached on disk), or return it unchanged."""
     return _compile(function, inline="never")
 
 
 def njit_inline(function: _F) -> _F:
-    """The same for a helper of the inner loop, pasted into its compiled callers.
+    """The same for a helper in the inner loop, which is pasted into its compiled callers.
 
-    LLVM does not do so by itself. Every call would then pass `Law` field by field and count a
-    reference to each array, which takes longer than the arithmetic.
+    LLVM does not inline it by itself. Every call would then pass `Law` field by field and count
+    references to each array, which takes longer than the arithmetic.
     """
     return _compile(function, inline="always")
 
@@ -65,14 +65,14 @@ def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
 
     class SourcesCache(FunctionCache):
-        """numba's cache on disk; its content is valid only while none of our sources changes."""
+        """numba's cache on disk, valid only as long as none of our sources changes."""
 
         def __init__(self, function: Callable[..., object]) -> None:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            # numba reads the version first, and nothing else of an index with another one. The rest
-            # may hold classes that no longer exist.
+            # numba reads an index's version first, and reads no further if it differs. The rest may
+            # hold classes that no longer exist.
             self._cache_file._version = self._cache_file._source_stamp = sources
 
     return SourcesCache

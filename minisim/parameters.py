@@ -1,4 +1,4 @@
-"""Parameters: meaning, default, range and unit of a field, declared together and checked once.
+"""Parameters: a field's meaning, default, range and unit, declared together and checked once.
 
     @declared
     class OneAtATime:
@@ -8,11 +8,11 @@
             "how far before the junction vehicles are seen", "m", default=40.0, low=1, high=400
         )
 
-`declared` makes a frozen dataclass whose constructor checks every such field and raises
-`InputError` with one sentence. Rules between fields go into `__post_init__`, which runs after
-that. The class docstring gets a list of the parameters; `parameters` gives them as data, for help
-texts and for readers of command lines and files. `spelled` makes the name of a recipe, in the
-spelling that those readers accept.
+`declared` makes a frozen dataclass whose constructor checks every such field and raises an
+`InputError` of one sentence. Rules that link fields go into `__post_init__`, which runs
+afterwards. The class docstring gets a list of the parameters; `parameters` gives them as data, for
+help texts and for parsers of command lines and files. `spelled` makes the name of a recipe, in the
+spelling that those parsers accept.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from minisim.errors import InputError, choice, instance, integer, number, number
 
 _T = TypeVar("_T")
 
-#: Returns the value of a field, perhaps in another form, or raises `InputError`. Arguments: what
-#: messages call the field, and its value.
+#: Returns the value of a field, perhaps in another form, or raises `InputError`. Its arguments are
+#: what messages call the field, and the field's value.
 Check = Callable[[str, Any], Any]
 
 _KEY = "parameter"
@@ -45,16 +45,16 @@ SWITCH = ("true", "false")
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is declared of a field.
+    """What is declared about a field.
 
     Attributes:
-        meaning: in a few words.
-        unit: such as "m"; empty where it has none.
+        meaning: what it means, in a few words.
+        unit: such as "m"; empty if it has none.
         allowed: the values that it takes, in words.
         check: see `Check`.
-        label: what messages call it; empty is the name of the field.
+        label: what messages call it; if empty, the name of the field.
         optional: whether None is allowed too.
-        words: what a text may be, for a field that is one of some words.
+        words: the words allowed, for a field that takes one of several.
         kinds: word -> what makes the value of that name, for a field that holds another recipe.
     """
 
@@ -68,12 +68,12 @@ class Parameter:
     kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
 
     def title(self, name: str) -> str:
-        """What messages call it: its label or name, and its unit."""
+        """What messages call the field: its label or name, and its unit."""
         return f"{self.label or name} [{self.unit}]" if self.unit else self.label or name
 
 
 class Declared(NamedTuple):
-    """A parameter of a class; `default` is `dataclasses.MISSING` where it has none."""
+    """A parameter of a class; `default` is `dataclasses.MISSING` if it has none."""
 
     name: str
     parameter: Parameter
@@ -99,7 +99,7 @@ def real(
     below: float = math.inf,
     **common: Unpack[Common],
 ) -> Any:
-    """A finite number in [low, high] and (above, below)."""
+    """A finite number within [low, high] and (above, below)."""
     check = _unchanged(partial(number, low=low, high=high, above=above, below=below))
     return checked(meaning, check, _range(low, high, above, below), unit, **common)
 
@@ -114,7 +114,7 @@ def whole(
 
 
 def word(meaning: str, among: Sequence[str], **common: Unpack[Common]) -> Any:
-    """One of some words."""
+    """One of several words."""
     check = partial(choice, allowed=among)
     return _field(meaning, check, " | ".join(among), words=tuple(among), **common)
 
@@ -139,7 +139,7 @@ def reals(
     count: int | None = None,
     **common: Unpack[Common],
 ) -> Any:
-    """Any sequence of finite numbers in [low, high], or of so many, kept as a tuple."""
+    """A sequence of finite numbers in [low, high], of any or a given length, kept as a tuple."""
 
     def check(title: str, value: Any) -> Any:
         kept = numbers(title, value)
@@ -161,9 +161,9 @@ def part(
     kinds: Mapping[str, Callable[..., Any]] | None = None,
     **common: Unpack[Common],
 ) -> Any:
-    """Another object, of class or protocol `kind`.
+    """Another object, of the class or protocol `kind`.
 
-    Command lines and files name it by a word of `kinds`, which maps words to what makes it.
+    Command lines and files name it by a word in `kinds`, which maps each word to what makes it.
     """
     classes = kind if isinstance(kind, tuple) else (kind,)
     allowed = " | ".join(kinds or (one.__name__ for one in classes))
@@ -174,7 +174,7 @@ def part(
 def checked(
     meaning: str, check: Check, allowed: str, unit: str = "", **common: Unpack[Common]
 ) -> Any:
-    """A field with a check of its own; `allowed` says in words which values pass it."""
+    """A field with a check of its own; `allowed` says in words which values pass."""
     return _field(meaning, check, allowed, unit, **common)
 
 
@@ -203,7 +203,7 @@ def _field(
 
 
 def _unchanged(test: Callable[[str, Any], object]) -> Check:
-    """A check that gives the value back as it came, such as an int where a float is allowed."""
+    """A check that returns the value as it is, such as an int where a float is allowed."""
 
     def check(title: str, value: Any) -> Any:
         test(title, value)
@@ -227,7 +227,7 @@ def declared(*, kw_only: bool) -> Callable[[type[_T]], type[_T]]: ...
 def declared(
     cls: type[_T] | None = None, /, *, kw_only: bool = False
 ) -> type[_T] | Callable[[type[_T]], type[_T]]:
-    """Make a frozen dataclass that checks its declared fields when it is made."""
+    """Make a frozen dataclass that checks its declared fields on construction."""
 
     def make(kind: type[_T]) -> type[_T]:
         between = kind.__dict__.get("__post_init__")
@@ -264,9 +264,9 @@ def parameters(kind: Any) -> tuple[Declared, ...]:
 
 
 def spelled(name: str, recipe: object) -> str:
-    """A recipe as command lines and files name it: `dim:gate=harmonious,order=lanes`.
+    """A recipe's name on command lines and in files: `dim:gate=harmonious,order=lanes`.
 
-    Only parameters that differ from their defaults are spelled. A value without a text of its own,
+    Only parameters that differ from their defaults are spelled. A value that has no text form,
     such as a matrix, becomes its class and a digest, so different recipes get different names.
     """
     arguments = _arguments(recipe)
@@ -292,7 +292,7 @@ def _arguments(recipe: Any) -> str:
 
 
 def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
-    """One value of a spelling; `kinds` are the words for nested recipes, as of `part`."""
+    """One value of a spelling; `kinds` are the words for nested recipes, as in `part`."""
     if value is None or isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -309,7 +309,7 @@ def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
         if type(value) is maker:
             arguments = _arguments(value)
             return f"{known}({arguments})" if arguments else known
-    # An object may have a `spelling` of its own, which a maker in `kinds` takes.
+    # An object may have a `spelling` of its own, which a maker in `kinds` accepts.
     own: str = getattr(value, "spelling", "")
     return own or f"{type(value).__name__}#{hashlib.sha256(repr(value).encode()).hexdigest()[:8]}"
 

@@ -1,1 +1,1 @@
-"""Conflict geometry: the junction on paper, its corridors, and where two vehicles come too near."""
+"""Conflict geometry: the junction on paper, its corridors, and where two vehicles get too close."""

@@ -1,4 +1,4 @@
-"""Where vehicles from different arms come too near each other.
+"""Where vehicles from different arms come too close to each other.
 
 A corridor is the area that a vehicle's body sweeps on its way through the junction. Two movements
 conflict when their corridors come closer than `CLEARANCE`.
@@ -23,14 +23,14 @@ from minisim.vehicle import VehicleType
 
 Shapes = npt.NDArray[np.object_]
 
-#: Room between two corridors that may be driven at once [m]: twice the static buffer of 0.25 m
-#: around each body in Dresner & Stone, JAIR 31 (2008), §3.
+#: Room between two corridors that may be used at the same time [m]: twice the static buffer of
+#: 0.25 m around each body in Dresner & Stone, JAIR 31 (2008), §3.
 CLEARANCE = 0.5
 
 #: Spacing of the bodies that make up a corridor, and of those tested for zones [m].
 SWEEP_STEP = 0.5
 
-#: Spacing of the bodies tested for clearing distances [m]; half the clearance misses none.
+#: Spacing of the bodies tested for clearing distances [m]; at half the clearance, none is missed.
 CLEARING_STEP = CLEARANCE / 2.0
 
 #: Spacing of the bodies tested for areas [m].
@@ -38,10 +38,10 @@ AREA_STEP = 0.1
 
 
 class Areas(NamedTuple):
-    """Conflict areas of every two movements, shape (m, m) each [m], NaN where there is none.
+    """Conflict areas of each pair of movements, shape (m, m) each [m], NaN where there is none.
 
-    While its front bumper is at an `s` between enter[p, q] and leave[p, q], a body on path p
-    overlaps the part of corridor q inside the junction.
+    A body on path p overlaps the part of corridor q inside the junction while the `s` of its front
+    bumper is between enter[p, q] and leave[p, q].
     """
 
     enter: Floats
@@ -49,7 +49,7 @@ class Areas(NamedTuple):
 
 
 def corridor(path: Path, vehicle: VehicleType) -> shapely.Geometry:
-    """The area that a body sweeps from when its front enters to when its rear has left."""
+    """The area that a body sweeps from when its front enters until its rear has left."""
     first, last = path.entry, path.exit + vehicle.length
     count = math.ceil((last - first) / SWEEP_STEP) + 1
     corners = path.bodies(np.linspace(first, last, count), vehicle)
@@ -58,7 +58,7 @@ def corridor(path: Path, vehicle: VehicleType) -> shapely.Geometry:
 
 
 def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
-    """Bodies on a path with their fronts at these `s`, shape (fronts,)."""
+    """Bodies on a path with their fronts at the given `s`, shape (fronts,)."""
     return np.asarray(shapely.polygons(path.bodies(fronts, vehicle)))
 
 
@@ -70,9 +70,9 @@ def corridors(intersection: Intersection, vehicle: VehicleType) -> Shapes:
 
 @lru_cache(maxsize=256)
 def separation(intersection: Intersection, vehicle: VehicleType) -> Floats:
-    """Distance [m] between the corridors of every two movements, shape (m, m).
+    """Distance [m] between the corridors of each pair of movements, shape (m, m).
 
-    0 where they overlap, and between movements from one arm, which begin together.
+    0 where they overlap, and between movements from the same arm, which begin together.
     """
     swept = corridors(intersection, vehicle)
     i, j = np.triu_indices(len(swept), 1)
@@ -93,8 +93,8 @@ def conflicts(
 def entry_room(intersection: Intersection, vehicle: VehicleType) -> float:
     """Smallest distance [m] between a vehicle held at its entry and a corridor of another arm.
 
-    0 means that the vehicle does not fit the lanes: turning into an exit lane, it would touch
-    another vehicle that waits beside that lane.
+    0 means that the vehicle does not fit the lanes: when turning into an exit lane, it would touch
+    a vehicle waiting beside that lane.
     """
     entry, movements = intersection.approach_length, intersection.movements
     firsts = [intersection.paths[movements.rows[arm][1]] for arm in range(intersection.n)]
@@ -111,8 +111,8 @@ def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
     between `[p, q, 0]` and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
     left the junction. Two vehicles can touch only when both are in their zones.
 
-    A zone begins one tested body before the first near one and ends one after the last. Where no
-    tested body is near, but the corridors are near in between, it is the whole crossing.
+    A zone begins one tested body before the first one too close and ends one after the last. If no
+    tested body is too close, but the corridors are in between, the zone is the whole crossing.
     """
     ends = [path.crossing + vehicle.length for path in intersection.paths]
     past = [np.linspace(0.0, end, math.ceil(end / SWEEP_STEP) + 1) for end in ends]
@@ -130,9 +130,9 @@ def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
 def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
 
-    `[p, q]`: from there on the body of a vehicle of movement q keeps `CLEARANCE` from the corridor
-    of movement p. Minus infinity where the two do not conflict. Infinite where that takes until
-    the rear is out of the junction, as when both leave by one exit lane.
+    `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
+    of movement p. Minus infinity where the two do not conflict. Infinite where this is only so once
+    the rear has left the junction, as when both use the same exit lane.
     """
     ways = _prepared(shapely.buffer(corridors(intersection, vehicle), CLEARANCE))
     ends = [path.crossing + vehicle.length for path in intersection.paths]
@@ -149,7 +149,7 @@ def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floa
 
 @lru_cache(maxsize=256)
 def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
-    """Where on its path a vehicle is in the way of another movement inside the junction."""
+    """Where on its path a vehicle blocks another movement inside the junction."""
     paths = intersection.paths
     fronts = [np.arange(path.entry, path.exit + vehicle.length, AREA_STEP) for path in paths]
     swept = corridors(intersection, vehicle)
@@ -176,7 +176,7 @@ def _reaching(
     pairs: Bools,
     room: float = 0.0,
 ) -> Iterator[tuple[int, int, npt.NDArray[np.intp]]]:
-    """For each of `pairs` (p, q): indices of the fronts where bodies on path p are near area q."""
+    """For each of `pairs` (p, q): indices of the fronts where a body on path p is near area q."""
     for p in np.flatnonzero(pairs.any(axis=1)).tolist():
         shapes = bodies(intersection.paths[p], fronts[p], vehicle)
         for q in np.flatnonzero(pairs[p]).tolist():

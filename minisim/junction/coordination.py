@@ -1,9 +1,9 @@
-"""Where two vehicles on their paths come too near: the coordination space of two movements.
+"""Where two vehicles on their paths come too close: the coordination space of two movements.
 
 Two vehicles on given paths are one point in the plane of their positions. A region of that plane
 is forbidden (the coordination space of O'Donnell and Lozano-Pérez, ICRA 1989). An interval on each
-path would only be the box around that region. The region also shows which vehicle has passed the
-other.
+path would only give the box around that region. The region also shows which vehicle has passed
+the other.
 """
 
 from __future__ import annotations
@@ -24,32 +24,31 @@ from minisim.vehicle import VehicleType
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between two bodies of which one stands or crawls [m]: the buffer of 0.25 m around one of the
-#: two (see `CLEARANCE`).
+#: Room between two bodies, one of which stands or crawls [m]: the buffer of 0.25 m around one of
+#: them (see `CLEARANCE`).
 CLOSE = 0.25
 
-#: Least room, where two vehicles would otherwise stand for ever, and the step of its measurement
-#: [m].
+#: Least room where two vehicles would otherwise stand for ever, and the step at which it is
+#: measured [m].
 TIGHT = 0.1
 
 
 class Region(NamedTuple):
-    """The forbidden region of two movements, on a grid of `STEP` from the junction entry on.
+    """The forbidden region of two movements, on a grid of `STEP` from the junction entry onwards.
 
-    Rows are positions of the first vehicle's front past the entry; columns are those of the
-    second's. A position before the entry counts as the entry. One past the grid is out of the
-    region.
+    Rows are positions of the first vehicle's front past the entry; columns, of the second's. A
+    position before the entry counts as the entry. A position beyond the grid is outside the region.
     """
 
     close: Bools  #: whether bodies come closer than `CLOSE` within one step of the grid point
-    ever: Bools  #: and closer than `CLEARANCE` at this or a later position of the second
+    ever: Bools  #: likewise for `CLEARANCE`, at this or any later position of the second
 
     def room(self, first: float, second: float) -> float:
-        """How far the first may still go, wherever the second goes [m]; may be infinite."""
+        """How far the first may go on, wherever the second goes [m]; may be infinite."""
         return _free(self.ever, first, second)
 
     def way(self, first: float, second: float) -> float:
-        """How far the first may still go while the second stands where it is [m]."""
+        """How far the first may go on while the second stays where it is [m]."""
         return _free(self.close, first, second)
 
     def touches(self, first: Floats, second: Floats) -> bool:
@@ -59,7 +58,7 @@ class Region(NamedTuple):
         return bool(self.close[rows[inside], columns[inside]].any())
 
     def ends(self, second: float) -> float:
-        """From where on the first is out of the region, if the second is here or further on [m]."""
+        """Where the first leaves the region for good if the second is here or further on [m]."""
         column = max(int(second / STEP), 0)
         if column >= self.ever.shape[1]:
             return 0.0
@@ -71,7 +70,7 @@ class Region(NamedTuple):
 def region(
     intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> Region | None:
-    """The forbidden region of two movements, by index; None where bodies never come near."""
+    """The forbidden region of two movements, by index; None if the bodies never come close."""
     near, close = _grids(intersection, vehicle, min(first, second), max(first, second))
     if not near.any():
         return None
@@ -86,8 +85,8 @@ def passes(
 ) -> bool:  # fmt: skip
     """Whether a vehicle on one path can pass a vehicle that stands on another path.
 
-    All the way it needs a room of `CLOSE` by the grid or, measured, of more than `TIGHT`. Movements
-    are indices; `x` and `y` are how far past the entry the fronts are [m].
+    The moving one needs `CLOSE` of room all the way on the grid or, measured, more than `TIGHT`.
+    Movements are indices; `x` and `y` are how far past the entry the fronts are [m].
     """
     shared = region(intersection, vehicle, first, second)
     if shared is None or shared.way(x, y) == math.inf:
@@ -107,7 +106,7 @@ def _free(blocked: Bools, first: float, second: float) -> float:
 def _squeezes(
     intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
 ) -> bool:
-    """`passes`, measured; the grid is too coarse for the last decimetres."""
+    """`passes`, by measurement; the grid is too coarse for the last few decimetres."""
     one, other = intersection.paths[first], intersection.paths[second]
     stands = bodies(other, np.array([other.entry + y]), vehicle)
     past = np.arange(x, one.crossing + vehicle.length, TIGHT)
@@ -119,7 +118,7 @@ def _squeezes(
 def _grids(
     intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
-    """Whether the bodies come closer than `CLEARANCE`, and than `CLOSE`, near each grid point."""
+    """Whether, near each grid point, bodies come closer than `CLEARANCE`, and than `CLOSE`."""
     one, other = (_until_clear(intersection.paths[k], vehicle) for k in (first, second))
     distance = shapely.distance(one[:, None], other[None, :])
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)

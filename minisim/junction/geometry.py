@@ -2,8 +2,8 @@
 
 x points east, y north, in metres. An approach lane ends at its entry, `junction_radius` from the
 centre. Between entry and exit every movement is one circular arc. No curve fitting is needed: the
-two lane centre lines mirror each other in the bisector of their arms, so entry and exit are equally
-far from where the lines meet, and one arc is tangent to both.
+two lane centre lines mirror each other across the bisector of their arms, so entry and exit are
+equally far from where the lines meet, and one arc is tangent to both.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from minisim.parameters import checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
-#: Kerb radius between neighbouring arms [m]; netconvert's default `radius` is 4 m too.
+#: Kerb radius between neighbouring arms [m]; netconvert's default `radius` is also 4 m.
 KERB_RADIUS = 4.0
 #: Smallest radius of a path that a car can follow [m]: passenger cars turn within 5–6 m (AASHTO
 #: Green Book, design vehicle P: centre-line radius 6.4 m); the authors' 5-arm network has 4.5 m.
@@ -33,7 +33,7 @@ MIN_PATH_RADIUS = 4.0
 
 @dataclass(frozen=True)
 class Arm:
-    """A road that meets the junction: its name and bearing [degrees clockwise from north]."""
+    """A road into the junction: its name and bearing [degrees clockwise from north]."""
 
     name: str
     bearing: float
@@ -67,16 +67,16 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
 
 
 def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
-    """Angles between neighbouring arms [deg], from the first arm on."""
+    """Angles between neighbouring arms [deg], starting from the first arm."""
     return (b - a for a, b in pairwise((*bearings, bearings[0] + 360.0)))
 
 
 @declared
 class Intersection:
-    """A junction of n ≥ 3 arms, one lane in and one lane out on each.
+    """A junction of n ≥ 3 arms, with one lane in and one lane out on each.
 
-    The arms are named a, b, c… in the order of their bearings. Without a `junction_radius` it is
-    the smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (lane_width +
+    The arms are named a, b, c… in the order of their bearings. `junction_radius` defaults to the
+    smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (lane_width +
     KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
     """
 
@@ -135,15 +135,15 @@ class Intersection:
 
     @property
     def approach_length(self) -> float:
-        """From the road entry to the junction entry [m], the same on every arm."""
+        """Distance from the road entry to the junction entry [m], the same on every arm."""
         return self.arm_length - self.junction_radius
 
     def index(self, movement: Movement | str) -> int:
-        """Position of a movement in `movements`; raises `InputError` where it does not exist."""
+        """Position of a movement in `movements`; raises `InputError` if it does not exist."""
         return self.movements.number(movement)
 
     def parse(self, text: str) -> Movement:
-        """Read a movement such as `a1`; raises `InputError`, which says what is allowed."""
+        """Read a movement such as `a1`; raises an `InputError` that says what is allowed."""
         return self.movements[self.index(text)]
 
     def exit_arm(self, movement: Movement) -> int:
@@ -156,11 +156,11 @@ class Intersection:
 
     @cached_property
     def paths(self) -> tuple[Path, ...]:
-        """One path a movement, in the order of `movements`."""
+        """One path per movement, in the order of `movements`."""
         return tuple(self._build_path(m) for m in self.movements)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
-        """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²]."""
+        """Speed [m/s] at which the arc requires the lateral acceleration `lateral` [m/s²]."""
         return math.sqrt(lateral * self.path(movement).radius)
 
     def _half_angle(self, movement: Movement) -> float:

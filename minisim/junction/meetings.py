@@ -1,8 +1,8 @@
 """Where two ways through a junction meet, as SUMO sees it.
 
 SUMO's vehicles follow not only the vehicle ahead, but also vehicles that are about to join their
-way inside the junction or have just left it. For every two movements, this is the distance from
-the place where their ways meet to the end of each way.
+way inside the junction or have just left it. This module gives, for each pair of movements, the
+distance from the place where their ways meet to the end of each way.
 Source: `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.28).
 """
 
@@ -23,7 +23,7 @@ from minisim.junction.turns import Turn, turns
 #: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
 DIVERGED = 2.5
 
-#: Ways that bend by less than this are straight [°].
+#: Ways that bend by less than this count as straight [°].
 BENT = math.degrees(1e-4)
 
 
@@ -31,15 +31,15 @@ class Meeting(IntEnum):
     """How two ways meet."""
 
     NOWHERE = 0
-    JOIN = 1  # they end in one exit lane
-    PART = 2  # they begin on one approach lane
+    JOIN = 1  # they end in the same exit lane
+    PART = 2  # they begin on the same approach lane
 
 
 def meetings(intersection: Intersection) -> Floats:
-    """How and where every two movements meet, shape (m, m, 2).
+    """How and where each pair of movements meets, shape (m, m, 2).
 
-    `[p, q]` holds the kind (`Meeting`) and the distance on way p from where it meets way q to the
-    junction exit [m].
+    `[p, q]` holds the kind (`Meeting`) and the distance along way p from where it meets way q to
+    the junction exit [m].
     """
     curves, paths = _curves(intersection), intersection.paths
     table = np.zeros((len(paths), len(paths), 2))
@@ -54,9 +54,9 @@ def meetings(intersection: Intersection) -> Floats:
 
 
 class _Curve(NamedTuple):
-    """A way or a part of it: its polyline and the length that a vehicle drives on it [m].
+    """A way or part of one: its polyline and the length that a vehicle drives on it [m].
 
-    The polyline's own length may differ a little: SUMO rounds lengths, and scales positions.
+    The polyline's own length may differ slightly: SUMO rounds lengths and scales positions.
     """
 
     points: Floats
@@ -64,12 +64,12 @@ class _Curve(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """Driven length over the polyline's."""
+        """Driven length divided by the polyline's."""
         return self.length / float(distances_along(self.points)[-1])
 
 
 def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
-    """Each way, and its part behind the waiting position, a point of the polyline.
+    """Each way, and the part of it past the waiting position, which is a point of the polyline.
 
     Only that part can meet a way that joins.
     """
@@ -85,13 +85,13 @@ def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
 
 
 def _parted(one: _Curve, two: _Curve) -> float:
-    """Distance along two curves with one beginning to where they part [m]."""
+    """Distance along two curves from their common start to where they part [m]."""
     ends = [float(distances_along(curve.points)[-1]) for curve in (one, two)]
     return min(max(_until_apart(one, two), _until_apart(two, one)), *ends)
 
 
 def _until_apart(curve: _Curve, other: _Curve) -> float:
-    """Distance along a curve to where it stays `DIVERGED` from the other [m]."""
+    """Distance along a curve beyond which it stays `DIVERGED` from the other [m]."""
     line = shapely.LineString(other.points)
     gaps = np.asarray(shapely.distance(shapely.points(curve.points), line))
     at = distances_along(curve.points)
@@ -105,7 +105,7 @@ def _until_apart(curve: _Curve, other: _Curve) -> float:
 def sagittas(intersection: Intersection, length: float) -> Floats:
     """Room that SUMO adds behind a leader on a curve to the far side, shape (m,) [m].
 
-    The height of the arc over a chord of the vehicle's length and 2 m; 0 for straight and near
+    The height of the arc over a chord as long as the vehicle plus 2 m; 0 for straight and near
     turns.
     """
     chord = length + 2.0

@@ -1,4 +1,4 @@
-"""Movements and their indices. Only this module works out an index from lane and manoeuvre."""
+"""Movements and their indices. Only this module computes an index from lane and manoeuvre."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Movements(tuple[Movement, ...]):
     exits: Ints  #: arm of exit, likewise
     apart: Bools  #: whether two movements come from different arms, shape (m, m)
     index_of: Ints  #: index by lane and manoeuvre, shape (n, n); −1 for manoeuvre 0
-    #: The same as nested tuples, which are quicker for one look-up at a time.
+    #: The same as nested tuples, which are faster for single look-ups.
     rows: tuple[tuple[int, ...], ...]
-    #: Bit by lane and manoeuvre; manoeuvre 0 is an unknown one, with the bits of all of its lane.
+    #: Bit by lane and manoeuvre; manoeuvre 0 means unknown and has the bits of all in its lane.
     bits: tuple[tuple[int, ...], ...]
     _numbers: dict[Movement | str, int]
 

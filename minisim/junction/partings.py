@@ -1,4 +1,4 @@
-"""Where movements of one lane part, and what a vehicle's place tells of its manoeuvre."""
+"""Where movements of one lane part, and what a vehicle's place reveals about its manoeuvre."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
-#: Extra lateral room before a vehicle that turns off no longer obstructs the lane [m].
+#: Extra lateral room needed before a vehicle turning off no longer obstructs the lane [m].
 BRANCH_ROOM = 0.5
 
 
@@ -22,7 +22,7 @@ def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """Where movements from one arm part, shape (m, m) [m].
 
     `[p, q]` is the smallest `s` on path p at which a rear bumper no longer obstructs path q.
-    It is infinite on the same path, and 0 between different arms.
+    It is infinite for the same path, and 0 between different arms.
     """
 
     def last_near(path: Path, other: Path) -> float:
@@ -35,10 +35,10 @@ def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
 
 @lru_cache(maxsize=64)
 def showing(intersection: Intersection, tolerance: float) -> Floats:
-    """From where on a vehicle visibly does not take another manoeuvre of its lane, (m, m) [m].
+    """Where a vehicle is first visibly not taking another manoeuvre of its lane, (m, m) [m].
 
-    `[p, q]`: from this far past the entry on, the middle of the front bumper of a vehicle on path p
-    is more than `tolerance` [m] beside path q. Infinite on the path itself, 0 between lanes.
+    `[p, q]`: from this far past the entry, the middle of the front bumper of a vehicle on path p
+    is more than `tolerance` [m] off path q. Infinite for the same path, 0 between lanes.
     """
 
     def first_beside(path: Path, other: Path) -> float:
@@ -52,8 +52,8 @@ def showing(intersection: Intersection, tolerance: float) -> Floats:
 def parting(intersection: Intersection, room: float) -> Floats:
     """How far past the entry two movements of a lane are first `room` apart, shape (m, m) [m].
 
-    The two vehicles compared have come equally far. Infinite for a movement and itself, and where
-    two are never so far apart; minus infinity for movements of different lanes.
+    The two vehicles compared have driven equally far. Infinite for a movement with itself, and for
+    two that never get that far apart; minus infinity for movements of different lanes.
     """
 
     def first_apart(path: Path, other: Path) -> float:
@@ -70,7 +70,7 @@ def parting(intersection: Intersection, room: float) -> Floats:
 def _by_lane(
     intersection: Intersection, different: float, measure: Callable[[Path, Path], float]
 ) -> Floats:
-    """`measure` of every two movements of a lane; `different` for other lanes."""
+    """`measure` of each pair of movements of a lane; `different` for pairs from different lanes."""
     paths, apart = intersection.paths, intersection.movements.apart
     result = np.full(apart.shape, different)
     for p, q in np.argwhere(~apart).tolist():

@@ -27,12 +27,12 @@ class Way(NamedTuple):
     """Another simulator's curve through the junction."""
 
     points: tuple[tuple[float, float], ...]  #: x, y of its polyline from entry to exit [m]
-    length: float  #: what a vehicle drives on it [m]; simulators round it
-    #: From the entry to the waiting position inside, which SUMO gives to some far turns [m], or 0.
+    length: float  #: how far a vehicle drives on it [m]; simulators round it
+    #: Distance from the entry to the waiting position that SUMO gives some far turns [m], or 0.
     wait: float = 0.0
 
     def resampled(self, count: int) -> Floats:
-        """`count` points at equal distances along it, shape (count, 2)."""
+        """`count` equally spaced points along it, shape (count, 2)."""
         points = np.asarray(self.points, dtype=float)
         at = distances_along(points)
         wanted = np.linspace(0.0, at[-1], count)
@@ -40,7 +40,7 @@ class Way(NamedTuple):
 
 
 def distances_along(points: Floats) -> Floats:
-    """Distance of each point from the start of a polyline, along it [m], shape (points,)."""
+    """Distance of each point along a polyline from its start [m], shape (points,)."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -50,7 +50,7 @@ class Path:
     """The path of one movement: approach lane, arc, exit lane."""
 
     movement: Movement
-    exit_arm: int  #: index of the arm that it leaves by
+    exit_arm: int  #: index of the arm by which it leaves
     entry: float  #: `s` of the junction's entry [m]
     exit: float  #: and of its exit [m]
     length: float  #: `s` at the end of the exit lane [m]
@@ -61,7 +61,7 @@ class Path:
 
     @property
     def crossing(self) -> float:
-        """From the junction's entry to its exit [m]."""
+        """Distance from the junction's entry to its exit [m]."""
         return self.exit - self.entry
 
     @property
@@ -71,7 +71,7 @@ class Path:
         return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
     def position(self, s: npt.ArrayLike) -> Floats:
-        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See also `locate`."""
+        """x, y [m] at `s`, shape (..., 2); goes straight on beyond both ends. See also `locate`."""
         s = np.asarray(s, dtype=float)
         step = self.crossing / ARC_SEGMENTS
         t = np.clip((s - self.entry) / step, 0.0, ARC_SEGMENTS)
@@ -85,7 +85,7 @@ class Path:
     def pose(self, s: npt.ArrayLike, length: float) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
-        The body is the chord between its bumpers, whose middles both lie on the path.
+        The body is the chord between its bumpers, both of whose middles lie on the path.
         """
         front = self.position(s)
         along = front - self.position(np.asarray(s, dtype=float) - length)
@@ -112,8 +112,8 @@ def locate(
 ) -> tuple[float, float]:
     """`Path.position` of one point, `past` the junction entry [m], in plain floats.
 
-    `headings` are the four numbers of `Path.heading_in` and `Path.heading_out`. It takes lists and
-    arrays alike: the kernel compiles it, and plain Python calls it millions of times.
+    `headings` are the four numbers of `Path.heading_in` and `Path.heading_out`. It takes both
+    lists and arrays: the kernel compiles it, and plain Python calls it millions of times.
     """
     last = len(points) - 1
     if past <= 0.0:

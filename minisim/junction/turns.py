@@ -8,10 +8,10 @@ from enum import IntEnum
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Path
 
-#: A smaller angle is no turn and needs no indicator [°].
+#: A smaller angle is not a turn and needs no indicator [°].
 STRAIGHT = 30.0
 
-#: Ways whose bearings differ by less are equally straight [°].
+#: Ways whose bearings differ by less than this are equally straight [°].
 SAME_ANGLE = 1e-6
 
 
@@ -24,7 +24,7 @@ class Turn(IntEnum):
 
 
 def indicator(path: Path, straight: float = STRAIGHT) -> int:
-    """The side that a path turns to: −1 left, 1 right, 0 for less than `straight` [°]."""
+    """The side to which a path turns: −1 left, 1 right, 0 for less than `straight` [°]."""
     turn = math.degrees(path.turn)
     return 0 if abs(turn) < straight else -1 if turn > 0.0 else 1
 
@@ -38,8 +38,8 @@ def turns(intersection: Intersection, straight: float = STRAIGHT) -> tuple[Turn,
 def lane_turns(intersection: Intersection, lane: int) -> tuple[Turn, ...]:
     """The kinds of a lane's manoeuvres 1, 2, …, by their order.
 
-    The straightest manoeuvre is straight on, whatever its angle, so that every lane has one that
-    needs no indicator.
+    The straightest manoeuvre counts as straight on, whatever its angle, so that every lane has one
+    that needs no indicator.
     """
     straight = straightest(intersection, lane)
     kinds = tuple(Turn)[:: 1 if intersection.side == "left" else -1]  # from left to right
@@ -47,7 +47,7 @@ def lane_turns(intersection: Intersection, lane: int) -> tuple[Turn, ...]:
 
 
 def straightest(intersection: Intersection, lane: int) -> int:
-    """The straightest manoeuvre of a lane; of two equal ones, as at 120°, the left one."""
+    """The straightest manoeuvre of a lane; if two are equal, as at 120°, the left one."""
     bearings, movements = intersection.bearings, intersection.movements
 
     def bend(manoeuvre: int) -> int:

@@ -1,1 +1,1 @@
-"""What a run leaves: trips, metrics, trajectories and how safe it was."""
+"""What a run produces: trips, metrics, trajectories and how safe it was."""

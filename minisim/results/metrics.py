@@ -1,10 +1,10 @@
-"""The table of metrics: what is measured of a run, in what unit, by which equation.
+"""The table of metrics: what is measured in a run, in which unit and by which equation.
 
-A metric has one value a trip or one number a run. Values of trips are averaged over the whole run
+A metric has one value per trip or one number per run. Trip values are averaged over the whole run
 and over each group of trips, in two forms. SUMO's form, which the paper used, is the mean over the
 trips that ended before the horizon. The complete form is the mean over all demanded trips: an
 unfinished trip counts with its waiting, loss and travel up to the horizon, and a vehicle that
-never got on the road counts with its departure delay.
+never got onto the road counts with its departure delay.
 
 To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
@@ -30,7 +30,7 @@ from minisim.results.trips import Floats, Trips
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Keys of summaries and columns of sweeps, which are no names for a metric.
+#: Keys of summaries and columns of sweeps, which no metric may have as its name.
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "error", "growing",
     "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre", "movements", "profile",
@@ -57,7 +57,7 @@ def _function(title: str, value: Any) -> Any:
 class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
-    The function takes the `Trips` where `needs` is "trips", else the `Run`. A number that needs
+    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`. A number that needs
     only trips is also measured for each lane, movement and kind.
     """
 
@@ -93,7 +93,7 @@ class Metric:
         return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
 
     def values(self, subject: Run | Trips, count: int) -> Floats:
-        """One value a trip, shape (count,), NaN where there is none; `InputError` for others."""
+        """One value per trip, shape (count,), NaN where there is none; otherwise `InputError`."""
         given = self._measured(subject)
         if METRICS.get(self.name) is self:
             return given  # type: ignore[no-any-return]  # ours are tested; each summary asks
@@ -106,7 +106,7 @@ class Metric:
         return np.asarray(values, dtype=float)
 
     def number(self, subject: Run | Trips) -> float | int | None:
-        """One number, or None where there is none; raises `InputError` for anything else."""
+        """One number, or None if there is none; raises `InputError` for anything else."""
         given = self._measured(subject)
         plain = given.item() if isinstance(given, np.generic) else given
         if plain is None or type(plain) is int:
@@ -133,9 +133,9 @@ def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 
 
     A vehicle is present from demand to arrival, so queues before the road count too. The numbers
     are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
-    needed. `scenarios.statistics.growing` tells which growth is more than chance. Arrays have shape
-    (k,), all times are in s; `leave` is infinite where not reached. `start` ends the warm-up; the
-    quarters divide the time after it.
+    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
+    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
+    the quarters divide the time after it.
     """
     length = (end - start) / 4.0
     if length <= 0.0:  # the run was stopped during its warm-up
@@ -165,10 +165,10 @@ def _safety(name: str) -> Callable[[Run], float | None]:
 _TRIPINFO = "(SUMO, Simulation/Output/TripInfo)"
 _SSM = "(SUMO, Simulation/Output/SSM Device)"
 
-#: Metric that counts short encroachments -> what they are shorter than [s].
+#: Metric that counts short encroachments -> the time that they are shorter than [s].
 PETS: Final = {"pets_below_1_s": 1.0, "pets_below_1_5_s": 1.5, "pets_below_2_s": 2.0}
 
-#: Every metric of ours, in the order of tables.
+#: All our own metrics, in the order in which tables list them.
 TABLE: Final = (
     Metric(
         "trips", lambda trips: len(trips.demand_time), needs="trips", title="trips", symbol="k",
@@ -255,10 +255,10 @@ TABLE: Final = (
 
 METRICS: Final = {metric.name: metric for metric in TABLE}
 
-#: What every summary has.
+#: The metrics in every summary.
 USUAL: Final = tuple(metric for metric in TABLE if metric.usual)
 
-#: Names of the usual metrics with a value a trip: columns of trip tables, and means.
+#: Names of the usual metrics with one value per trip: columns of trip tables, and means.
 MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
 
 #: Names of the metrics of `minisim.results.safety`.
@@ -272,7 +272,10 @@ SPREAD: Final = ("p50", "p95", "max")
 
 
 def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
-    """What a caller asks for, each once; `InputError` for no sequence, unknown or equal names."""
+    """The metrics asked for, once each.
+
+    Raises `InputError` for anything but a sequence, and for unknown or clashing names.
+    """
     asked: dict[str, Metric] = {}
     for metric in items("metrics", metrics, "names and Metrics"):
         if not isinstance(metric, Metric):
@@ -285,7 +288,7 @@ def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
 
 
 def named_metrics(metrics: Iterable[str | Metric]) -> tuple[str | Metric, ...]:
-    """`asked_metrics` with ours as names, which is how recipes of runs keep them."""
+    """`asked_metrics` with our own as names, which is how recipes for runs keep them."""
     return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
 
 

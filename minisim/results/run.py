@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 
 
 class ScenarioLike(Protocol):
-    """What a run needs of a scenario; `scenarios.Scenario` is one."""
+    """What a run needs from a scenario, such as `scenarios.Scenario`."""
 
     @property
     def name(self) -> str:
-        """Such as "four-way"."""
+        """Its name, such as "four-way"."""
 
     @property
     def profile_name(self) -> str:
-        """Such as "paper"."""
+        """The profile's name, such as "paper"."""
 
     @property
     def density(self) -> float:
-        """Mean inflow a lane [veh/h]."""
+        """Mean inflow per lane [veh/h]."""
 
     @property
     def horizon(self) -> float:
@@ -48,11 +48,11 @@ class ScenarioLike(Protocol):
 
     @property
     def warmup(self) -> float:
-        """Trips demanded before this time do not count in any mean or number of trips [s]."""
+        """Trips demanded before this time [s] do not count in any mean or number of trips."""
 
     @property
     def depart_speed(self) -> float | None:
-        """Speed at insertion [m/s]; None is the highest safe one."""
+        """Speed at insertion [m/s]; None means the highest safe speed."""
 
     def site(self, seed: int) -> Site:
         """What the controller may know."""
@@ -63,7 +63,7 @@ class ScenarioLike(Protocol):
 
 @cache
 def environment() -> Mapping[str, str]:
-    """The versions that runs of this process are made with, for their provenance."""
+    """The versions used for runs in this process, for their provenance."""
     python, numpy = platform.python_version(), np.__version__
     return {"minisim": __version__, "python": python, "numpy": numpy}
 
@@ -76,21 +76,21 @@ class Run:
     controller: Controller
     seed: int
     site: Site  #: what the controller knew
-    plan: Plan  #: what it asked for
+    plan: Plan  #: what the controller asked for
     collisions: tuple[Collision, ...]  #: each pair of vehicles once
     columns: Trips  #: all trips as arrays
     record: str | None  #: what was recorded of the trajectories: "junction", "all" or None
     trace: Records  #: the recording
-    rows: Records  #: vehicle id and path of each of its rows
-    counts: Mapping[str, float] = field(default_factory=dict)  #: of the controller's session
-    kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty where all are of one kind
-    #: What moved the vehicles, for the provenance: `host`, and perhaps its version.
+    rows: Records  #: vehicle id and path of each row to which the trace refers
+    counts: Mapping[str, float] = field(default_factory=dict)  #: counts of the controller's session
+    kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
+    #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
     environment: Mapping[str, str] = field(default_factory=environment)
 
     @cached_property
     def trips(self) -> pd.DataFrame:
-        """One row a trip in demand order, columns `minisim.results.summary.TRIP_COLUMNS`."""
+        """One row per trip in demand order, columns `minisim.results.summary.TRIP_COLUMNS`."""
         return trip_table(self.columns, self.kinds)
 
     @cached_property
@@ -116,7 +116,7 @@ class Run:
     def summary(
         self, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
     ) -> dict[str, Any]:
-        """What was run, and its numbers; see `minisim.results.summary.summarise`."""
+        """What was run, and the numbers; see `minisim.results.summary.summarise`."""
         return {
             "controller": self.controller.name,
             "scenario": self.scenario.name,
@@ -131,15 +131,15 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Versions and parameters: all that is needed to run it again."""
+        """Versions and parameters: everything needed to run it again."""
         what = {"scenario": repr(self.scenario), "controller": repr(self.controller)}
         return {**self.environment, **what, "seed": str(self.seed), **self.host}
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the run to one file; see `minisim.results.saved`.
 
-        Raises `MissingExtraError` without pyarrow, `InputError` for a site that is not made of our
-        classes, and `FileError` where the file cannot be written; then nothing is left behind.
+        Raises `MissingExtraError` without pyarrow, `InputError` for a site not made of our own
+        classes, and `FileError` if the file cannot be written; then nothing is left behind.
         """
         from minisim.results.saved import save
 
@@ -149,8 +149,8 @@ class Run:
     def load(cls, path: str | os.PathLike[str]) -> Run:
         """Read a run that `save` has written.
 
-        Raises `MissingExtraError` without pyarrow, and `FileError` for no such file, no saved run,
-        a damaged one, or one of another layout.
+        Raises `MissingExtraError` without pyarrow, and `FileError` if the file is missing, damaged,
+        not a saved run, or of another layout.
         """
         from minisim.results.saved import load
 
@@ -168,7 +168,7 @@ class Run:
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
-        """One row a vehicle and step, columns `TRAJECTORY_COLUMNS`; `InputError` for no record."""
+        """One row per vehicle and step (`TRAJECTORY_COLUMNS`); `InputError` if not recorded."""
         import pandas as pd
 
         if self.record is None:

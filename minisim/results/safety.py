@@ -1,16 +1,17 @@
 """Safety monitors on a recording: TTC, DRAC, PET and braking, as SUMO's SSM device defines them.
 
-Each is a function of a trajectory frame (`run.trajectories`; record="junction" is enough) and its
+Each is a function of a trajectory frame (`run.trajectories`; record="junction" is enough) and the
 site:
 
-* following — a vehicle and its leader. The leader is the one ahead in its lane, until its rear
-  has left their shared path, or the next one from another arm on the way to the same exit lane.
+* following — a vehicle and its leader. The leader is the vehicle ahead in the same lane, until
+  its rear has left their shared path, or the next one from another arm bound for the same exit
+  lane.
   TTC = gap/Δv (Hayward 1972) and DRAC = Δv²/(2·gap), both only while closing (Δv > 0).
-* encroachment — two vehicles through the same conflict area of two movements.
-  PET = time the second enters − time the first has left; 0 or less means both were inside.
+* encroachment — two vehicles passing through the same conflict area of two movements.
+  PET = time when the second enters − time when the first has left; at 0 or less, both were inside.
 * crossing — two vehicles with right of way on conflicting movements. If, at constant speed, the
   second would enter the conflict area before the first has left it, TTC = d/v of the second.
-  A vehicle without right of way is about to stop, so it is on no crossing course.
+  A vehicle without right of way is about to stop, so it is not on a crossing course.
 """
 
 from __future__ import annotations
@@ -41,12 +42,12 @@ from minisim.results.trajectories import (
 )  # fmt: skip
 from minisim.results.trips import Ints
 
-#: Longer than any path [m]: keeps the vehicles apart in one ascending array.
+#: Longer than any path [m]: keeps vehicles apart in one ascending array.
 _FAR = 1e6
 
 
 class Rows(NamedTuple):
-    """A trajectory frame as arrays, sorted by time, then vehicle; shape (rows,) each."""
+    """A trajectory frame as arrays, sorted by time, then by vehicle; shape (rows,) each."""
 
     time: Floats
     step: Ints
@@ -58,7 +59,7 @@ class Rows(NamedTuple):
 
 
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
-    """The closest calls of a recording; None where nothing of the kind happened.
+    """The closest calls in a recording; None where nothing of the kind happened.
 
     They are `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
     `max_braking_mps2`, the number of encroachments `pets`, and the numbers of short ones
@@ -92,7 +93,7 @@ def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
 
 
 def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
-    """Every follower and its leader at every step.
+    """Each follower and its leader at each step.
 
     Columns `time_s, follower, leader, gap_m, closing_mps, ttc_s, drac_mps2`. TTC is NaN while not
     closing, and 0 where bodies overlap. DRAC is NaN without a gap.
@@ -116,9 +117,9 @@ def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
 
 
 def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
-    """Every two vehicles that pass a conflict area of two movements one after the other.
+    """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
-    A vehicle that is inside when its recording ends counts as leaving then. A vehicle whose entry
+    A vehicle still inside when its recording ends counts as leaving then. A vehicle whose entry
     was not recorded does not count. Columns `time_s` (the second enters), `first, second, pet_s`,
     sorted by time.
     """
@@ -148,7 +149,7 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
 
 
 def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
-    """Every step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
+    """Each step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
     rows = _rows(frame, site)
     areas = conflict_areas(site.intersection, site.vehicle)
     clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
@@ -227,7 +228,7 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers in and past the junction and of their leaders to the exit lane; gaps [m].
 
     Leaders come from another arm; those from the same arm are leaders in the lane. There must be
-    a gap: of two bodies side by side, neither follows the other yet.
+    a gap: when two bodies are side by side, neither follows the other yet.
     """
     paths, movements = site.intersection.paths, site.intersection.movements
     origin, exit_arm = movements.origins[rows.movement], movements.exits[rows.movement]
@@ -247,7 +248,7 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
 
 
 def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
-    """Vehicles and their movements (k,), and when they enter and leave the areas (k, m) [s]."""
+    """Vehicles and their movements (k,), and when each enters and leaves the areas (k, m) [s]."""
     if not len(rows.time):
         empty = np.empty((0, len(areas.enter)))
         return np.empty(0, np.int64), np.empty(0, np.int64), empty, empty
@@ -269,7 +270,7 @@ def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
 
 
 def _times(rows: Rows, row: Ints, place: Floats) -> Floats:
-    """Time until the fronts pass `place` at their present speeds [s]; 0 where they have passed."""
+    """Time until the fronts pass `place` at their present speeds [s]; 0 once they have passed."""
     distance = place - rows.s[row]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(distance <= 0.0, 0.0, distance / rows.v[row])

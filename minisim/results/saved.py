@@ -1,11 +1,11 @@
 """A run on disk: one zip file of JSON and Parquet, without pickle.
 
 The file holds `run.json`, `trips.parquet`, `trace.parquet` and `rows.parquet`. It is written whole
-or not at all, and the checksums of zip show damage.
+or not at all, and zip's checksums reveal damage.
 
 Objects of our own classes (`PACKAGES`) are written as class and fields, and come back as they
 were. Other scenarios and controllers come back as stand-ins with their name and text. Reading a
-file imports modules of ours only.
+file imports only our own modules.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from minisim.files import replacing
 from minisim.results.run import Run
 from minisim.results.trips import TRIP_ARRAYS, Trips
 
-#: The file type, and the layout that this version writes.
+#: The type of file, and the layout that this version writes.
 MARK: Final = "minisim run"
 LAYOUT: Final = 1
 
 #: Packages whose classes are written as class and fields.
 PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 
-#: Fields of a run that are plain values.
+#: The fields of a run that hold plain values.
 _VALUES: Final = (
     "seed", "site", "plan", "collisions", "record", "counts", "host", "environment",
 )  # fmt: skip
@@ -64,7 +64,7 @@ class _StandIn:
 
 @dataclass(frozen=True, repr=False)
 class SavedController(_StandIn):
-    """Stands in for a controller that is not of our classes."""
+    """Stands in for a controller that is not of our own classes."""
 
     what = "controller"
     start = _StandIn.refuse
@@ -72,7 +72,7 @@ class SavedController(_StandIn):
 
 @dataclass(frozen=True, repr=False)
 class SavedScenario(_StandIn):
-    """Stands in for a scenario that is not of our classes."""
+    """Stands in for a scenario that is not of our own classes."""
 
     what = "scenario"
     profile_name: str
@@ -90,7 +90,7 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
     head = {
         "mark": MARK,
         "layout": LAYOUT,
-        "provenance": run.provenance,  # for people; not read again
+        "provenance": run.provenance,  # for human readers; not read back
         "scenario": _written_or(run.scenario, SavedScenario),
         "controller": _written_or(run.controller, SavedController),
         **{name: written(getattr(run, name)) for name in _VALUES},
@@ -130,7 +130,7 @@ def load(path: str | os.PathLike[str]) -> Run:
             return _run(head, file)
     except FileError:
         raise
-    except Exception as error:  # damage can show itself anywhere
+    except Exception as error:  # damage can show up anywhere
         raise FileError(f"{place} is damaged: {type(error).__name__}: {error}") from error
 
 
@@ -153,7 +153,7 @@ def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
 
 
 def written(value: object) -> Any:
-    """A value as JSON, which `made` reads; raises `InputError` for what is not of our classes."""
+    """A value as JSON that `made` can read; raises `InputError` for classes that are not ours."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
@@ -178,7 +178,7 @@ def written(value: object) -> Any:
 
 
 def made(data: Any) -> Any:
-    """The value that `written` wrote; raises `InputError` for anything else."""
+    """The value that `written` wrote; raises `InputError` for any other data."""
     match data:
         case None | bool() | str() | int() | float():
             return data
@@ -211,7 +211,7 @@ def _fields(kind: Any) -> tuple[str, ...]:
 
 
 def _is_ours(kind: type) -> bool:
-    """Whether it is a frozen dataclass or a named tuple of our packages."""
+    """Whether `kind` is a frozen dataclass or a named tuple from our packages."""
     if kind.__module__.partition(".")[0] not in PACKAGES or "<locals>" in kind.__qualname__:
         return False
     frozen = getattr(kind, "__dataclass_params__", None)
@@ -219,7 +219,7 @@ def _is_ours(kind: type) -> bool:
 
 
 def _class(name: str) -> Any:
-    """The class of ours that a file names; nothing else is looked at, nor imported."""
+    """The class of ours that a file names; nothing else is looked at or imported."""
     module, _, qualname = name.partition(":")
     ours = module.partition(".")[0] in PACKAGES and qualname.isidentifier()
     kind = getattr(importlib.import_module(module), qualname, None) if ours else None
@@ -229,7 +229,7 @@ def _class(name: str) -> Any:
 
 
 def _written_or(value: Any, stand_in: type[_StandIn]) -> Any:
-    """The value or, where it is not of our classes, a stand-in with what is known of it."""
+    """The value or, if it is not of our own classes, a stand-in with what is known about it."""
     try:
         return written(value)
     except InputError:

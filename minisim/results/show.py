@@ -11,7 +11,7 @@ from minisim.results.metrics import MEANS, METRICS
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Names are cut to this length, so that each stays on its line.
+#: Names are cut to this length so that each fits on its line.
 LONGEST = 60
 
 
@@ -25,7 +25,7 @@ def as_text(run: Run) -> str:
 
 
 def as_html(run: Run) -> str:
-    """What was run, and a table of means by lane; without colours, for light and dark notebooks."""
+    """What was run, and a table of means by lane; no colours, to suit light and dark notebooks."""
     summary = run.summary()
     headings = ("lane", "trips", "unfinished", *(METRICS[name].heading for name in MEANS))
     head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)

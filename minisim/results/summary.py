@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run
 
-#: Columns of the trip table, the same in CSV. Times are in seconds, NaN where not reached. Where
+#: Columns of the trip table, the same in CSV. Times are in seconds, NaN if not reached. If
 #: vehicles have kinds, `kind` follows `vehicle`.
 TRIP_COLUMNS: Final = (
     "vehicle", "demand_time_s", "depart_s", "arrival_s", "lane", "manoeuvre", "exit_lane", *MEANS,
 )  # fmt: skip
 
-#: What trips can be grouped by -> the key of the groups in a summary.
+#: What trips can be grouped by -> the groups' key in a summary.
 GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
 
 
 def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
-    """All trips as a DataFrame with `TRIP_COLUMNS`; values not reached are NaN."""
+    """All trips as a DataFrame with `TRIP_COLUMNS`; missing values are NaN."""
     import pandas as pd
 
     names = np.array(list(ARM_NAMES))
@@ -55,17 +55,18 @@ def summarise(
 ) -> dict[str, Any]:
     """The usual numbers of a run, and the metrics asked for.
 
-    The means at the top and in each group are SUMO's form; those under `complete` are the complete
-    form. Trips are grouped by lane (`lanes`) and, where vehicles have kinds, by kind (`kinds`).
+    The means at the top and in each group are in SUMO's form; those under `complete` are in the
+    complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds, by kind
+    (`kinds`).
 
     Args:
         run: what to measure. Trips demanded during its scenario's warm-up do not count.
-        metrics: names of `minisim.results.metrics.METRICS`, or `Metric`s. A mean that is asked for
+        metrics: names of `minisim.results.metrics.METRICS`, or `Metric`s. Each mean asked for
             also gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
-        by: more groups, "movement".
+        by: further groupings, such as "movement".
 
-    Raises `InputError` for an unknown metric or group, a metric that needs trajectories where none
-    were recorded, and a metric whose function returns the wrong type or shape.
+    Raises `InputError` for an unknown metric or group, a metric that needs trajectories when none
+    were recorded, or a metric whose function returns the wrong type or shape.
     """
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
@@ -87,13 +88,13 @@ def summarise(
 
 
 class _Measured:
-    """The metrics of a run, measured once and then summed up for any of its trips."""
+    """The metrics of a run, measured once and then summarised for any set of its trips."""
 
     def __init__(self, run: Run, table: tuple[Metric, ...], asked: tuple[Metric, ...]) -> None:
         self._trips = run.counted
         self._spread = {metric.name for metric in asked}
         self._values = [(m, _trip_values(run, m)) for m in table if m.per == "trip"]
-        # The two numbers that every group has are counted in `of`.
+        # The two numbers that every group has are computed in `of`.
         self._numbers = [m for m in table if m.per == "run" and m.needs == "trips" and not m.usual]
 
     def of(self, rows: Ints) -> dict[str, Any]:
@@ -123,7 +124,7 @@ def _trip_values(run: Run, metric: Metric) -> Floats:
 
 
 def _mean(values: list[float]) -> float | None:
-    """Mean without NaNs."""
+    """Mean, ignoring NaNs."""
     total = math.fsum(values)
     if total != total:
         return _mean([value for value in values if value == value])
@@ -131,7 +132,7 @@ def _mean(values: list[float]) -> float | None:
 
 
 def _spread(name: str, values: list[float]) -> dict[str, float | None]:
-    """Median, 95th percentile and maximum without NaNs, as columns."""
+    """Median, 95th percentile and maximum, ignoring NaNs, as columns."""
     there = [value for value in values if value == value]
     spread = np.percentile(there, (50, 95, 100)).tolist() if there else [None] * 3
     return {f"{name}_{what}": value for what, value in zip(SPREAD, spread, strict=True)}
