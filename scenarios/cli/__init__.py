@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input gives one line on stderr and code 2. A collision that stops a run, or a stdout that
-    cannot be written, gives 1. Ctrl-C gives 130 and SIGTERM 143. Expected failures show no traceback.
+    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback.
     """
     prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
