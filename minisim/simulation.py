@@ -39,7 +39,7 @@ from minisim.hosting import AFTERMATH, Alarm, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
 
-#: `Observed._make` without its check of the number of fields, which is that of `OBSERVED`.
+#: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
 
 
@@ -49,9 +49,9 @@ class Simulation:
     Args:
         scenario: what to simulate.
         controller: what decides; its session is private to this run.
-        seed: of the run's random streams.
+        seed: seed of the run's random streams.
         record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
-        record_window: from and to [s].
+        record_window: start and end of the recording [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
 
     Raises:
@@ -106,7 +106,7 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether the horizon is reached or every vehicle has arrived."""
+        """Whether the horizon has been reached or every vehicle has arrived."""
         return self._done or self.tick >= self._horizon_tick
 
     @property

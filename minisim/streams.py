@@ -1,7 +1,7 @@
-"""Named random streams: one `SeedSequence` a run, one child for each purpose.
+"""Named random streams: one `SeedSequence` per run, one child per purpose.
 
-Draws from one stream cannot shift another. So the arrivals of a seed are the same for every
-controller (common random numbers), no matter what the controller draws.
+Draws from one stream cannot shift another. So a seed gives the same arrivals for every controller
+(common random numbers), no matter what the controller draws.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ def stream(seed: int, name: str) -> np.random.Generator:
 
 
 class Draws:
-    """Random numbers by what they are for: the same in any order of asking.
+    """Random numbers by purpose: they are the same whatever the order of the draws.
 
     A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step. So an extra
     question never shifts the answers to others, as it would in a stream. The hash is BLAKE2b
     (RFC 7693); its key is drawn from the stream.
 
     Args:
-        seed: of the run.
-        name: of the stream.
+        seed: the run's seed.
+        name: the stream's name.
     """
 
     def __init__(self, seed: int, name: str) -> None:
         self._key = stream(seed, name).bytes(32)
 
     def uniform(self, *of: int) -> float:
-        """A number uniform on (0, 1), both ends excluded."""
+        """A number uniformly distributed on (0, 1), both ends excluded."""
         words = struct.pack(f"<{len(of)}q", *of)
         digest = hashlib.blake2b(words, digest_size=8, key=self._key).digest()
         return ((int.from_bytes(digest, "little") >> 12) + 0.5) * 2.0**-52
 
     def normal(self, *of: int) -> float:
-        """A number of the standard normal distribution (Box & Muller 1958)."""
+        """A number from the standard normal distribution (Box & Muller 1958)."""
         radius = math.sqrt(-2.0 * math.log(self.uniform(*of, 0)))
         return radius * math.cos(2.0 * math.pi * self.uniform(*of, 1))

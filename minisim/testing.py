@@ -39,11 +39,11 @@ from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
 
-#: Time that a controller may take for each vehicle after the demand has ended [s], and time for the
-#: roads. An all-way stop, the slowest sensible rule, needs about 2.5 s a vehicle.
+#: Time that a controller may take per vehicle after the demand has ended, and time to drive the
+#: roads [s]. An all-way stop, the slowest sensible rule, needs about 2.5 s per vehicle.
 SECONDS_PER_VEHICLE, SECONDS_PER_ROAD = 10.0, 600.0
 
-#: `simulate` of a host, and `decide` of a session.
+#: A host's `simulate`, and a session's `decide`.
 Simulate = Callable[..., Run]
 Decide = Callable[[View], Iterable[Command]]
 
@@ -51,7 +51,7 @@ HOSTS = ("minisim", "sumo")
 
 
 class ContractError(MinisimError, AssertionError):
-    """A controller broke its contract; a failed assertion for test runners."""
+    """A controller broke its contract; to test runners, a failed assertion."""
 
 
 @declared(kw_only=True)
@@ -95,7 +95,7 @@ class SmallScenario:
         return Intersection(self.bearings, side=self.side, arm_length=self.arm_length)
 
     def site(self, seed: int) -> Site:
-        """What a controller may know of it."""
+        """What a controller may know about it."""
         return Site(
             intersection=self.intersection,
             vehicle=self.vehicle,
@@ -111,7 +111,7 @@ class SmallScenario:
 
 
 def small_scenario(arms: int = 4, *, density: float = 350.0, **options: Any) -> SmallScenario:
-    """A regular junction of so many arms; `options` are the attributes of `SmallScenario`."""
+    """A regular junction with this many arms; `options` are the attributes of `SmallScenario`."""
     integer("arms", arms, low=3, high=len(ARM_NAMES))
     bearings = tuple(360.0 * i / arms for i in range(arms))
     return SmallScenario(bearings=bearings, density=density, **options)
@@ -120,7 +120,7 @@ def small_scenario(arms: int = 4, *, density: float = 350.0, **options: Any) -> 
 def drained(
     arms: int = 4, *, density: float = 350.0, demand_time: float = 300.0, **options: Any
 ) -> SmallScenario:
-    """A small scenario that leaves any working controller the time to serve every vehicle."""
+    """A small scenario that gives any working controller enough time to serve every vehicle."""
     number("demand_time [s]", demand_time, above=0, high=1e6)
     vehicles = arms * density * demand_time / 3600.0
     drain = SECONDS_PER_ROAD + SECONDS_PER_VEHICLE * vehicles
@@ -138,22 +138,22 @@ def check_controller(
 ) -> None:
     """Run a controller through its contract (`minisim.control`).
 
-    A controller is a recipe: it compares, hashes, prints and pickles as a value does, and runs
+    A controller is a recipe: it compares, hashes, prints and pickles like a value, and runs
     leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
-    same trips, also from a pickled copy and after any other runs. No vehicles collide, and
-    all are served after the demand has ended.
+    same trips, even from a pickled copy or after any other runs. No vehicles collide, and all
+    are served in the end, once the demand is over.
 
     Args:
         controller: to check.
         arms: junctions to check it on.
-        density: mean inflow a lane [veh/h].
+        density: mean inflow per lane [veh/h].
         horizon: how long the demand lasts [s].
         collision_free: whether collisions break the contract.
         host: what moves the vehicles: "minisim", "sumo" (extra `sumo`), or a function that is
-            called as `minisim.simulate` is.
+            called like `minisim.simulate`.
 
     Raises:
-        ContractError: what is broken, in one sentence.
+        ContractError: the contract is broken; the message says how in one sentence.
         MissingExtraError: the host is not installed.
     """
     instance("arms", arms, Iterable)
@@ -194,8 +194,8 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
     """Check a session's answer to a view.
 
     Raises:
-        ContractError: not a command, a vehicle that is not in the view, a lane that does not
-            exist, a speed or deceleration below 0, or a wake-up that is not in the future.
+        ContractError: an item is not a command, a vehicle is not in the view, a lane does not
+            exist, a speed or deceleration is below 0, or a wake-up is not in the future.
     """
     ids = {vehicle.id for vehicle in view.vehicles}
     for command in commands:
@@ -223,7 +223,7 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
 
 @dataclass(frozen=True)
 class _Wrapped:
-    """A controller with something around `decide` of its sessions."""
+    """A controller whose sessions' `decide` is wrapped in something."""
 
     controller: Controller
     name: str
@@ -268,7 +268,7 @@ def _watched(controller: Controller) -> _Wrapped:
 
 
 def _disturbed(controller: Controller, scenario: SmallScenario, run: Simulate) -> _Wrapped:
-    """The controller, with a run of another seed in the middle of each of its runs."""
+    """The controller, with another seed's run in the middle of each of its runs."""
 
     def wrap(session: Session, site: Site) -> Decide:  # noqa: ARG001
         due = [scenario.demand_time / 2.0]

@@ -1,4 +1,4 @@
-"""Vehicle types: size and car-following parameters; and the table of car-following models."""
+"""Vehicle types (size and car-following parameters) and the table of car-following models."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Model(NamedTuple):
     `minisim.engine.laws` says how a run applies them.
 
     Attributes:
-        braking: what it asks of the brakes in front of a standing obstacle [m/s²], given the
+        braking: how hard it makes a vehicle brake for a stationary obstacle [m/s²], given the
             vehicle's acceleration and comfortable deceleration.
-        stepwise: whether it speaks of the next speed, at which a vehicle drives the whole step
+        stepwise: whether it gives the next speed, at which a vehicle drives the whole step
             (`minisim.carfollowing.semi_implicit`); otherwise the step is ballistic.
-        margin: a vehicle is inserted this far past its own length, and has arrived this far
-            before the end of the road [m].
-        sumo: SUMO's model of the same law; empty where it has none.
+        margin: a vehicle is inserted this far past its own length, and counts as arrived this
+            far before the end of the road [m].
+        sumo: SUMO's model of the same law; empty if SUMO has none.
         stand_ins: SUMO's models of other laws that can drive such vehicles.
     """
 
@@ -35,15 +35,15 @@ class Model(NamedTuple):
 
 
 def _idm_braking(a: float, b: float) -> float:
-    """What the IDM asks of the brakes, and a quarter more [m/s²].
+    """How hard the IDM brakes, plus a quarter [m/s²].
 
-    It brakes at k²/b, where k = v²/2s is just enough. Its free-road term takes up to a away again:
+    It brakes at k²/b, where k = v²/2s is just enough. Its free-road term reduces that by up to a:
     k²/b − a = k at k = (b + √(b² + 4ab))/2.
     """
     return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
 
 
-#: Every car-following model by its name. The order gives the models their numbers in the kernel.
+#: Every car-following model by name. Their order gives their numbers in the kernel.
 MODELS: Mapping[str, Model] = {
     "idm": Model("the IDM", _idm_braking, sumo="IDM"),
     "iidm": Model("the improved IDM, which keeps the gap s0 + vT at any speed", _idm_braking),
@@ -51,8 +51,8 @@ MODELS: Mapping[str, Model] = {
     "krauss": Model(
         "SUMO's default law without its random part", lambda _, b: b, stepwise=True, sumo="Krauss"
     ),
-    # A cruise control brakes as hard as the vehicle can. The margin is SUMO's `POSITION_EPS`: it
-    # inserts a vehicle there by `departPos="base"`, the position of the published runs.
+    # A cruise control brakes as hard as the vehicle can. The margin is SUMO's `POSITION_EPS`,
+    # where it inserts a vehicle with `departPos="base"`, the position used in the published runs.
     "cc": Model(
         "cruise control, only for a `CruiseVehicle`",
         lambda *_: 0.0, stepwise=True, margin=0.1, sumo="CC", stand_ins=(),
@@ -66,7 +66,7 @@ class VehicleType:
 
     The defaults are SUMO's passenger car (`vType` defaults of vClass "passenger": length 5,
     width 1.8, minGap 2.5, accel 2.6, decel 4.5, tau 1.0, emergencyDecel 9), so that runs
-    compare with SUMO. The exponent is Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
+    can be compared with SUMO's. The exponent is from Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
 
     The headway has a lower bound because no law reacts faster than the longest step allows
     (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
@@ -117,11 +117,11 @@ class VehicleType:
 
     @property
     def needed_braking(self) -> float:
-        """What the model asks of the brakes in front of a standing obstacle [m/s²]."""
+        """How hard the model makes a vehicle brake for a stationary obstacle [m/s²]."""
         return MODELS[self.model].braking(self.acceleration, self.deceleration)
 
     def top_speed(self, limit: float) -> float:
-        """Bound on the speed of this type where the speed limit is `limit` [m/s]."""
+        """Upper bound on this type's speed where the speed limit is `limit` [m/s]."""
         return 2.0 * limit
 
 
@@ -131,8 +131,8 @@ class CruiseVehicle(VehicleType):
 
     It ignores speed limits: it drives at `cruise_speed` until a controller advises another
     speed. Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`.
-    The defaults are those of SUMO's model (`MSCFModel_CC`, from Plexe) where the authors' vehicle
-    type does not override them; headway and spacing of the base class are the ACC's.
+    The defaults come from SUMO's model (`MSCFModel_CC`, from Plexe) unless the authors' vehicle
+    type overrides them; the base class's headway and spacing are the ACC's.
     """
 
     cruise_speed: float = real(
@@ -169,5 +169,5 @@ class CruiseVehicle(VehicleType):
     )
 
     def top_speed(self, limit: float) -> float:
-        """The same, or the cruise speed where that is higher."""
+        """The same bound, or the cruise speed if that is higher."""
         return max(super().top_speed(limit), self.cruise_speed)

@@ -19,7 +19,7 @@ from minisim.results.summary import TRIP_COLUMNS
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Columns of `run.trajectories`, one row a vehicle and step, sorted by time, then vehicle.
+#: Columns of `run.trajectories`, one row per vehicle and step, sorted by time, then vehicle.
 TIME: Final = "time_s"
 VEHICLE: Final = "vehicle"
 LANE: Final = "lane"
@@ -44,10 +44,10 @@ _FCD_HEAD: Final = (
 
 
 def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write `run.trajectories` as CSV or Parquet, by the suffix of `path`.
+    """Write `run.trajectories` as CSV or Parquet, depending on the suffix of `path`.
 
-    Raises `InputError` for a missing column or another suffix, `MissingExtraError` for Parquet
-    without pyarrow, and `FileError` if it cannot be written; then nothing is left behind.
+    Raises `InputError` for a missing column or any other suffix, `MissingExtraError` for
+    Parquet without pyarrow, and `FileError` if the file cannot be written; no partial file remains.
     """
     check_columns(frame)
     write_table(frame, path)
@@ -56,7 +56,7 @@ def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> Non
 def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     """Write `run.trips` as CSV or Parquet, with empty cells for what an unfinished trip lacks.
 
-    Raises as `write_trajectories`.
+    Raises the same errors as `write_trajectories`.
     """
     check_columns(frame, TRIP_COLUMNS)
     write_table(frame, path)
@@ -65,12 +65,12 @@ def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
 def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> None:
     """Write `run.trajectories` as SUMO floating-car data (fcd-export), which SUMO's tools read.
 
-    As in SUMO, x and y are the middle of the front bumper [m], the angle is in degrees clockwise
+    As in SUMO, x and y are the centre of the front bumper [m], the angle is in degrees clockwise
     from north, and `pos` is the front bumper's distance from the start of its lane [m]. Lanes are
     named `a_in_0` (approach), `:C_a1_0` (inside the junction, by movement) and `b_out_0` (exit).
 
     Raises `InputError` for a missing column or a movement that the site does not have, and
-    `FileError` if it cannot be written; then nothing is left behind.
+    `FileError` if the file cannot be written; no partial file remains.
     """
     instance("site", site, Site)
     check_columns(frame)
@@ -82,7 +82,7 @@ def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> 
 
 
 def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
-    """Each row's movement by index, shape (rows,); raises `InputError` for what is not there."""
+    """Each row's movement by index, shape (rows,); raises `InputError` if the site lacks it."""
     n = site.intersection.n
     codes, names = frame[LANE].factorize()
     index = {name: k for k, name in enumerate(ARM_NAMES[:n])}
@@ -113,7 +113,7 @@ def check_columns(frame: pd.DataFrame, columns: Iterable[str] = TRAJECTORY_COLUM
 def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64]) -> Iterator[str]:
     """The lines of the timesteps; rows are sorted by time."""
     names, positions = _sumo_lanes(frame[S].to_numpy(dtype=float), movement, site)
-    # Rounded here as they are printed, so that 359.999 becomes 0.00, and −0.001 not −0.00.
+    # Rounded as for printing, so that 359.999 becomes 0.00 and −0.001 does not become −0.00.
     numbers = [frame[c].to_numpy(dtype=float).round(2) + 0.0 for c in (X, Y, ANGLE, SPEED)]
     numbers[2] %= 360.0
     columns = [column.tolist() for column in (*numbers, positions)]
@@ -134,7 +134,7 @@ def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64])
 
 
 def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple[list[str], Floats]:
-    """Each row's lane in SUMO's style and the position on it [m]."""
+    """Each row's lane, named as in SUMO, and the position on it [m]."""
     paths = site.intersection.paths
     names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
     starts = np.array([(0.0, p.entry, p.exit) for p in paths])

@@ -2,9 +2,9 @@
 
     from minisim.sumo import simulate
 
-    run = simulate(four_way(density=350), Dim(), seed=1)  # the same Run as minisim.simulate's
+    run = simulate(four_way(density=350), Dim(), seed=1)  # a Run, as minisim.simulate returns
 
-This package is the only one that knows SUMO.
+This package is the only one that knows about SUMO.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """SUMO's `CC`, the model of `minisim.vehicle.CruiseVehicle`: its vehicle type, and its steering.
 
-Such a vehicle obeys no limit and no marking. It is told the advised speed. It gets a command for a
-hold line only while the line asks for more braking than the model does.
+Such a vehicle obeys no speed limit or marking. It is told the advised speed. It gets a command for
+a hold line only while the line asks for more braking than the model does.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from minisim.sumo.messages import Job
 from minisim.sumo.steering import Car, Released, Speeds, near
 from minisim.vehicle import CruiseVehicle
 
-#: Spacing and radar, numbers in SUMO's code (`MSCFModel_CC`) [m].
+#: Spacing and radar range, fixed in SUMO's code (`MSCFModel_CC`) [m].
 FIXED = (2.0, 250.0)
 
-#: The published runs' speed mode: the model alone. With a safe gap (1) SUMO would limit the engine
-#: to what its controller asks for, and the lag would vanish.
+#: The published runs' speed mode: the model alone. If SUMO kept a safe gap (1), it would limit
+#: the engine to what its controller asks for, and the lag would vanish.
 CRUISING = 0
 
-#: SUMO's number of the controller that is a cruise control with ACC (`Plexe::ACC`).
+#: SUMO's number for the controller with both cruise control and ACC (`Plexe::ACC`).
 ACC = 1
 
 
 def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
-    """The attributes of its `vType` alone; raises `InputError` where SUMO's code fixes a value."""
+    """The attributes of CC's `vType` only; raises `InputError` if SUMO fixes another value."""
     if (vehicle.spacing, vehicle.radar) != FIXED:
         spacing, radar = FIXED
         raise InputError(
@@ -47,7 +47,7 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
 
 
 class Cruiser:
-    """Steers SUMO's `CC` as a cruise control with ACC, by its desired speed."""
+    """Steers SUMO's `CC` as a cruise control with ACC, through its desired speed."""
 
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
         law = job.law
@@ -58,7 +58,7 @@ class Cruiser:
         self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
 
     def load(self, cars: Iterable[Car]) -> None:
-        """Switch the controller on: SUMO inserts by the rule of the active one."""
+        """Switch the controller on: SUMO inserts vehicles by the active controller's rule."""
         for car in cars:
             self._vehicle.setSpeedMode(car.name, CRUISING)
             self._set(car, "ccaht", self._cruise.headway)
@@ -66,7 +66,7 @@ class Cruiser:
             self.advise(car)
 
     def depart(self, car: Car) -> None:
-        """Set the desired speed again: advice may have come before the vehicle."""
+        """Set the desired speed again: advice may have come before the vehicle did."""
         self.advise(car)
 
     def advise(self, car: Car) -> None:
@@ -93,11 +93,11 @@ class Cruiser:
                 ahead = car
 
     def release(self, car: Car) -> None:
-        """Leave it to the model."""
+        """Leave the car to the model."""
         self._speeds.hand_back(car)
 
     def _own(self, car: Car, ahead: Car | None) -> float:
-        """Acceleration of the model on the approach, where a command would replace it [m/s²]."""
+        """The model's acceleration on the approach if no command replaces it [m/s²]."""
         law, cruise = self._law, self._cruise
         v0 = self._desired(car)
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)

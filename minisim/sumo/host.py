@@ -34,10 +34,10 @@ from minisim.vehicle import VehicleType
 #: SUMO's car-following models that a run may use.
 MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
 
-#: What may happen at a collision.
+#: How a run may react to a collision.
 REACTIONS = (*ON_COLLISION, "teleport")
 
-#: What the child writes on stderr.
+#: File for what the child writes to stderr.
 STDERR = "stderr.txt"
 
 INSTALL = "pip install 'minisim[sumo]'"
@@ -45,7 +45,7 @@ INSTALL = "pip install 'minisim[sumo]'"
 #: What the child runs. The classes of its messages must belong to the module, not to `__main__`.
 CHILD = "from minisim.sumo.worker import main; main()"
 
-#: Called with the steps done and all steps.
+#: Called with the number of steps done and the total.
 Progress = Callable[[int, int], None]
 
 
@@ -65,29 +65,30 @@ def simulate(
 ) -> Run:
     """Run a scenario under a controller in SUMO, as `minisim.simulate` does in minisim.
 
-    Arrivals, vehicles, geometry, limits and commands are the same. SUMO follows leaders,
-    integrates, inserts, measures the trips and finds collisions, in a process of its own.
+    Arrivals, vehicles, geometry, limits and commands are the same. In a process of its
+    own, SUMO does the car following, integrates, inserts, measures trips and finds collisions.
 
     Args:
         scenario: what to simulate.
         controller: what decides; its session runs here, in the caller's process.
-        seed: of the arrivals and of SUMO.
+        seed: seed of the arrivals and of SUMO.
         model: SUMO's car-following model: "IDM", "Krauss" (without its random part), or "CC" for
-            a `CruiseVehicle`. By default SUMO's model of the vehicles' own law.
+            a `CruiseVehicle`. The default is SUMO's model of the vehicles' own law.
         record: None, "junction" or "all": keep trajectories. Their x and y are positions on
             minisim's paths, which SUMO's network repeats.
-        record_window: from and to [s].
+        record_window: start and end of the recording [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
             "teleport" is SUMO's default, as in the published runs: a vehicle that runs into the one
-            ahead or waits for 300 s is put on the next road, or has arrived where there is none.
-            Touching inside the junction does not count.
+            ahead or waits for 300 s is moved to the next road, or counts as arrived if there is
+            none. Touching inside the junction does not count.
         keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
-            and its trips; by default they are temporary. They also stay when the run fails, and
-            the exception has a note that names the folder.
-        fcd: file for the floating-car data of every step that SUMO itself writes, made when the
-            run has ended well.
-        gui: show it in sumo-gui.
-        progress: called at every wake-up, with the steps done and the steps up to the horizon.
+            and its trips; by default they are temporary. They are also kept if the run fails,
+            and the exception has a note that names the folder.
+        fcd: file for the floating-car data that SUMO itself writes for every step; created once the
+            run has succeeded.
+        gui: show the run in sumo-gui.
+        progress: called at every wake-up with the number of steps done and the total up to the
+            horizon.
 
     Raises:
         MissingExtraError: SUMO is not installed.
@@ -181,7 +182,7 @@ def _check_display() -> None:
 
 @contextmanager
 def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """The folder for SUMO's files: the one to keep, made if it is missing, or a temporary one."""
+    """The folder for SUMO's files: the one to keep, created if missing, or a temporary one."""
     if keep is None:
         with tempfile.TemporaryDirectory(prefix="minisim-sumo-") as name:
             yield Path(name)
@@ -244,7 +245,7 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
-    """The model of SUMO that drives the vehicles; raises `InputError` where none can."""
+    """The SUMO model that drives the vehicles; raises `InputError` if none can."""
     own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
     fitting = [model for model in MODELS if model == own or model in stand_ins]
     model = own if asked is None else asked
@@ -260,7 +261,7 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
 
 
 def _vehicle_for(asked: str) -> str:
-    """The vehicle that one of SUMO's models can drive."""
+    """Which vehicle SUMO's model `asked` can drive, as words for a message."""
     if asked == "CC":
         return "a CruiseVehicle: use --profile as_run"
     models = [name for name, it in CAR_FOLLOWING.items() if asked in (it.sumo, *it.stand_ins)]
@@ -288,7 +289,7 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
     """Run the job in a process of its own; returns SUMO's version and the result.
 
     Raises:
-        SumoError: the process refused or died. The caller stays as it was.
+        SumoError: the process refused or died. The caller is unaffected.
     """
     environment = sumo_environment(home) | {
         "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),

@@ -17,15 +17,15 @@ class Job(NamedTuple):
     """All that the process needs.
 
     Attributes:
-        command, folder: what starts SUMO, and where.
-        temporary: whether the process removes the folder when its caller has gone.
+        command, folder: the command that starts SUMO, and the folder to run it in.
+        temporary: whether the process removes the folder if its caller is gone.
         model: car-following model, one of `minisim.sumo.MODELS`.
-        plan: of the session.
-        road, law: of the run, with its limits, marks and lines.
-        motion: as `minisim.engine.kernel.build_motion` has it.
-        top_speed: no vehicle is faster [m/s].
-        network: lengths in SUMO.
-        vehicles: as `minisim.engine.state.build_vehicles` has them.
+        plan: the session's plan.
+        road, law: the run's road and law, with its limits, marks and lines.
+        motion: as returned by `minisim.engine.kernel.build_motion`.
+        top_speed: speed that no vehicle exceeds [m/s].
+        network: the lanes' lengths in SUMO.
+        vehicles: as returned by `minisim.engine.state.build_vehicles`.
         horizon: tick at which to stop.
         stop_on_collision: whether the first collision ends the run.
         teleport: whether SUMO takes vehicles off the road, as it does by default.
@@ -56,7 +56,7 @@ class Channel:
         self._source, self._target = source, target
 
     def receive(self) -> Any:
-        """The next object; `EOFError` when the other process has gone."""
+        """The next object; raises `EOFError` if the other process is gone."""
         return pickle.load(self._source)
 
     def send(self, message: object) -> None:
@@ -66,13 +66,13 @@ class Channel:
 
 
 class Started(NamedTuple):
-    """SUMO runs, in this version."""
+    """SUMO is running; this is its version."""
 
     version: str
 
 
 class Asked(NamedTuple):
-    """A wake-up: what the session is to be shown. The answer is a list of commands."""
+    """A wake-up, with what to show the session. The answer is a list of commands."""
 
     tick: int
     vehicles: tuple[Observed, ...]
@@ -82,10 +82,10 @@ class Ended(NamedTuple):
     """The run is over.
 
     Attributes:
-        tick: reached.
+        tick: last tick reached.
         done: whether all vehicles have arrived.
         collisions: each pair of vehicles once.
-        time_loss: of every vehicle [s], by id.
+        time_loss: time loss of every vehicle [s], by id.
         trace: what was recorded.
     """
 

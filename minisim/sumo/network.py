@@ -1,13 +1,13 @@
 """The junction as a SUMO network, built by netconvert, with our geometry to the millimetre.
 
-By itself netconvert cuts the roads and bends the turns by its own rules. We give it the shape of
-the junction and of every turn, so entries, exits and arcs lie where minisim has them. Lengths that
-still differ are read back (`Network`), so positions in SUMO are exact in `s`.
+Left to itself, netconvert cuts the roads and bends the turns by its own rules. We give it the shape
+of the junction and of every turn, so entries, exits and arcs lie where minisim has them. Lengths
+that still differ are read back (`Network`), so positions in SUMO are exact in `s`.
 
-If the ways are netconvert's own (`Intersection.ways`: those of the published runs), netconvert
-draws the junction, with its waiting positions and its right of way. The lengths must come out as
-the ways have them. Between equal roads, rounding decides which has priority and which vehicles wait
-inside. So coordinates begin at the lower left corner there, which is netconvert's default.
+If the ways are netconvert's own (`Intersection.ways`, as in the published runs), netconvert
+draws the junction, with its waiting positions and its right of way. The lengths must match the
+ways. Between equal roads, rounding decides which has priority and which vehicles wait inside. So
+the coordinates then start at the lower left corner, which is netconvert's default.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from minisim.results.trajectories import lane_names
 NODES, EDGES, CONNECTIONS = "minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"
 NETWORK = "minisim.net.xml"
 
-#: Decimals of what is written and read [m].
+#: Decimals of the lengths written and read [m].
 DIGITS = 6
 
 #: Rounding of netconvert's own lengths [m]: it writes two decimals.
@@ -38,11 +38,11 @@ ROUNDED = 0.0151
 
 @dataclass(frozen=True)
 class Network:
-    """The lengths that SUMO's lanes got, in the order of `Intersection.movements` [m].
+    """The lengths of SUMO's lanes, in the order of `Intersection.movements` [m].
 
     Attributes:
-        approach: of each movement's approach lane.
-        inside: of its way through the junction.
+        approach: length of each movement's approach lane.
+        inside: length of its way through the junction.
     """
 
     approach: tuple[float, ...]
@@ -54,12 +54,12 @@ def build_network(
 ) -> Network:
     """Write the network into `folder`.
 
-    With our arcs no vehicle has to give way: a hosted controller is the only rule (`pass`, and no
+    With our arcs no vehicle has to give way: the hosted controller alone decides (`pass`, and no
     place to wait inside the junction). Turns have the road's speed limit, since the host slows
-    vehicles for them.
+    vehicles down for them.
 
     Raises:
-        SumoError: netconvert refuses, in its own words, or draws other ways than the given ones.
+        SumoError: netconvert refuses (the message is its own) or draws ways other than those given.
     """
     ours = intersection.ways is None
     write_xml(folder / NODES, "nodes", _nodes(intersection))
@@ -79,13 +79,13 @@ def build_network(
 
 
 def _as_given(intersection: Intersection, network: Network) -> Network:
-    """The lengths of the intersection; netconvert's may differ only by rounding.
+    """The intersection's lengths; netconvert's may differ only by rounding.
 
     One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance.
-    Positions follow from what vehicles have driven since their insertion, so errors do not add up.
+    Positions follow from the distance driven since insertion, so errors do not add up.
 
     Raises:
-        SumoError: netconvert draws other lengths.
+        SumoError: netconvert's lengths differ by more than rounding.
     """
     paths = intersection.paths
     for path, approach, inside in zip(paths, network.approach, network.inside, strict=True):
@@ -105,7 +105,7 @@ def _as_given(intersection: Intersection, network: Network) -> Network:
 
 
 def run_tool(command: list[str], folder: Path, home: Path) -> None:
-    """Run one of SUMO's programs in `folder`; raises `SumoError` with what it says."""
+    """Run one of SUMO's programs in `folder`; raises `SumoError` with its error message."""
     name = Path(command[0]).name
     try:
         done = subprocess.run(
@@ -125,7 +125,7 @@ def sumo_environment(home: Path) -> dict[str, str]:
 
 
 def read_network(intersection: Intersection, file: Path) -> Network:
-    """Read the lengths of a network; raises `SumoError` where it is not that of `intersection`."""
+    """Read a network's lengths; raises `SumoError` if it lacks a way of `intersection`."""
     root = ET.parse(file).getroot()
     length = {lane.get("id"): float(lane.get("length", "nan")) for lane in root.iter("lane")}
     onward = {(c.get("from"), c.get("to")): c.get("via") for c in root.iter("connection")}

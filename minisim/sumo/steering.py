@@ -2,8 +2,8 @@
 
 `Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.engine.laws`) compute what a
 hold line, a marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`)
-where a lower limit holds, a commanded speed (`setSpeed`) while a vehicle has to brake for what is
-ahead. Behind a leader SUMO still drives slower than that.
+where a lower limit applies, or a commanded speed (`setSpeed`) while a vehicle has to brake for
+what is ahead. Behind a leader, SUMO may still drive the vehicle more slowly.
 
 `minisim.sumo.cruising` steers SUMO's `CC`.
 """
@@ -21,15 +21,15 @@ from minisim.engine.state import STOP_MARGIN, Law, Records
 from minisim.junction.movements import Movements
 from minisim.sumo.messages import Job
 
-#: SUMO keeps a safe gap (1) and the maximal acceleration (2). It knows no right of way (no 8), and
+#: SUMO keeps a safe gap (1) and the maximum acceleration (2). It heeds no right of way (no 8), and
 #: minisim limits the braking (no 4). (SUMO, TraCI/Change Vehicle State, speed mode.) Inside the
-#: junction a vehicle follows those that come from its lane or leave by its exit. It also yields to
-#: those that cross, although the controller alone decides which vehicle goes. So it ignores all
-#: vehicles in the junction (32) as long as one of them shares neither lane nor exit with it.
+#: junction, a vehicle follows those from its own lane and those that leave by its exit. It also
+#: yields to crossing vehicles, although the controller alone decides which vehicle goes. So it
+#: ignores all vehicles in the junction (32) while one of them shares neither lane nor exit with it.
 #: Meanwhile it follows the vehicle ahead into its exit by minisim's law.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
-#: SUMO knows no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
+#: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
 LEAST_SPEED = 0.01
 
 
@@ -37,11 +37,11 @@ class Car:
     """A vehicle; `minisim.engine.state.VEHICLE` explains the values.
 
     Attributes:
-        brake: how hard it has to brake at least [m/s²]; 0 without such a command.
+        brake: the least that it must brake [m/s²]; 0 without such a command.
         present: whether it is on the road.
         seen: tick of the last look at it.
-        lost_ticks: as there. Between two looks that are more than a step apart it is the time
-            beyond what the distance takes at the limit.
+        lost_ticks: as in `VEHICLE`. Between two looks more than a step apart, it grows by the
+            time beyond what the distance takes at the limit.
     """
 
     __slots__ = (
@@ -62,16 +62,16 @@ class Car:
         self.section = self.mark = self.seen = 0
         self.go = self.cleared = self.present = False
         self.advice = math.inf
-        self.desired = math.inf  # the last value that SUMO has got
+        self.desired = math.inf  # the last value given to SUMO
         self.commanded = self.ignoring = False
 
 
-#: Whether a vehicle has the right of way, by itself or by its lane.
+#: Whether a vehicle has the right of way, on its own or through its lane.
 Released = Callable[[Car], bool]
 
 
 class Steering(Protocol):
-    """What the worker asks of a car-following model of SUMO.
+    """What the worker needs in order to steer one of SUMO's car-following models.
 
     Attributes:
         near: `s` from which vehicles have to be steered in every step [m].
@@ -80,19 +80,19 @@ class Steering(Protocol):
     near: float
 
     def load(self, cars: Iterable[Car]) -> None:
-        """SUMO knows the vehicles; none is on the road yet."""
+        """Called when SUMO knows the vehicles, before any is on the road."""
 
     def depart(self, car: Car) -> None:
-        """A vehicle was inserted."""
+        """Called when a vehicle has been inserted."""
 
     def advise(self, car: Car) -> None:
-        """The advice for a vehicle on the road has changed."""
+        """Called when the advice for a vehicle on the road has changed."""
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
-        """Before a step; the vehicles of each lane, front to back, up to the exit."""
+        """Called before a step with each lane's vehicles, front to back, up to the exit."""
 
     def release(self, car: Car) -> None:
-        """The vehicle has left the junction: from here on SUMO alone drives it."""
+        """Called when the vehicle has left the junction: now SUMO alone drives it."""
 
 
 class Speeds:
@@ -102,12 +102,12 @@ class Speeds:
         self._vehicle = libsumo.vehicle
 
     def command(self, car: Car, speed: float) -> None:
-        """Drive it at this speed [m/s], whatever the model says."""
+        """Drive the car at this speed [m/s], whatever the model says."""
         self._vehicle.setSpeed(car.name, max(speed, 0.0))
         car.commanded = True
 
     def hand_back(self, car: Car) -> None:
-        """Leave it to the model again."""
+        """Leave the car to the model again."""
         if car.commanded:
             self._vehicle.setSpeed(car.name, -1.0)
             car.commanded = False
@@ -146,7 +146,7 @@ class Follower:
         ]
         inside = {car.path for car in self._inside}
         for lane in lanes:
-            foremost = True  # on the approach; it also follows vehicles of other lanes
+            foremost = True  # on the approach; it also follows vehicles from other lanes
             for car in lane:
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
@@ -160,13 +160,13 @@ class Follower:
                     car.ignoring = ignoring
 
     def release(self, car: Car) -> None:
-        """Leave it to SUMO, at the limit of the exit."""
+        """Leave the car to SUMO, at the exit's speed limit."""
         limit = self._limits[car.path][1][car.section]
         self._desire(car, min(limit * car.factor, car.advice))
         self._speeds.hand_back(car)
 
     def _merging(self, car: Car) -> float:
-        """How much the vehicle from another lane that takes the exit before it counts."""
+        """Closeness to the vehicle from another lane that takes the same exit before this car."""
         mine, law = self._exit[car.path][0], self._law
         ahead = None
         for other in self._inside:
@@ -187,7 +187,7 @@ class Follower:
         k = section + 1
         slower = laws.braking_begins(v, starts[k] - s, law)
         held = held and near(v, law.hold - s, law)
-        # SUMO would drop to a lower desired speed at once; the law brakes.
+        # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
         braked = car.brake > 0.0
         if not (slower or held or braked or v > v0 or v0 < LEAST_SPEED or z > 0.0):
@@ -208,7 +208,7 @@ class Follower:
             self._speeds.hand_back(car)
 
     def _free(self, v: float, v0: float) -> float:
-        """Acceleration of the model on an empty road."""
+        """The model's acceleration on an empty road."""
         law = self._law
         if self._model == "IDM":
             return laws.follow(v, v0, 0.0, law)

@@ -1,10 +1,10 @@
 """The process that runs libsumo. It moves the vehicles; the caller's process decides.
 
-libsumo holds one simulation a process, and a crash would take its caller down. So it runs in a
-process of its own, which knows no controller. That process advances until a wake-up, sends a view
+libsumo holds one simulation per process, and a crash would take its caller down. So it runs in a
+process of its own, which knows no controllers. That process advances until a wake-up, sends a view
 and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
 
-SUMO follows leaders, integrates and finds collisions. `minisim.sumo.steering` tells it what else
+SUMO does car following, integrates and finds collisions. `minisim.sumo.steering` tells it what else
 vehicles have to obey.
 """
 
@@ -38,19 +38,20 @@ from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
 
-#: Lines of a recording that are kept as Python objects.
+#: Lines of a recording that are held as Python objects before they become an array.
 TRACE_LINES = 100_000
 
-#: Longest time between two looks at a vehicle that no controller needs to know of [s].
+#: Longest time between two looks at a vehicle that no controller needs to know about [s].
 GLANCE = 1.0
 
 
 class Worker:
     """One run in SUMO: `minisim.simulation.Simulation` without the session.
 
-    A tick is the state that SUMO writes at that time. SUMO first moves all vehicles and then
-    inserts those that are due, so a vehicle's first state is that of its insertion. Vehicles that a
-    controller or a recording may need are watched in every step; the others are read now and then.
+    The state at a tick is the one that SUMO writes at that time. SUMO first moves all vehicles and
+    then inserts those that are due, so a vehicle's first state is the one at its insertion.
+    Vehicles that a controller or a recording may need are watched in every step; the others are
+    read now and then.
     """
 
     def __init__(self, job: Job, libsumo: Any, caller: Channel) -> None:
@@ -68,7 +69,7 @@ class Worker:
         ]
         cars = (Car(row, record, law) for row, record in enumerate(job.vehicles))
         self._cars = {car.name: car for car in cars}
-        # A metre earlier, so that the acceleration is known from the first step on.
+        # One metre earlier, so that the acceleration is already known when it is first needed.
         self._near = -1.0 + min(
             self._steering.near, law.entry - law.sight, self._marks[0], _record_start(job)
         )
@@ -116,7 +117,7 @@ class Worker:
         return self._job.stop_on_collision and bool(self._collisions)
 
     def _decide(self) -> None:
-        """Ask what the session commands; all answers are collected before any is carried out."""
+        """Ask for the session's commands; all are collected before any is carried out."""
         self._alarm.reset(self._tick)
         self._caller.send(Asked(self._tick, tuple(self._view())))
         for command in self._caller.receive():
@@ -154,7 +155,7 @@ class Worker:
         return car.go or self._open[car.lane]
 
     def _observe(self) -> bool:
-        """Read the new state; whether a front has passed a mark, or a rear left the junction."""
+        """Read the new state; returns whether a front passed a mark or a rear left the junction."""
         sumo = self._libsumo
         distance, speed = sumo.VAR_DISTANCE, sumo.VAR_SPEED
         if self._tick < self._job.horizon:
@@ -191,7 +192,7 @@ class Worker:
             self._lanes[car.lane].remove(car)
 
     def _turn_to(self, car: Car) -> None:
-        """Watch a vehicle from now on, or arrange for the next glance."""
+        """Watch a vehicle from now on, or arrange the next glance at it."""
         sumo, law = self._libsumo, self._job.law
         ahead = self._near - car.s
         if ahead <= 0.0 and not self._unneeded(car):
@@ -201,7 +202,7 @@ class Worker:
         self._glances[self._tick + max(1, int(seconds / law.dt))].append(car)
 
     def _unneeded(self, car: Car) -> bool:
-        """Whether it has passed everything that it may be needed for."""
+        """Whether the car has passed every place where it may be needed."""
         return car.cleared and self._job.law.record_from == NEVER
 
     def _glance(self, car: Car) -> None:
@@ -211,7 +212,7 @@ class Worker:
             car.v = self._libsumo.vehicle.getSpeed(car.name)
 
     def _travel(self, car: Car, s: float) -> None:
-        """Book the time lost since the last look, and move on to `s`."""
+        """Add the time lost since the last look, and move on to `s`."""
         limit = self._limits[car.path][1][car.section] * car.factor
         due = (s - car.s) / (limit * self._job.law.dt)
         car.lost_ticks += max(self._tick - car.seen - due, 0.0)
@@ -240,7 +241,7 @@ class Worker:
         return passed
 
     def _position(self, p: int, travelled: float) -> float:
-        """`s` on path p of a vehicle that has driven so far since its insertion [m]."""
+        """`s` on path p of a vehicle that has driven `travelled` since its insertion [m]."""
         law, network = self._job.law, self._job.network
         inside = travelled + law.length + law.margin - network.approach[p]
         if inside <= 0.0:
@@ -255,7 +256,7 @@ class Worker:
         return self._position(car.path, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
-        """Its rear has left the junction: from here on SUMO alone drives it."""
+        """Leave a car whose rear has left the junction to SUMO alone."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
         self._steering.release(car)
@@ -297,18 +298,18 @@ class Worker:
         return Collision(time, *zip(*sorted(both), strict=True))
 
     def _touched(self, car: Car, collision: Any) -> float:
-        """`s` of a vehicle in a collision [m]; one that was taken off the road was near its end."""
+        """`s` of a vehicle in a collision [m]; one that has been removed was near the end."""
         s = self._locate(car) if car.present else None
         return self._exit[car.path] + float(collision.pos) if s is None else s
 
 
 def _record_start(job: Job) -> float:
-    """`s` from which on vehicles are recorded [m]; infinite without a recording."""
+    """`s` from which vehicles are recorded [m]; infinite without a recording."""
     return job.law.record_start if job.law.record_from != NEVER else math.inf
 
 
 def main() -> None:
-    """Receive a job on stdin, run it, and talk on stdout; what SUMO prints goes to stderr."""
+    """Receive a job on stdin, run it, and answer on stdout; what SUMO prints goes to stderr."""
     with os.fdopen(os.dup(1), "wb") as target:
         os.dup2(2, 1)
         caller = Channel(sys.stdin.buffer, target)
@@ -325,5 +326,5 @@ def main() -> None:
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             caller.send(Failed(str(error)))
         except (EOFError, BrokenPipeError):
-            if job.temporary:  # the caller was killed, and cannot do it
+            if job.temporary:  # the caller was killed and cannot remove it
                 shutil.rmtree(job.folder, ignore_errors=True)

@@ -1,6 +1,6 @@
 """The `minisim` command. It may import every other package.
 
-Each module of this package adds the command of its name to the app. A command imports what it
+Each module of this package adds to the app the command it is named after. A command imports what it
 needs when it runs, so that `minisim --help` is quick.
 """
 
@@ -21,7 +21,7 @@ from scenarios.termination import Terminated, terminable
 
 __all__ = ["COMMANDS", "app", "main"]
 
-#: The help lists these first, and then the others by name.
+#: The help lists these first, then the others by name.
 _FIRST = ("demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "crossval")
 
 #: The names of the commands, in the order of the help.
@@ -40,8 +40,8 @@ _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
-    Bad input is one line on stderr and code 2. A collision that stops a run, or a stdout that
-    cannot be written, is 1. Ctrl-C is 130, and SIGTERM 143. No expected failure is a traceback.
+    Bad input gives one line on stderr and code 2. A collision that stops a run, or a stdout that
+    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback.
     """
     prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Terminated as end:
         return _fail("terminated", int(end.code or 0))
     except BrokenPipeError:
-        # The reader of our output has gone, as `head` does.
+        # The reader of our output has stopped early, as `head` does.
         drop_output()
         return 1
     except OSError as error:

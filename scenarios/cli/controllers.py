@@ -58,7 +58,7 @@ def _meaning(make: Callable[..., Any]) -> str:
 
 
 def _parameters(make: Callable[..., Any]) -> Iterator[dict[str, Any]]:
-    """What is declared of each parameter, or what the signature says."""
+    """What is declared about each parameter, or else what its signature says."""
     from minisim.parameters import parameters, spelled_value
 
     declared = {it.name: it.parameter for it in parameters(make)}

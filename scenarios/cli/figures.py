@@ -43,7 +43,7 @@ def figures(
     ] = False,
     as_list: Annotated[bool, option("List the names and stop.", None, "--list")] = False,
 ) -> None:
-    """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
+    """Draw the paper's figures and tables, and further ones (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
     from minisim.files import make_folder
     from scenarios.cli.shared.report import gallery_table

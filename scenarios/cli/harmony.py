@@ -29,7 +29,7 @@ def harmony(
     csv: Annotated[bool, typer.Option("--csv", help="Print the matrix as CSV.")] = False,
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
-    """Print which movements can be driven at once: the harmony matrix."""
+    """Print which movements can be driven together: the harmony matrix."""
     if csv and as_json:
         raise InputError("--csv and --json exclude each other; give one")
     what, matrix = junction(scenario, bearings, side, profile, clearance)

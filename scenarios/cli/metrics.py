@@ -8,7 +8,7 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import show_json, wrapped
 
-#: What is printed about a metric.
+#: What is printed about each metric.
 SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation", "usual")
 
 

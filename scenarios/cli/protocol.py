@@ -71,7 +71,7 @@ def protocol(
 ) -> None:  # fmt: skip
     """Visit every state of arrivals, decisions, commitments and clearings (3 and 4 arms).
 
-    Is it safe, can it get stuck, which lanes can wait for ever?
+    Is it safe? Can it get stuck? Which lanes can wait for ever?
     """
     from dim.proofs.modelcheck import explore, starvation
     from dim.proofs.protocol import Protocol
