@@ -106,7 +106,7 @@ def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.
 
 
 def average(rows: pd.DataFrame) -> pd.DataFrame:
-    """Means over seeds with the half-widths of their 95 % intervals.
+    """Means over seeds with the half widths of their 95 % intervals.
 
     Returns:
         One row per controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`

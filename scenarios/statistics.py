@@ -21,7 +21,7 @@ FILLING = 4.0
 
 
 class Interval(NamedTuple):
-    """The interval mean ± half_width for `size` values; the half-width is NaN for a single one."""
+    """The interval mean ± half_width for `size` values; the half width is NaN for a single one."""
 
     mean: float
     half_width: float

@@ -109,7 +109,7 @@ def analysis_text(analysis: Analysis) -> Text:
 
 
 def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]) -> Text:
-    """Whether it is safe and live, and which lanes can wait forever."""
+    """Whether it is safe and live, and which lanes can wait for ever."""
     rules = search.protocol
     text = Text.assemble(
         (name, "bold"),
