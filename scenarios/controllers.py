@@ -1,4 +1,4 @@
-"""The table of controllers, and how one is named.
+"""The table of controllers, and how to name one.
 
 A controller is named the same way on the command line, in files and in Python:
 
@@ -6,7 +6,7 @@ A controller is named the same way on the command line, in files and in Python:
     dim:gate=harmonious,monitor=on             parameters, see `minisim controllers dim`
     mymodule:MyController(k=3)                 a class of your own, from the working directory or
     path/to/file.py:MyController(k=3)          installed
-    {name = "dim", gate = "harmonious"}        a table, as TOML has it
+    {name = "dim", gate = "harmonious"}        a table, as in TOML
 
 An installed package may add names through entry points of the group `minisim.controllers`.
 """
@@ -39,7 +39,7 @@ from scenarios.spelling import Call, build, call_of, parse_arguments
 
 
 class Look(NamedTuple):
-    """How a series is drawn in every figure; two looks differ in grey print too."""
+    """How a series is drawn in every figure; any two looks also differ in greyscale."""
 
     label: str
     colour: str  # its name in `figures.style.COLOURS`
@@ -51,8 +51,8 @@ class Variant(NamedTuple):
     """A controller with some of its parameters, as studies compare it.
 
     Attributes:
-        arguments: those that differ from the defaults, as they are spelled.
-        look: in figures; None is grey.
+        arguments: those that differ from the defaults, as written in a spec.
+        look: its look in figures; None means grey.
         rival: whether it is compared with all others on equal terms.
     """
 
@@ -65,11 +65,11 @@ class Entry(NamedTuple):
     """A row of the table of controllers.
 
     Attributes:
-        name: without parameters.
-        make: its class, which declares the parameters; the first line of its docstring is the help.
+        name: the controller's name, without parameters.
+        make: its class, which declares the parameters; its docstring's first line is the help text.
         variants: those that have a look or are rivals.
-        safe: whether these never collide, with any number of arms.
-        as_run: what the name alone means under the profile `as_run`; empty means the same.
+        safe: whether these variants never collide, with any number of arms.
+        as_run: what the bare name means under the profile `as_run`; empty means the same as usual.
     """
 
     name: str
@@ -117,17 +117,17 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
     )
 })  # fmt: skip
 
-#: Every variant by its spelling.
+#: Every variant, by its spelling.
 VARIANTS: Mapping[str, Variant] = MappingProxyType({
     f"{name}:{variant.arguments}" if variant.arguments else name: variant
     for name, entry in CONTROLLERS.items()
     for variant in entry.variants
 })  # fmt: skip
 
-#: Spellings of those that are compared on equal terms, in the order of figures.
+#: Spellings of the variants compared on equal terms, in the order used in figures.
 RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 
-#: Spellings of those that never collide and serve any number of arms.
+#: Spellings of the variants that never collide and that serve any number of arms.
 SAFE = tuple(name for name in VARIANTS if CONTROLLERS[name.partition(":")[0]].safe)
 
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
@@ -136,15 +136,15 @@ _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 def controller_named(
     spec: str | Mapping[str, Any] | Controller, profile: str | Profile = "paper"
 ) -> Controller:
-    """The controller that a text or a table names; a controller passes through.
+    """The controller that a string or table names; a controller is returned as it is.
 
     Args:
         spec: see the module's docstring.
-        profile: under `as_run`, "dim" and "v2ic" alone mean what was run for the paper.
+        profile: under `as_run`, a bare "dim" or "v2ic" means what was run for the paper.
 
     Raises:
         InputError: an unknown name or parameter (with the nearest one), a value that is not
-            allowed, a class that cannot be loaded or made, or one that is no controller.
+            allowed, a class that cannot be loaded or made, or one that is not a controller.
     """
     as_run = profile_named(profile).name == AS_RUN.name
     if isinstance(spec, str):
@@ -162,7 +162,7 @@ def controller_named(
 
 
 def check_controller(what: str, value: Any) -> Controller:
-    """Return a controller, or raise `InputError` with what `value` lacks."""
+    """Return `value` if it is a controller; otherwise raise `InputError` saying what it lacks."""
     if isinstance(value, Controller) and not isinstance(value, type):
         return value
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
@@ -171,7 +171,7 @@ def check_controller(what: str, value: Any) -> Controller:
 
 
 def maker_of(name: str) -> Any:
-    """The class, or a plugin's function, of a name or of `module:Class`; raises `InputError`."""
+    """The class (or plugin's function) for a name or `module:Class`; raises `InputError`."""
     if name in CONTROLLERS:
         return CONTROLLERS[name].make
     if written := _CLASS.fullmatch(name):
@@ -188,7 +188,7 @@ def maker_of(name: str) -> Any:
 
 @cache
 def plugins() -> Mapping[str, EntryPoint]:
-    """The controllers that installed packages register, by name; our own names come first."""
+    """The controllers that installed packages register, by name; our own names take precedence."""
     points = entry_points(group="minisim.controllers")
     return {point.name: point for point in points if point.name not in CONTROLLERS}
 
@@ -199,7 +199,7 @@ def package_of(plugin: EntryPoint) -> str:
 
 
 def _read(text: str) -> Call:
-    """A controller's name with its arguments."""
+    """Split a controller's text into its name and arguments."""
     head, colon, rest = text.partition(":")
     written = _CLASS.fullmatch(text)
     if written is not None and (head not in CONTROLLERS or rest[:1].isupper()):

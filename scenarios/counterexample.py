@@ -17,8 +17,8 @@ from minisim.arrivals import Arrivals
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
-#: The largest delay of the last vehicle [s]. No vehicle takes as long from the start of the yellow
-#: zone through the junction.
+#: The largest delay of the last vehicle [s]. No vehicle takes that long from the start of the
+#: yellow zone through the junction.
 LATEST = 10.0
 
 #: Simulated time after the last demand [s]: twice 500 m at 10 m/s.
@@ -26,15 +26,15 @@ PATIENCE = 100.0
 
 
 def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> Arrivals | None:
-    """Arrivals in the order of one of `paths` that end in a collision; None where there are none.
+    """Arrivals in the order of one of `paths` that end in a collision; None if there are none.
 
     All vehicles want to enter the road at time 0, except the last one. It comes after the shortest
     delay that ends in a collision on any path.
 
     Args:
         scenario: junction and profile; its demand is not used.
-        dim: the rules of the paths.
-        paths: to unsafe states (`dim.proofs.modelcheck.explore`).
+        dim: the rules under which the paths were found.
+        paths: paths to unsafe states (`dim.proofs.modelcheck.explore`).
     """
     for step in range(round(LATEST / scenario.profile.dt)):
         for path in paths:

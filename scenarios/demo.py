@@ -109,7 +109,7 @@ def average(rows: pd.DataFrame) -> pd.DataFrame:
     """Means over seeds with the half widths of their 95 % intervals.
 
     Returns:
-        One row a controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`
+        One row per controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`
         (sums), and each of `METRICS` with its `…_ci95`.
     """
     runs = rows.groupby(["controller", "density"], sort=False)

@@ -1,8 +1,8 @@
 """A caller's own classes, named `module:Class`, from the working directory or installed.
 
-Python may not search the working directory, and a worker process does not. So the directory is on
-the search path while a module of it is imported, and objects of the module's classes are pickled
-together with their folder.
+Python may not search the working directory, and a worker process never does. So the directory is
+on the search path while one of its modules is imported, and objects of the module's classes are
+pickled together with their folder.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Any
 
 from minisim.errors import InputError, choice
 
-#: File -> its text when it was last imported.
+#: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}
 
 
 def load_class(module: str, name: str) -> type:
-    """A class by its own name and the name of its module or the path of its file.
+    """A class, given its own name and the name of its module or the path of its file.
 
     Raises:
         InputError: no such module or class, or one that cannot be imported; the message names the
-            file and line where there is one.
+            file and line if they are known.
     """
     file = _file_of(module)
     loaded = _imported(module) if file is None else _from_file(*file)
@@ -47,7 +47,7 @@ def load_class(module: str, name: str) -> type:
 
 
 def _file_of(module: str) -> tuple[Path, str] | None:
-    """The folder and the module's name there; None for an installed module."""
+    """The folder and the module's name within it; None for an installed module."""
     if module.endswith(".py"):
         path = Path(module)
         if not path.is_file():
@@ -69,7 +69,7 @@ def _imported(module: str) -> ModuleType:
 
 
 def _from_file(folder: Path, name: str) -> ModuleType:
-    """Import a module of a folder, again when its text has changed."""
+    """Import a module from a folder, and again if its text has changed."""
     file = _source(folder, name)
     try:
         text = file.read_bytes()
@@ -99,7 +99,7 @@ def _source(folder: Path, name: str) -> Path:
 
 
 def _check_own(module: ModuleType | None, file: Path) -> None:
-    """Raise `InputError` when a module was imported from another file."""
+    """Raise `InputError` if a module was imported from another file."""
     origin = getattr(module, "__file__", None) or ""
     if module is not None and Path(origin).resolve() != file.resolve():
         raise InputError(
@@ -109,7 +109,7 @@ def _check_own(module: ModuleType | None, file: Path) -> None:
 
 @contextmanager
 def _found_in(folder: Path) -> Iterator[None]:
-    """Search the folder first, and write no byte code: Python knows its age only to a second."""
+    """Search the folder first, and write no bytecode: Python checks its age only to a second."""
     before, written = list(sys.path), sys.dont_write_bytecode
     sys.path.insert(0, str(folder))
     sys.dont_write_bytecode = True
@@ -122,7 +122,7 @@ def _found_in(folder: Path) -> Iterator[None]:
 
 
 def _told(error: BaseException, folder: Path = Path("/")) -> str:
-    """What went wrong, after the last line of the folder's files that led there."""
+    """What went wrong, preceded by the last line in the folder's files that led to it."""
     if isinstance(error, SyntaxError):
         return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
     lines = [

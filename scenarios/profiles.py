@@ -28,8 +28,8 @@ class Profile:
 
 
 #: What the paper's text prescribes in §III: roads of 40 km/h, deceleration 2 m/s², cars of 4 m with
-#: 2 m of headway. The rest (acceleration, time headway, emergency braking, width) is that of SUMO's
-#: passenger car, since the paper simulates in SUMO.
+#: 2 m of headway. The rest (acceleration, time headway, emergency braking, width) is taken from
+#: SUMO's passenger car, since the paper simulates in SUMO.
 PAPER = Profile(
     name="paper",
     vehicle=VehicleType(length=4.0, min_gap=2.0, deceleration=2.0),
@@ -42,9 +42,9 @@ FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
 #: (length 4, minGap 2, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel` is misspelt,
-#: so SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed limits ignored, step 0.01 s.
-#: `deceleration` is the strongest braking that the cruise control itself asks for. Controllers and
-#: hold lines use it; the authors' DIM has no hold lines.
+#: so SUMO's default of 1.5 applies), headway 1.5 s, inserted at rest, speed limits ignored, step
+#: 0.01 s. `deceleration` is the strongest braking that the cruise control itself asks for.
+#: Controllers and hold lines use it; the authors' DIM has no hold lines.
 AS_RUN = Profile(
     name="as_run",
     vehicle=CruiseVehicle(
@@ -60,12 +60,13 @@ AS_RUN = Profile(
     dt=0.01,
 )
 
-#: How the published numbers of both signals arose at balanced inflow, and those of the adaptive
-#: signal also at 4:1:4:1. The vehicle follows SUMO's Krauss model without its random part, tau 1
+#: How the published numbers arose for both signals at balanced inflow, and for the adaptive signal
+#: also at 4:1:4:1. The vehicle follows SUMO's Krauss model without its random part, tau 1
 #: (`carFollowModel` is not given), accel 50, decel 1000, length 4, minGap 2. Speed factors are
 #: N(1, 0.1), SUMO's default (0.80 … 1.24 in the published trips). Vehicles are inserted at rest on
-#: roads of 14 m/s. The runs stepped 0.01 s. 0.1 s gives the same within 1 % of the waiting and
-#: 0.15 s of the travel time (fixed-time signal, 150 … 350 veh/h, common seeds).
+#: roads of 14 m/s. The runs had a step of 0.01 s; a step of 0.1 s gives the same waiting time
+#: within 1 % and the same travel time within 0.15 s (fixed-time signal, 150 … 350 veh/h, common
+#: seeds).
 AS_RUN_SIGNALS = Profile(
     name="as_run_signals",
     vehicle=VehicleType(
@@ -81,14 +82,14 @@ AS_RUN_SIGNALS = Profile(
     depart_speed=0.0,
 )
 
-#: The profiles of published runs, which use the junctions of the authors' networks.
+#: The profiles of the published runs; they use the junctions in the authors' networks.
 PUBLISHED_PROFILES = (AS_RUN, AS_RUN_SIGNALS)
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROFILES)}
 
 
 def profile_named(name: str | Profile) -> Profile:
-    """The profile of a name; a `Profile` passes through."""
+    """The profile with this name; a `Profile` is returned as it is."""
     if isinstance(name, Profile):
         return name
     return PROFILES[choice("profile", name, PROFILES)]

@@ -1,4 +1,4 @@
-"""Junctions and arrivals of the published runs, from `scenarios/data`; READMEs there say more."""
+"""Junctions and arrivals of the published runs, from `scenarios/data`; see the READMEs there."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
-#: when the runs at 4:1:4:1 were made (in `my_network.net.xml` of that time, b+ comes from the south
+#: when the runs at 4:1:4:1 were made (in `my_network.net.xml` as of then, b+ comes from the south
 #: and c+ from the east).
 RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
-#: Arm counts of the published junctions.
+#: Numbers of arms of the published junctions.
 PUBLISHED_ARMS = (3, 4, 5)
 
 
@@ -42,7 +42,7 @@ def _way(row: dict[str, str]) -> Way:
 
 
 def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
-    """The arrivals of a published run (`scenarios.paper.Cell`), by the arms of our junctions.
+    """The arrivals of a published run (`scenarios.paper.Cell`), mapped to our junctions' arms.
 
     Raises:
         InputError: no such run was published.

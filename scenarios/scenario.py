@@ -12,7 +12,7 @@ from scenarios.profiles import PAPER, Profile
 
 @declared(kw_only=True)
 class Scenario:
-    """A junction, its demand and a profile: all of a run except its controller and seed."""
+    """A junction, its demand and a profile: everything in a run except its controller and seed."""
 
     name: str = text('such as "four-way"', label="scenario name")
     intersection: Intersection = part("the geometry", Intersection)
@@ -45,12 +45,12 @@ class Scenario:
 
     @property
     def depart_speed(self) -> float | None:
-        """Speed at insertion [m/s]; None is the highest safe one."""
+        """Speed at insertion [m/s]; None means the highest safe one."""
         return self.profile.depart_speed
 
     @property
     def density(self) -> float:
-        """Mean inflow a lane [veh/h], as demanded or as recorded."""
+        """Mean inflow per lane [veh/h], as demanded or as recorded."""
         return self.demand.density if self.recorded is None else sum(self.rates) / len(self.rates)
 
     @property
@@ -61,7 +61,7 @@ class Scenario:
         return recorded.rates(n, self.horizon) if recorded is not None else self.demand.rates(n)
 
     def site(self, seed: int = 0) -> Site:
-        """What a controller may know of it."""
+        """What a controller may know about the scenario."""
         return Site(
             intersection=self.intersection,
             vehicle=self.profile.vehicle,
@@ -72,7 +72,7 @@ class Scenario:
         )
 
     def arrivals(self, seed: int) -> Arrivals:
-        """The arrival table of one seed, the same for every controller."""
+        """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
             return self.recorded
         return self.demand.draw(self.intersection.n, self.horizon, seed)

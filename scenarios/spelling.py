@@ -1,10 +1,10 @@
-"""Recipes read from text and tables, as `minisim.parameters.spelled` writes them.
+"""Reads recipes from text and tables, as `minisim.parameters.spelled` writes them.
 
     dim:gate=harmonious,priorities=(3,2,1,0),perception=noisy(intent_error=0.15,kind=symmetric)
 
 Values are numbers, words, quoted texts, lists in brackets, and nested recipes. `true`, `false` and
-`none` may be in any case; `on` and `off` switch a part on and off. A text is parsed as Python
-source and never evaluated. A table, as TOML has it, means the same: `{name = "dim", gate =
+`none` may be upper or lower case; `on` and `off` switch a part on and off. Text is parsed as Python
+source and never evaluated. A table, as in TOML, means the same: `{name = "dim", gate =
 "harmonious", perception = {name = "noisy", intent_error = 0.15}}`.
 """
 
@@ -25,13 +25,13 @@ _CONSTANTS = {"true": True, "false": False, "none": None}
 _ON_OFF = {"on": True, "off": False}
 _VARIABLE = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
 
-#: Annotations that are checked where a class declares no parameters.
+#: Annotations that are checked if a class declares no parameters.
 _SIMPLE = (float, int, str, bool)
 
 
 @dataclass(frozen=True)
 class Call:
-    """A recipe as written: a name, and arguments by position and by name."""
+    """A recipe as written: a name, with positional and named arguments."""
 
     name: str
     places: tuple[Any, ...] = ()
@@ -58,7 +58,7 @@ def parse_arguments(name: str, text: str) -> Call:
 
 
 def call_of(value: Mapping[str, Any]) -> Call:
-    """A table with a `name` as a recipe; raises `InputError`."""
+    """The recipe given by a table with a `name`; raises `InputError`."""
     named = {str(key): one for key, one in value.items()}
     name = named.pop("name", None)
     if not isinstance(name, str):
@@ -104,12 +104,12 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
         return make(*given.args, **given.kwargs)
     except MinisimError as error:
         raise InputError(f"{title}: {error}") from None
-    except Exception as error:  # a class of the caller's own may raise anything
+    except Exception as error:  # the caller's own class may raise anything
         raise InputError(f"{title} cannot be made: {type(error).__name__}: {error}") from error
 
 
 def _value(name: str, parameter: Parameter, value: Any) -> Any:
-    """What a written value means for a declared parameter, which checks it later."""
+    """What a written value means for a declared parameter; the parameter checks it later."""
     if isinstance(value, Mapping):
         only = {"name": next(iter(parameter.kinds))} if len(parameter.kinds) == 1 else {}
         value = call_of({**only, **value})
@@ -131,7 +131,7 @@ def _value(name: str, parameter: Parameter, value: Any) -> Any:
 
 
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:
-    """Annotations by parameter; none where one of them cannot be resolved."""
+    """Annotations by parameter; empty if one of them cannot be resolved."""
     try:
         return typing.get_type_hints(
             vars(make).get("__init__", make) if isinstance(make, type) else make
@@ -141,7 +141,7 @@ def _hints(make: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _check_simple(title: str, hint: Any, value: Any) -> None:
-    """Check a value where its annotation is float, int, str or bool, or one of them or None."""
+    """Check a value if its annotation is float, int, str or bool, or an optional one of these."""
     union = typing.get_origin(hint) in (typing.Union, types.UnionType)
     kinds = typing.get_args(hint) if union else (hint,)
     if any(kind not in (*_SIMPLE, types.NoneType) for kind in kinds):
@@ -149,7 +149,7 @@ def _check_simple(title: str, hint: Any, value: Any) -> None:
     if not any(
         isinstance(value, (float, int) if kind is float else kind)
         for kind in kinds
-        if (kind is bool) == isinstance(value, bool)  # True is no number here
+        if (kind is bool) == isinstance(value, bool)  # True is not a number here
     ):
         names = " or ".join("None" if kind is types.NoneType else kind.__name__ for kind in kinds)
         raise InputError(f"{title} must be a {names}, got {show(value)}")

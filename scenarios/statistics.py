@@ -11,17 +11,17 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, number, numbers
 
-#: A queue grows when it exceeds this many standard deviations of chance; a normal variable does so
-#: in 1 % of cases.
+#: A queue is growing if its increase exceeds this many standard deviations of chance; a normal
+#: variable does so in 1 % of cases.
 GROWTH_SCORE = 2.326
 
-#: The shortest horizon that can show growth, in travel times on a free road. The roads are then
-#: full at the start of the second quarter.
+#: The shortest horizon that can show growth, in travel times on a free road. At this length, the
+#: roads are full at the start of the second quarter.
 FILLING = 4.0
 
 
 class Interval(NamedTuple):
-    """The interval mean ± half_width of a number (`size`) of values; NaN wide for a single one."""
+    """The interval mean ± half_width for `size` values; the half width is NaN for a single one."""
 
     mean: float
     half_width: float
@@ -37,21 +37,21 @@ def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval
     """Mean and Student-t confidence interval of independent values, t·s/√n (Student 1908).
 
     Raises:
-        InputError: no value, one that is not finite, or a confidence outside (0, 1).
+        InputError: no values, a value that is not finite, or a confidence outside (0, 1).
     """
     mean, half_width, count = prediction_interval(values, confidence)
     return Interval(mean, half_width / math.sqrt(count + 1.0), count)
 
 
 def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
-    """Interval of one more independent value, t·s·√(1 + 1/n) about the mean of n values.
+    """Interval for one more independent value, t·s·√(1 + 1/n) about the mean of n values.
 
-    Compare a single published run with this interval, not with that of the mean. It holds the next
-    of normally distributed values with probability `confidence` (Hahn & Meeker 1991, Statistical
-    Intervals, §4.7).
+    Compare a single published run with this interval, not with the one for the mean. It contains
+    the next normally distributed value with probability `confidence` (Hahn & Meeker 1991,
+    Statistical Intervals, §4.7).
 
     Raises:
-        InputError: as `mean_interval`.
+        InputError: as for `mean_interval`.
     """
     from scipy.special import stdtrit  # takes a tenth of a second to import
 
@@ -69,14 +69,14 @@ def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> In
 
 
 def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Confidence interval of the mean of a Poisson variable from one value of it.
+    """Confidence interval for the mean of a Poisson variable, from a single value.
 
-    Exact: at the upper end, `count` or fewer events have probability (1−confidence)/2, at the lower
-    end `count` or more (Garwood 1936). After 0 events the upper end is −ln((1−confidence)/2), which
-    is 3.7 for 0.95.
+    Exact: at the upper end, `count` or fewer events have probability (1−confidence)/2; at the lower
+    end, `count` or more do (Garwood 1936). After 0 events the upper end is −ln((1−confidence)/2),
+    which is 3.7 for 0.95.
 
     Raises:
-        InputError: no count, or a confidence outside (0, 1).
+        InputError: `count` is not a count, or a confidence outside (0, 1).
     """
     from scipy.special import gammainccinv, gammaincinv
 
@@ -91,15 +91,16 @@ def growing(growth: float, trips: int) -> bool:
     """Whether queues kept growing; a mean delay then depends on the horizon.
 
     With Poisson arrivals at rate λ and service that just keeps up, the number of vehicles is a
-    random walk of variance λ a second. The means of two windows of length T/4 that begin T/2 apart
-    differ with variance λ(T/2 − T/12) = 5/12 λT: the integral of the walk's covariance min(s, t)
-    over both windows. λT is the expected number of trips. A queue with capacity to spare returns to
-    its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals, 0.2 % are called
-    growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Sums over runs show slower
-    growth: of cells of ten such hours, none is called growing at 0.95, 6 % at 1, 98 % at 1.1.
+    random walk of variance λ per second. The means of two windows of length T/4 that begin T/2
+    apart differ with variance λ(T/2 − T/12) = 5/12 λT: the integral of the walk's covariance
+    min(s, t) over both windows. λT is the expected number of trips. A queue with capacity to spare
+    returns to its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals,
+    0.2 % are classed as growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Sums over
+    runs reveal slower growth: of cells of ten such hours, none is classed as growing at 0.95, 6 %
+    at 1, 98 % at 1.1.
 
-    A horizon of less than four travel times (`FILLING`) shows nothing: the roads still fill in the
-    second quarter, so the last one has more vehicles in any case.
+    A horizon of less than four travel times (`FILLING`) shows nothing: the roads are still filling
+    in the second quarter, so the last one has more vehicles in any case.
     """
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 
@@ -108,10 +109,10 @@ def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
     """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
 
     The two-sample statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for
-    samples that do not overlap. scipy's own takes a second to import.
+    samples that do not overlap. scipy's own version takes a second to import.
 
     Raises:
-        InputError: a sample is empty or holds something that is not finite.
+        InputError: a sample is empty or contains a value that is not finite.
     """
     samples = [np.sort(np.asarray(numbers("sample", s))) for s in (first, second)]
     if not all(map(len, samples)):

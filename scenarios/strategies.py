@@ -9,7 +9,7 @@
     def test_nothing_collides(scenario, controller):
         simulate(scenario, controller)  # a collision raises
 
-The tests of minisim use them, and so may yours: `pip install 'minisim[testing]'`.
+minisim's own tests use them, and yours can too: `pip install 'minisim[testing]'`.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def scenarios(
     horizon: float = 120.0,
     arm_length: float = 150.0,
 ) -> Scenario:
-    """Short scenarios on random junctions; roads of `arm_length` keep a run quick."""
+    """Short scenarios on random junctions; roads of length `arm_length` keep a run quick."""
     angles = draw(bearings(min_arms, max_arms))
     intersection = Intersection(angles, side=draw(st.sampled_from(SIDES)), arm_length=arm_length)
     return Scenario(

@@ -60,7 +60,7 @@ def reproduce(
     names = [study_named(name).name for name in only or NAMES]
     workers = options.processes(jobs)
     if store is not None and store.exists():
-        Store(store, create=False).close()  # a wrong one is refused before a folder is made
+        Store(store, create=False).close()  # refuse a wrong one before making a folder
     folder = make_folder(out)
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
         made = []

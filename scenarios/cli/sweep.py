@@ -30,7 +30,7 @@ DEFAULTS = {
     "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
     "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
 }  # fmt: skip
-#: A junction of your own, as it is written in a file, and how brackets are escaped in the help.
+#: A junction of your own as written in a file, and how the help text escapes brackets.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
 PLAIN = str.maketrans({"[": r"\["})
 LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
@@ -91,7 +91,7 @@ def sweep(
         float | None, option("Simulated time; as the file says, or 3600.", "S")
     ] = None,
 ) -> None:
-    """Run many experiments over seeds; results are kept, and what is there is not run again."""
+    """Run many experiments over seeds; results are kept, and stored runs are not repeated."""
     from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
@@ -126,7 +126,7 @@ def sweep(
 
 
 def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
-    """Those of a study or of a file; a word without a suffix that is no file names a study."""
+    """The runs of a study or file; a word without a suffix that is not a file names a study."""
     from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = ("paper", *STUDIES)

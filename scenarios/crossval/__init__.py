@@ -1,7 +1,7 @@
-"""minisim, SUMO and the paper on common arrivals.
+"""minisim, SUMO and the paper, compared on common arrivals.
 
-Both hosts simulate a cell with the same arrivals and the same controller, so that a difference is
-one of physics. Where the cell replays a published run, the paper's numbers stand beside theirs.
+Both hosts simulate a cell with the same arrivals and the same controller, so any difference comes
+from physics. If the cell replays a published run, the paper's numbers are shown beside theirs.
 """
 
 from scenarios.crossval.cases import Case, replayed_cases

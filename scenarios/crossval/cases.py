@@ -29,21 +29,21 @@ from scenarios.scenario import Scenario
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
 PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
 
-#: Names of their junctions -> number of arms.
+#: Names of the published junctions -> number of arms.
 JUNCTIONS: Final = {"three-way": 3, "four-way": 4, "five-way": 5}
 
 #: How far a replay's mean travel time may be from the published one, by the controller's name in
-#: `reference.csv` [s]. Parts of the published set-up are not on record; this leaves room for them.
+#: `reference.csv` [s]. Parts of the published set-up are not on record; this allows for them.
 TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 
 #: The same for DIM at 350 veh/h [s]. There, two vehicles of the published runs were teleported, and
-#: the order of vehicles that came in the same second decides more.
+#: the order of vehicles that arrived in the same second matters more.
 TRAVEL_350: Final = 3.0
 
 
 @declared
 class Case:
-    """One cell; `InputError` for a controller that is unknown or cannot be made."""
+    """One cell; raises `InputError` if its controller is unknown or cannot be made."""
 
     scenario: Scenario = part("junction, demand and profile", Scenario)
     controller: str = text("its command-line name")
@@ -56,9 +56,9 @@ class Case:
         self.recipe()
 
     def recipe(self, seed: int = 0) -> Recipe:
-        """The run of one seed; a replay with the published vehicle has the published controller.
+        """The run of one seed; a replay with the published vehicle uses the published controller.
 
-        Vehicles of the published runs do touch; in other runs that is an error.
+        Vehicles do touch in the published runs; in other runs that is an error.
         """
         if self.published is not None and self.same_law:
             controller = controller_of(*self.published)
@@ -69,7 +69,7 @@ class Case:
 
     @property
     def split(self) -> str:
-        """Of the demand, such as "4:3:2:1"; a published run has that of its label."""
+        """The demand's split, such as "4:3:2:1"; for a published run, the one in its label."""
         if self.published is not None:
             return self.published.split
         shares = self.scenario.demand.split
@@ -77,22 +77,22 @@ class Case:
 
     @property
     def density(self) -> float:
-        """Mean inflow a lane that was demanded [veh/h]."""
+        """Mean demanded inflow per lane [veh/h]."""
         return self.scenario.demand.density
 
     @property
     def name(self) -> str:
-        """Such as "four-way balanced 350 dim"."""
+        """The cell's name, such as "four-way balanced 350 dim"."""
         return f"{self.scenario.name} {self.split} {self.density:g} {self.controller}"
 
     @property
     def same_law(self) -> bool:
-        """Whether SUMO moves the vehicles by the same law as minisim."""
+        """Whether SUMO moves the vehicles by the same law as minisim does."""
         return self.scenario.profile.name.startswith(AS_RUN.name)
 
     def reference(self, metric: str, lane: str) -> float | None:
-        """The paper's mean [s]; None where it has none that this cell should reproduce."""
-        if not self.same_law or self.scenario.horizon != 3600.0:  # that of the published runs
+        """The paper's mean [s]; None if the paper has none that this cell should reproduce."""
+        if not self.same_law or self.scenario.horizon != 3600.0:  # the published runs' horizon
             return None
         who = PUBLISHED.get(self.controller)
         if who is None or not float(self.density).is_integer():
@@ -106,7 +106,7 @@ class Case:
     def reference_tolerance(self, metric: str) -> Tolerance | None:
         """How far a replay may be from the published mean; None for any other cell.
 
-        Waiting 10 %; travel as in `TRAVEL` and `TRAVEL_350`.
+        Waiting times: 10 %; travel times: as in `TRAVEL` and `TRAVEL_350`.
         """
         if self.published is None:
             return None
@@ -125,11 +125,11 @@ def replayed_cases(
     profile: str | Profile | None,
     horizon: float,
 ) -> list[Case]:
-    """The published runs of these controllers, junctions, densities and splits; all where empty.
+    """The published runs with these junctions, controllers, densities and splits; empty means all.
 
-    Densities [veh/h] and splits are those of the runs' labels. The profile None is each run's own
-    vehicle, with the controller of the run; any other vehicle goes with the controller of that
-    profile. `InputError` for an unknown name, or if no published run is left.
+    Densities [veh/h] and splits are as in the runs' labels. With profile None, each run keeps its
+    own vehicle and controller; with any other vehicle, it has that profile's controller. Raises
+    `InputError` for an unknown name, or if no published run matches.
     """
     for split in splits:
         choice("split of a published run", split, SPLITS)

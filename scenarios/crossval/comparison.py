@@ -1,4 +1,4 @@
-"""Two hosts on the same arrivals: how far their trips agree, and where they part.
+"""Two hosts on the same arrivals: how closely their trips agree, and where they part ways.
 
 Differences are SUMO's value minus minisim's. A vehicle has the same index in both hosts, because
 they get the same arrival table.
@@ -23,28 +23,28 @@ from scenarios.statistics import Interval, ks_distance, mean_interval
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Two trips closer than this are the same [s]: a step of the profile `fair`.
+#: Trips whose times differ by at most this count as the same [s]: a step of the profile `fair`.
 CLOSE: Final = 0.1
 
-#: Two positions farther apart than this are not the same [m].
+#: Positions farther apart than this count as different [m].
 APART: Final = 0.5
 
-#: The metrics by which a trip is judged, and how a report calls them.
+#: The metrics by which a trip is judged, and what a report calls them.
 JUDGED: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
 
-#: Decimals of a time [s]: more would tell equal waiting times apart by their rounding errors.
+#: Decimals of a time [s]: with more, rounding errors would make equal waiting times differ.
 DECIMALS: Final = 6
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What a mean may differ by: a share of the value or an absolute amount, whichever is more."""
+    """How much a mean may differ: a share of the value or an absolute amount, whichever is more."""
 
     relative: float
     absolute: float = 0.0
 
     def holds(self, value: float, difference: float) -> bool:
-        """Whether a value that differs this much is within; false for NaN."""
+        """Whether a difference from `value` is within the tolerance; false for NaN."""
         return abs(difference) <= max(self.relative * abs(value), self.absolute)
 
     def __str__(self) -> str:
@@ -65,11 +65,11 @@ class Row(NamedTuple):
 
     lane: str  # "all" or a letter
     metric: str  # one of `minisim.results.metrics.MEANS`
-    trips: tuple[int, int]  # that ended, in minisim and in SUMO
+    trips: tuple[int, int]  # number that ended, in minisim and in SUMO
     minisim: Interval  # the mean over seeds of each run's mean
     sumo: Interval
-    difference: Interval  # of the two means of a seed, mean over seeds
-    ks: float  # distance of the distributions of all trips; NaN where a host has none
+    difference: Interval  # between the two means of a seed; mean over seeds
+    ks: float  # distance between the distributions of all trips; NaN if a host has none
     within: float  # share of the trips that differ by less than `CLOSE`
 
 
@@ -79,14 +79,14 @@ class Divergence(NamedTuple):
     seed: int
     vehicle: int  # index into the trips
     movement: str  # such as "a2"
-    depart: float  # in minisim; the time of its demand where it never got on the road
-    end: float  # when it had arrived in both; the end of the run where it did not
+    depart: float  # in minisim; the time of its demand if it never got on the road
+    end: float  # when it had arrived in both; the end of the run if it did not
     waiting: tuple[float, float]  # in minisim and in SUMO, up to the end of the run
     travel: tuple[float, float]
 
 
 class Parting(NamedTuple):
-    """The first moment at which a vehicle is at two places."""
+    """The first moment at which a vehicle is in different places in the two hosts."""
 
     time: float  # [s]
     vehicle: int  # index into the trips
@@ -98,7 +98,7 @@ class Parting(NamedTuple):
 
 
 def compare(pairs: Sequence[Pair], arms: int) -> tuple[Row, ...]:
-    """Every metric of all lanes and of each; nothing without a pair."""
+    """Every metric, for all lanes together and for each lane; empty if there are no pairs."""
     lanes: list[int | None] = [None, *range(arms)] if pairs else []
     return tuple(_row(pairs, lane, metric) for lane in lanes for metric in MEANS)
 
@@ -109,7 +109,7 @@ def agreement(pairs: Sequence[Pair]) -> float:
 
 
 def first_divergence(pair: Pair) -> Divergence | None:
-    """Where the trips of one seed begin to differ; None where none does."""
+    """Where the trips of one seed begin to differ; None if they never do."""
     apart = np.flatnonzero(~_close(pair, *JUDGED) & _ended(pair))
     if not len(apart):
         return None
@@ -127,10 +127,10 @@ def first_divergence(pair: Pair) -> Divergence | None:
 
 
 def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
-    """The first of the common moments at which a vehicle's positions are more than `APART` apart.
+    """The first common moment at which a vehicle's two positions are more than `APART` apart.
 
-    If several vehicles are at that moment, it is the one that is farthest apart. Both frames are
-    trajectories of the same run (`Run.trajectories`).
+    If this holds for several vehicles at that moment, the one with the largest gap is taken. Both
+    frames are trajectories of the same run (`Run.trajectories`).
     """
     both = minisim.merge(sumo, on=[TIME, VEHICLE], suffixes=("", "_sumo"))
     both["apart"] = (both[S] - both[f"{S}_sumo"]).abs()
@@ -150,7 +150,7 @@ def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
 
 
 def times(trips: Trips, metric: str, lane: int | None = None) -> Floats:
-    """A metric of the trips that ended [s], of one lane or of all."""
+    """A metric of the trips that ended [s], on one lane or on all."""
     chosen = trips.arrived if lane is None else trips.arrived & (trips.lane == lane)
     return np.asarray(METRICS[metric].of(trips)[chosen]).round(DECIMALS)
 
@@ -177,13 +177,13 @@ def _interval(values: Sequence[float]) -> Interval:
 
 
 def _close(pair: Pair, *metrics: str) -> Bools:
-    """Whether a trip is the same, shape (k,); an unfinished one counts with its time so far."""
+    """Whether each trip is the same, shape (k,); an unfinished one counts with its time so far."""
     differences = [np.abs(METRICS[m].of(pair.sumo) - METRICS[m].of(pair.minisim)) for m in metrics]
     return np.asarray(np.max(differences, axis=0) <= CLOSE + 10.0**-DECIMALS)
 
 
 def _ended(pair: Pair, lane: int | None = None) -> Bools:
-    """Whether a trip ended in one of the hosts, shape (k,)."""
+    """Whether each trip ended in at least one of the hosts, shape (k,)."""
     ended = pair.minisim.arrived | pair.sumo.arrived
     return np.asarray(ended if lane is None else ended & (pair.minisim.lane == lane))
 

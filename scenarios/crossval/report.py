@@ -1,4 +1,4 @@
-"""The comparison on disk: `crossval.csv`, one row a cell, lane and metric, and `crossval.md`."""
+"""The comparison on disk: `crossval.csv` (one row per cell, lane and metric), `crossval.md`."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def write_report(
 ) -> None:
     """Write both files, each whole or not at all; raises `FileError`.
 
-    `command` makes the report again; `figures`, in the folder already, are file name -> caption.
+    `command` reproduces the report; `figures`, already in the folder, are file name -> caption.
     """
     write_table(table(results), folder / CSV)
     write_text(folder / REPORT, markdown(results, command, figures))
 
 
 def table(results: Sequence[Result]) -> pd.DataFrame:
-    """One row a cell, lane and metric; a run that failed is a row with its error.
+    """One row per cell, lane and metric; a failed run has a row with its error.
 
     Columns: controller, scenario, arms, split, density [veh/h], profile, horizon_s, lane, metric;
     host and seed of a failed run; seeds; trips, mean, half width of its 95 % interval and
-    collisions of each host; `difference` (SUMO − minisim, paired by seed) with its `…_ci95`;
+    collisions for each host; `difference` (SUMO − minisim, paired by seed) with its `…_ci95`;
     `ks`; `within`, the share of the trips that differ by less than 0.1 s; `published`; `error`.
     Times in seconds.
     """
@@ -48,7 +48,7 @@ def table(results: Sequence[Result]) -> pd.DataFrame:
 
 
 def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]) -> str:
-    """The report: tolerances, tables, where the hosts part, failed runs, figures."""
+    """The report: tolerances, tables, where the hosts part ways, failed runs, figures."""
     versions = sorted({result.sumo for result in results if result.sumo})
     replays = [result for result in results if result.meets_paper("minisim") is not None]
     failures = [

@@ -1,4 +1,4 @@
-"""What the comparison of a cell gives, and whether that is within the stated tolerances."""
+"""The result of comparing a cell, and whether it is within the stated tolerances."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from scenarios.crossval.comparison import (
     first_divergence,
 )
 
-#: What the means of the two hosts may differ by where each has its own car following.
+#: How far the means of the two hosts may differ if each has its own car-following model.
 HOST_TOLERANCES: Final = {"travel_time_s": Tolerance(0.03), "waiting_time_s": Tolerance(0.10, 0.3)}
-#: Share of the trips that must be the same where both hosts have the same car following.
+#: Share of the trips that must be the same if both hosts use the same car-following model.
 HOST_SHARE: Final = 0.9
 
-#: With fewer trips than this a verdict says little: one trip that takes twice the mean moves a
-#: mean of 30 by 3 %, which is all that travel times may differ by.
+#: With fewer trips than this, a verdict says little: one trip that takes twice the mean shifts a
+#: mean of 30 by 3 %, which is the whole tolerance for travel times.
 FEW: Final = 30
 
 
@@ -38,37 +38,37 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a case gave."""
+    """The result of a case."""
 
     case: Case
     pairs: tuple[Pair, ...] = ()  # the seeds that both hosts finished
     collisions: tuple[int, int] = (0, 0)  # in minisim and in SUMO, over the runs that ended well
     failures: tuple[Failure, ...] = ()
-    sumo: str = ""  # its version; empty where it did not run
-    parting: Parting | None = None  # None where a second run saw none, or was not made
+    sumo: str = ""  # its version; empty if it did not run
+    parting: Parting | None = None  # None if a second run showed none or was not made
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """The statistics; empty without a pair."""
+        """The statistics; empty if there are no pairs."""
         return compare(self.pairs, self.case.scenario.intersection.n)
 
     @cached_property
     def agreement(self) -> float:
-        """Share of the trips that are the same; NaN without a pair."""
+        """Share of the trips that are the same; NaN if there are no pairs."""
         return agreement(self.pairs)
 
     @cached_property
     def divergence(self) -> Divergence | None:
-        """The first trip of the first pair that differs; None where none does."""
+        """The first trip of the first pair to differ between the hosts; None if none does."""
         return first_divergence(self.pairs[0]) if self.pairs else None
 
     def row(self, metric: str, lane: str = "all") -> Row:
-        """The statistics of a metric and lane."""
+        """The statistics for a metric and lane."""
         return next(row for row in self.rows if (row.metric, row.lane) == (metric, lane))
 
     @property
     def trips(self) -> tuple[int, int]:
-        """That ended in minisim and in SUMO, over the pairs."""
+        """Number of trips that ended in minisim and in SUMO, over all pairs."""
         return self.row("travel_time_s").trips if self.rows else (0, 0)
 
     @property
@@ -80,7 +80,7 @@ class Result:
     def hosts_agree(self) -> bool | None:
         """Whether the hosts agree within the stated tolerances.
 
-        None where there is nothing to judge by: no seed was finished by both hosts, or no trip
+        None if there is nothing to judge by: no seed was finished by both hosts, or no trip
         ended in either.
         """
         if not any(self.trips):
@@ -93,7 +93,7 @@ class Result:
         )
 
     def meets_paper(self, host: str) -> bool | None:
-        """Whether a host's means are within the tolerances of the published ones, if there are."""
+        """Whether a host's means are within tolerance of the published ones; None without any."""
         judged = [
             tolerance.holds(value, getattr(self.row(metric), host).mean - value)
             for metric in HOST_TOLERANCES

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run, ScenarioLike
 
-#: Host -> where its `simulate` is, imported when it is needed.
+#: Host -> the module of its `simulate`, imported when needed.
 HOSTS: Final = {"minisim": "minisim.simulation", "sumo": "minisim.sumo"}
 
-#: Recorded before the departure of the first trip that differs, and after its arrival [s].
+#: Time recorded before the departure of the first trip that differs and after its arrival [s].
 BEFORE, AFTER = 30.0, 5.0
 
 Progress = Callable[[int, int], None]
@@ -40,7 +40,7 @@ Answer = TypeVar("Answer")
 
 
 class _Outcome(NamedTuple):
-    """What a run gave; `sumo` is the version of SUMO, empty for the other host."""
+    """The result of a run; `sumo` is the version of SUMO, empty for minisim."""
 
     trips: Trips
     collisions: int
@@ -57,9 +57,9 @@ def crossvalidate(
     """Run every case with every seed in both hosts, and compare.
 
     A run that fails becomes a `Failure` of its case; one whose process dies is tried once more.
-    Replays have one run: their arrivals are not drawn. There are `jobs` processes; `progress` is
-    called with the number of runs done and of all. SUMO's runs, which take nearly all the time, are
-    kept and looked for in `folder`/sumo.
+    A replay is run once, since its arrivals are not drawn. There are `jobs` processes; `progress`
+    is called with the number of finished runs and the total. SUMO's runs, which take nearly all the
+    time, are stored in `folder`/sumo and reused from there.
     """
     runs = [
         (
@@ -76,7 +76,7 @@ def crossvalidate(
 def film(
     results: Sequence[Result], jobs: int = 1, progress: Progress | None = None
 ) -> list[Result]:
-    """Add where the hosts part, from a second, shorter run around the first trip that differs."""
+    """Add where the hosts part ways, from a shorter second run around the first differing trip."""
     tasks = [
         (result.case, host, result.divergence)
         for result in results
@@ -122,7 +122,7 @@ def _run(task: tuple[Case, str, int, Path | None]) -> _Outcome:
 
 
 def _read(file: Path) -> _Outcome | None:
-    """A run that was kept; None where it is not there, or not whole."""
+    """A stored run; None if it is missing or incomplete."""
     try:
         with np.load(file, allow_pickle=False) as data:
             columns = {name: data[name] for name in Trips._fields}
@@ -152,9 +152,9 @@ def _host(name: str) -> Host:
 def _gather(
     function: Callable[[Task], Answer], tasks: Sequence[Task], jobs: int, progress: Progress | None
 ) -> list[Answer | BaseException]:
-    """The function's answers in the order of the tasks; in place of one, what was raised."""
+    """The function's answers in the order of the tasks, or the exception that a task raised."""
     answers: dict[int, Answer | BaseException] = {}
-    # Processes even with one job: a thread could not be ended during an hour in SUMO.
+    # Processes even with one job: a thread could not be stopped during an hour in SUMO.
     with closing(pooled(function, dict(enumerate(tasks)), jobs, pool_of=processes)) as results:
         for k, answer in results:
             answers[k] = answer

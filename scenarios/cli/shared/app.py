@@ -1,4 +1,4 @@
-"""The app of the `minisim` command, to which each command is added."""
+"""The app of the `minisim` command, to which every command is added."""
 
 from __future__ import annotations
 

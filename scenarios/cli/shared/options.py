@@ -21,7 +21,7 @@ FILES = "Files"
 
 
 def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
-    """An option whose help says what there is to say of its default."""
+    """An option whose help text itself says all there is to say about its default."""
     return typer.Option(*flags, metavar=metavar, help=help, show_default=False, **more)
 
 
@@ -71,14 +71,14 @@ Arrivals = Annotated[
 
 
 def processes(jobs: int | None) -> int:
-    """The number of processes that --jobs asks for; one a core where it is not given."""
+    """The number of processes that --jobs asks for; one per core if it is not given."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
 def build_scenario(
     name: str, bearings: str | None, arrivals: Path | None = None, **options: Any
 ) -> Scenario:
-    """The scenario that the options describe; None is an option that was not given."""
+    """The scenario that the options describe; None stands for an option that was not given."""
     from minisim.arrivals import read_arrivals
     from scenarios.library import scenario_named
 
@@ -102,8 +102,8 @@ def build_scenario(
     return replace(made, recorded=recorded)
 
 
-#: So many arrivals use the last lane or the last manoeuvre. With equal shares on 4 arms, the chance
-#: that they use neither is (1/2)^30, one in 10^9.
+#: With this many arrivals, some use the last lane or the last manoeuvre. With equal shares on 4
+#: arms, the chance that none does is (1/2)^30, one in 10^9.
 ENOUGH = 30
 
 

@@ -1,4 +1,4 @@
-"""What the commands about DIM's rules share: the junction, the option --plot, and answers."""
+"""Shared by the commands about DIM's rules: the junction, the option --plot, and answers."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def junction(
 def answer(
     as_json: bool, facts: Mapping[str, Any], *texts: Text | Table, wrote: Path | None = None
 ) -> None:
-    """Print the facts as JSON, or else the texts and which file was written."""
+    """Print either the facts as JSON, or the texts and the name of the file written."""
     if as_json:
         show_json(facts)
         return
@@ -65,12 +65,12 @@ def answer(
 
 
 def names(things: Iterable[object]) -> list[str]:
-    """Movements or events as texts."""
+    """Movements or events as strings."""
     return list(map(str, things))
 
 
 def claims_table(name: str, analysis: Analysis) -> Table:
-    """Each claim: the number of cases in which it was tried, and in which it is false."""
+    """Each claim, with the number of cases in which it was tested and in which it is false."""
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"{name}, {analysis.n} arms: all {analysis.cases} cases, order {analysis.order}",
@@ -144,7 +144,7 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
 
 
 def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column a lane: ● harmony, · conflict."""
+    """The matrix with one column per lane: ● harmony, · conflict."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from figures.studies.shared.section import Item
     from scenarios.recipe import Recipe
 
-#: The closest calls that the command line shows of every run.
+#: The closest calls that the command line shows for every run.
 CLOSEST = ("min_ttc_s", "min_pet_s")
 
-#: Columns of the table of a run, and of that of a sweep, where no others are asked for.
+#: Columns of the tables of a run and of a sweep, unless others are asked for.
 RUN_COLUMNS = ("waiting_time_s", "travel_time_s", "depart_delay_s")
 CELL_COLUMNS = (
     "waiting_time_s", "complete_waiting_time_s", "travel_time_s", "complete_depart_delay_s",
@@ -32,9 +32,9 @@ CELL_COLUMNS = (
 def run_parts(
     summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
 ) -> Iterator[Text | Table]:
-    """What was run, its table, and what has one number a run.
+    """What was run, its table, and the metrics with one number per run.
 
-    The counts are those of `dim.senses.tally`: what wrong perception did.
+    The counts are from `dim.senses.tally`: the effects of wrong perception.
     """
     yield Text.assemble(
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
@@ -59,9 +59,9 @@ def run_parts(
 
 
 def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -> Table:
-    """Means by group and in total, of the metrics that were asked for or of the usual ones.
+    """Means by group and in total, for the requested metrics or else the usual ones.
 
-    Metrics that were asked for have their percentiles too.
+    Requested metrics also have their percentiles.
     """
     columns = _run_columns(metrics)
     table = Table(box=box.SIMPLE_HEAD)
@@ -114,7 +114,7 @@ def gallery_table(items: Iterable[Item]) -> Table:
 
 
 def sweep_table(cells: pd.DataFrame) -> Table:
-    """One line a cell: means over seeds with 95 % confidence intervals."""
+    """One line per cell: means over seeds with 95 % confidence intervals."""
     table = Table(box=box.SIMPLE_HEAD)
     for title in ("scenario", "profile", "split", "veh/h/lane", "controller"):
         table.add_column(title, no_wrap=True)
@@ -142,7 +142,7 @@ def sweep_table(cells: pd.DataFrame) -> Table:
 
 
 def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
-    """What to know of the table: growing queues, capped signals, the first failure."""
+    """What to know about the table: growing queues, capped signals, the first failure."""
     notes = []
     if "too_short" in cells and cells["too_short"].eq(True).any():
         notes.append(
@@ -168,7 +168,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
 
 
 def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
-    """A line for each signal whose demand is beyond Webster's formula."""
+    """A line for each signal whose demand exceeds what Webster's formula can handle."""
     from baselines import FixedTime
 
     return dict.fromkeys(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
-    """Run with a progress bar: in parts, which changes nothing in the result."""
+    """Run with a progress bar, in parts; this does not change the result."""
     from minisim.simulation import Simulation
 
     simulation = Simulation(scenario, controller, seed=seed, **options)
@@ -27,7 +27,7 @@ def simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> 
 
 
 def simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
-    """The same in SUMO."""
+    """Like `simulate`, but in SUMO."""
     from minisim.sumo import simulate as sumo_simulate
 
     try:
