@@ -1,4 +1,4 @@
-"""Ready-made scenarios: the paper's three junctions, regular ones, and ones with any bearings.
+"""Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
 
 All take the same keywords, `Options`.
 """
@@ -23,17 +23,16 @@ from scenarios.scenario import Scenario
 Side = Literal["left", "right"]
 
 #: Number of arms -> distance of the entries from the centre in the authors' networks [m]. Their
-#: approach lanes are 495.84, 492.8 and 491.6 m long. The first two distances follow from the
-#: default kerb radius, but netconvert rounds to centimetres, and a difference of only 3 mm changes
-#: when a vehicle enters a zone.
+#: approach lanes are 495.84, 492.8 and 491.6 m long. The first two follow from the default kerb
+#: radius, but netconvert rounds to centimetres, and 3 mm change when a vehicle enters a zone.
 PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
 class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
-    A profile may be given by name; shares of lanes (`split`) and of manoeuvres (`turns`) may be
-    given as numbers or as text such as "4:3:2:1".
+    A profile may be given by name, and shares of lanes (`split`) and of manoeuvres (`turns`) as
+    numbers or as a text such as "4:3:2:1".
     """
 
     name: str
@@ -58,7 +57,7 @@ _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
 
 def _shown(make: _Maker) -> _Maker:
-    """Give `make` a signature that shows `Options` and their defaults in help and completion."""
+    """Give `make` a signature in which help and completion see `Options` and their defaults."""
     defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
     own = inspect.signature(make).parameters.values()
     kept = [parameter for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
@@ -108,12 +107,12 @@ def from_bearings(
     The other functions of this module call this one.
 
     Raises:
-        InputError: an unknown keyword (the message suggests the nearest one), arms less than 30°
-            apart, an unknown profile, impossible demand, or a horizon ≤ 0.
+        InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
+            profile, impossible demand, horizon ≤ 0.
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
-        choice("scenario keyword", key, tuple(Options.__annotations__))
+        choice("keyword of a scenario", key, tuple(Options.__annotations__))
     given["profile"] = profile_named(given.get("profile", "paper"))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
@@ -127,11 +126,11 @@ def from_bearings(
 
 
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
-    """The scenario with a command-line name: three-way, four-way, five-way, N-way or custom.
+    """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
 
     Raises:
-        InputError: an unknown name (the message suggests the nearest one), `custom` without
-            bearings, or bearings without `custom`.
+        InputError: an unknown name (with the nearest one), or one of `custom` and bearings without
+            the other.
     """
     instance("scenario", name, str)
     if name == "custom":
@@ -166,7 +165,7 @@ def _regular(name: str, n: int, density: float, options: Mapping[str, Any]) -> S
 
 
 def _is_published(n: int, options: Mapping[str, Any]) -> bool:
-    """Whether the junction has the arms, side and dimensions of one of the paper's."""
+    """Whether the junction has the arms, side and measures of one of the paper's."""
     radius = options.get("junction_radius")
     return (
         n in PUBLISHED_ARMS

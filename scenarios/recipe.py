@@ -1,4 +1,4 @@
-"""The recipe for a run. Python, the command line, files and studies all start from one.
+"""The recipe of a run. Python, the command line, files and studies all start from one.
 
     run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
     run.summary()
@@ -23,7 +23,7 @@ from scenarios.scenario import Scenario
 #: What a collision does to a run; "teleport" is for SUMO only.
 ON_COLLISION = ("stop", "record", "teleport")
 
-#: Makes a run from a scenario, a controller and a seed, as `minisim.simulate` does.
+#: Makes a run of a scenario, a controller and a seed, such as `minisim.simulate`.
 Host = Callable[..., Run]
 
 
@@ -37,16 +37,14 @@ class Recipe:
 
     scenario: Scenario = part("what is simulated", Scenario)
     controller: Controller = checked(
-        "decides which vehicles go",
-        lambda _, value: check_controller(show(value), value),
-        "Controller",
+        "decides who goes", lambda _, value: check_controller(show(value), value), "Controller"
     )
-    seed: int = whole("seed of the random streams", low=0, default=0)
+    seed: int = whole("of the random streams", low=0, default=0)
     humans: float = real(
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
-    label: str = text("name of the controller in rows; its own name if empty", default="")
+    label: str = text("what rows call the controller; its own name where empty", default="")
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
         ON_COLLISION, default="stop",
@@ -66,22 +64,22 @@ class Recipe:
 
     @property
     def driven(self) -> Controller:
-        """The controller of the run, with the run's human drivers."""
+        """The controller of the run, with its human drivers."""
         if self.humans and isinstance(self.controller, Dim):
             return Mixed(self.controller, self.humans)
         return self.controller
 
     @property
     def name(self) -> str:
-        """The name of the controller in rows."""
+        """What rows call the controller."""
         return self.label or self.driven.name
 
     def run(self, host: Host | None = None, **options: Any) -> Run:
-        """Simulate the run, and record what its metrics need.
+        """Simulate it, and record what its metrics need.
 
         Args:
             host: `minisim.simulate` unless given; takes the same arguments.
-            options: further arguments for the host, such as `record`.
+            options: more arguments of the host, such as `record`.
 
         Raises:
             InputError: an option that is not allowed, or a scenario that the controller cannot

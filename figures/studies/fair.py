@@ -18,7 +18,7 @@ from scenarios.studies.shared.study import Results, with_total_delay
 
 
 def fair_figure(results: Results) -> Figure:
-    """Every controller with the same vehicle and speed limit: three measures over demand."""
+    """Every controller with one vehicle and speed limit: three measures over demand."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
         11.5, 5.4, len(MEASURES), left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06
@@ -33,8 +33,8 @@ def fair_figure(results: Results) -> Figure:
     plots.looks_legend(figure, map(style.look, RIVALS), 0.93, 4)
     plots.marks_legend(figure, 0.842)
     plots.footnote(figure, (
-        f"{missing_note(results)}  Waiting means standing on the road: it leaves out the queue in "
-        "front of a full road, and the crawling of V2I-C's vehicles."
+        f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
+        "before a full road, and V2I-C's vehicles crawl."
     ))  # fmt: skip
     return figure
 
@@ -44,8 +44,8 @@ def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
     known = {} if results.good.empty else losses(results.good)
     if not known:
         raise MissingRunsError(
-            "the store has no two demands at which DIM and another controller both ran with two "
-            f"common seeds; make these runs with: {results.effort.command('fair')}"
+            "the store has no two demands at which DIM and another controller ran with two common "
+            f"seeds; make them with: {results.effort.command('fair')}"
         )
     return known
 
@@ -75,7 +75,7 @@ def crossing_figure(results: Results) -> Figure:
 
 
 def loss_table(results: Results) -> Table:
-    """The demands from which DIM does worse than each rival."""
+    """From which demand on DIM does worse than each rival."""
     known = needed_losses(results)
     low, high = tried(known.values())
     rows = []
@@ -85,17 +85,17 @@ def loss_table(results: Results) -> Table:
             texts = ((cell.point, cell.interval) if cell else ("–", "–") for cell in cells)
             rows.append((style.look(rival).label, measure, *chain.from_iterable(texts)))
     return Table(
-        "Demand from which DIM does worse [veh/h/lane]",
+        "Demand from which on DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
         tuple(rows), labels=2,
         notes=(
             f"{missing_note(results)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
-            f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse only "
-            "between a and b, since the order may reverse again beyond the capacity of both. "
-            "“all”: worse in the mean at every demand tried; “c at the latest” then says that this "
-            "is certain only from c on. “never”: worse in the mean at no demand tried; “c at the "
-            "earliest” then says that DIM may do worse from c on.",
+            f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
+            "b only, for beyond the capacity of both their order may turn again. “all”: at every "
+            "demand tried, in the mean; “c at the latest” then says that only from c on it is "
+            "sure. “never”: at none in the mean; “c at the earliest” says that from c on it may "
+            "be.",
         ),
     )  # fmt: skip
 
@@ -105,7 +105,7 @@ def answer(results: Results) -> str:
     try:
         known = needed_losses(results)
     except MissingRunsError as error:
-        return f"The demands from which DIM loses are not known: {error}."
+        return f"From which demand on DIM loses is not known: {error}."
     low, high = tried(known.values())
     lines = []
     for rival in OTHERS:
@@ -116,10 +116,10 @@ def answer(results: Results) -> str:
         ]
         lines.append(f"- {style.look(rival).label}: {'; '.join(losing)}")
     return "\n".join([
-        "Demands at which DIM does worse than each rival, in veh/h/lane on four arms, paper's gate "
-        "→ harmonious gate. Each range runs from the demand given, with its 95 % interval, to the "
-        f"highest one tried ({high:g}) unless an end is given; \"all\" means from the lowest one "
-        f"tried ({low:g}) on, in the mean:\n",
+        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
+        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
+        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
+        "mean:\n",
         *lines,
     ])  # fmt: skip
 
@@ -150,7 +150,7 @@ SECTION = Section(
     "When does DIM lose?",
     (
         Item("fair", "every controller up to 800 veh/h/lane", fair_figure, ("fair",)),
-        Item("losses", "demand from which DIM loses", crossing_figure, ("fair",)),
+        Item("losses", "demand from which on DIM loses", crossing_figure, ("fair",)),
         Item("losses-table", "losses in numbers", loss_table, ("fair",)),
     ),
     answer,

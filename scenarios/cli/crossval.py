@@ -21,16 +21,15 @@ CONTROLLERS = ["dim", "fixed-time"]
 DENSITIES = [150.0, 250.0, 350.0]
 QUICK_DENSITIES = [150.0, 350.0]
 
-#: How many failed runs are printed on stderr; the report lists all of them.
+#: How many failed runs are printed on stderr; the report has all.
 TOLD = 10
 
 
 @app.command(
-    epilog="Writes crossval.md (the report), crossval.csv (one row per cell, lane and metric) and "
+    epilog="Writes crossval.md (the report), crossval.csv (one row a cell, lane and metric) and "
     "the figures. A cell whose controller cannot serve its scenario is refused before anything "
-    "runs; a run that fails becomes a row with its error. SUMO's runs are kept in the folder sumo "
-    "beside these files, and the same version reuses them; remove the folder to run them "
-    "afresh.\n\n"
+    "runs; a run that fails is a row with its error. SUMO's runs are kept in the folder sumo "
+    "beside them and used again by the same version; remove it to run them anew.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim crossval --quick\n\n"
     "minisim crossval four-way five-way -c dim -c dim:gate=harmonious -d 250 --seeds 5\n\n"
@@ -119,7 +118,7 @@ def crossval(
     folder = make_folder(out)
     with bar("simulating in both hosts") as progress:
         results = crossvalidate(cases, numbers, workers, progress, folder)
-    with bar("recording where the hosts part ways") as progress:
+    with bar("recording where they part") as progress:
         results = film(results, workers, progress)
     from figures.crossval import crossval_figures
     from figures.style import save

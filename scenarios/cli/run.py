@@ -20,8 +20,8 @@ _sumo = partial(option, rich_help_panel="SUMO")
 
 
 @app.command(
-    epilog="Means are over the trips that ended; the row [bold]with unfinished[/bold] counts all. "
-    "Exit codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
+    epilog="Means are over the trips that ended; [bold]with unfinished[/bold] counts all. Exit "
+    "codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
     "[bold]minisim controllers[/bold].\n\n"
     "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json\n\n"
     "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
@@ -50,8 +50,8 @@ def run(
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
-    host: Annotated[str, _sumo("What moves the vehicles: minisim or sumo.", "NAME")] = "minisim",
-    sumo_model: Annotated[str | None, _sumo("Instead of the vehicle's own law.", "NAME")] = None,
+    host: Annotated[str, _sumo("What moves vehicles: minisim or sumo.", "NAME")] = "minisim",
+    sumo_model: Annotated[str | None, _sumo("IDM, Krauss or CC, if not its own.", "NAME")] = None,
     gui: Annotated[bool, _sumo("Show the run in sumo-gui.", None, "--gui")] = False,
     keep_files: Annotated[Path | None, _sumo("Keep SUMO's files in a new folder.", "DIR")] = None,
     sumo_fcd: Annotated[Path | None, _sumo("SUMO's own floating-car data (XML).", "FILE")] = None,
@@ -100,7 +100,7 @@ def run(
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
         unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
-        error.add_note(f"{unwritten}use --on-collision record to note collisions and go on")
+        error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise
     with bar("measuring"):
         summary = result.summary(recipe.metrics, [by])
