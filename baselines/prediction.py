@@ -1,8 +1,8 @@
-"""Where a vehicle will be, step by step, if it drives on: the law of the hosts, looked ahead.
+"""Where a vehicle will be, step by step, if it drives on by the car-following law of the hosts.
 
-One vehicle alone on its path, behind at most two others whose motion is known: the one ahead in
-its lane, and the one that goes before it into the same exit lane. Positions here are distances
-past the junction entry, negative before it.
+The vehicle is alone on its path, behind at most two others with known motion: the one ahead in its
+lane, and the one that goes before it into the same exit lane. Positions here are distances past the
+junction entry, negative before it.
 """
 
 from __future__ import annotations
@@ -80,10 +80,10 @@ def ways(site: Site) -> tuple[Way, ...]:
 
 
 class Leader(NamedTuple):
-    """A vehicle whose motion is known, as its follower meets it.
+    """A vehicle with known motion, as its follower meets it.
 
     Attributes:
-        s, v: its positions [m] and speeds [m/s], one a step from now on; nobody after the last.
+        s, v: its positions [m] and speeds [m/s], one a step from now on; after the last it is gone.
         until: its rear matters up to this position on its own path [m].
         shift: added to its position to measure it on the follower's path [m].
     """
@@ -94,7 +94,7 @@ class Leader(NamedTuple):
     shift: float = 0.0
 
 
-NOBODY = Leader(np.empty(0), np.empty(0))
+NO_LEADER = Leader(np.empty(0), np.empty(0))
 
 
 def predict(
@@ -103,8 +103,8 @@ def predict(
     position: float,
     speed: float,
     *,
-    lane: Leader = NOBODY,
-    exit_lane: Leader = NOBODY,
+    lane: Leader = NO_LEADER,
+    exit_lane: Leader = NO_LEADER,
     beyond: float = 0.0,
     horizon: float = 60.0,
 ) -> tuple[Floats, Floats] | None:
@@ -121,8 +121,8 @@ def predict(
         horizon: [s].
 
     Returns:
-        None where it does not get through within the horizon, or not without emergency: a leader
-        that appears beside or behind it.
+        None where it does not get through within the horizon, or where a leader appears beside or
+        behind it, which would be an emergency.
     """
     steps = math.ceil(horizon / motion.dt)
     s, v = np.empty(steps), np.empty(steps)
@@ -160,7 +160,7 @@ def _drive(
         if s >= end:
             return k + 1
         z = 0.0
-        first = True  # nobody between it and the junction
+        first = True  # no vehicle is between it and the junction
         if k < len(lane_s):
             first = lane_s[k] >= 0.0
             rear = lane_s[k] - motion.length

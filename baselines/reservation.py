@@ -31,7 +31,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from baselines.prediction import NOBODY, Floats, Leader, Motion, predict, ways
+from baselines.prediction import NO_LEADER, Floats, Leader, Motion, predict, ways
 from minisim.control import (
     Command,
     Go,
@@ -46,7 +46,7 @@ from minisim.control import (
 )
 from minisim.errors import InputError, instance, number
 from minisim.junction.zones import conflict_zones
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import CruiseVehicle
 
 #: Differences from the prediction that are none [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -143,9 +143,9 @@ class Manager:
 
     def __init__(self, site: Site, buffer: float) -> None:
         instance("site", site, Site)
-        if isinstance(site.vehicle, EngineVehicle):
+        if isinstance(site.vehicle, CruiseVehicle):
             raise InputError(
-                "reservation predicts vehicles that follow the IDM, not an EngineVehicle; "
+                "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
                 "use the profile paper or fair"
             )
         self.slots: dict[int, Slot] = {}
@@ -167,11 +167,11 @@ class Manager:
         """
         p = seen.lane * self._manoeuvres + seen.manoeuvre - 1
         way = self._ways[p]
-        lane = NOBODY
+        lane = NO_LEADER
         if ahead is not None and ahead.ends >= now:
             lane = ahead.leader(now, until=float(self._branch[ahead.movement, p]))
         rival = self._before(way.exit_arm, seen)
-        exit_lane = NOBODY
+        exit_lane = NO_LEADER
         if rival is not None and rival.ends >= now:
             crossing = self._ways[rival.movement].crossing
             exit_lane = rival.leader(now, shift=way.crossing - crossing)

@@ -9,14 +9,17 @@ from __future__ import annotations
 import csv
 import math
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, choice, instance, integer, number, numbers, show
+from minisim.errors import FileError, InputError, instance, integer, number, numbers, show
 from minisim.junction.geometry import ARM_NAMES
+from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
 
 Floats = npt.NDArray[np.float64]
@@ -24,8 +27,12 @@ Ints = npt.NDArray[np.int64]
 
 MODELS = ("poisson", "exponential", "shifted")
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
-#: More than any lane can carry; beyond it a density is surely a typing error.
+#: Words for equal shares of the lanes and of the manoeuvres.
+BALANCED, UNIFORM = "balanced", "uniform"
+#: More than any lane can carry: a higher density is a typing error.
 MAX_DENSITY = 3600.0
+#: Shares as callers may give them.
+Shares = Sequence[float] | str | None
 #: The longest duration and the latest demand time [s].
 MAX_TIME = 1e7
 
@@ -83,36 +90,58 @@ class Arrivals:
         return tuple(float(c) * 3600.0 / horizon for c in counts)
 
 
-@dataclass(frozen=True, kw_only=True)
+def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
+    """Shares given as numbers or as a text such as "4:3:2:1"; None where they are equal.
+
+    Args:
+        name: what messages call them.
+        value: the shares; None and the word `equal` stand for equal ones.
+        equal: that word.
+
+    Raises:
+        InputError: no finite numbers, a negative one, or only zeros.
+    """
+    if value is None or value == equal:
+        return None
+    if isinstance(value, str):
+        try:
+            value = tuple(map(float, value.split(":")))
+        except ValueError:
+            raise InputError(
+                f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
+            ) from None
+    shares = numbers(name, value)
+    if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
+        raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
+    return shares
+
+
+@declared(kw_only=True)
 class Demand:
     """How many vehicles come, from where, and where to.
 
-    Attributes:
-        density: mean inflow a lane [veh/h]; with a split, the mean over all lanes.
-        split: shares of the lanes, such as (4, 3, 2, 1); None is balanced.
-        turns: shares of the manoeuvres 1 … n−1, the same on every lane; None is uniform.
-        model: of the arrivals: "poisson" counts in every second (the paper's), "exponential"
-            headways, or headways "shifted" by `min_headway` (all with the same mean).
-        min_headway: of the shifted model [s].
+    Shares may be given as numbers or as a text such as "4:3:2:1"; they are kept as a tuple of
+    floats, or None where they are equal. All models of arrivals have the same mean headway. The
+    paper's is Poisson: it counts the arrivals of every second.
     """
 
-    density: float
-    split: tuple[float, ...] | None = None
-    turns: tuple[float, ...] | None = None
-    model: str = "poisson"
-    min_headway: float = 1.5
-
-    def __post_init__(self) -> None:
-        number("density [veh/h/lane]", self.density, low=0, high=MAX_DENSITY)
-        for name in ("split", "turns"):
-            value = getattr(self, name)
-            if value is not None:
-                shares = numbers(name, value)
-                if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
-                    raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
-                object.__setattr__(self, name, shares)
-        choice("arrival model", self.model, MODELS)
-        number("min_headway [s]", self.min_headway, low=0, high=60)
+    density: float = real(
+        "mean inflow a lane; with a split, the mean over all lanes", "veh/h/lane",
+        low=0, high=MAX_DENSITY,
+    )  # fmt: skip
+    split: Shares = checked(
+        "shares of the lanes",
+        partial(read_shares, equal=BALANCED), f"shares such as 4:3:2:1 | {BALANCED}", default=None,
+    )  # fmt: skip
+    turns: Shares = checked(
+        "shares of the manoeuvres 1 … n−1, the same on every lane",
+        partial(read_shares, equal=UNIFORM), f"shares such as 1:2:1 | {UNIFORM}", default=None,
+    )  # fmt: skip
+    model: str = word(
+        "of the arrivals: poisson counts, exponential headways, or headways shifted by min_headway",
+        MODELS, default="poisson", label="arrival model",
+    )  # fmt: skip
+    min_headway: float = real("of the shifted model", "s", default=1.5, low=0, high=60)
 
     def rates(self, n: int) -> tuple[float, ...]:
         """Mean inflow of each of n lanes [veh/h]."""
@@ -245,11 +274,11 @@ def _parse_row(
     return time, lanes.index(lane_text), manoeuvre
 
 
-def _shares(
-    name: str, shares: tuple[float, ...] | None, count: int, things: str
-) -> tuple[float, ...]:
-    if shares is None:
+def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, ...]:
+    """Shares of so many things, with the sum 1."""
+    if given is None:
         return (1.0 / count,) * count
+    shares = tuple(map(float, given))  # a text no more: `Demand` has read it
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     total = sum(shares)

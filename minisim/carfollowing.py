@@ -11,11 +11,11 @@ import math
 
 from minisim.jit import njit, njit_inline
 
-#: Whoever has less than this to go has arrived [m]: an approach that slows down with the distance
-#: would never end (SUMO's `NUMERICAL_EPS`, in the same place).
+#: A vehicle that has less than this to go has arrived [m]: an approach that slows down with the
+#: distance would never end (SUMO's `NUMERICAL_EPS`, in the same place).
 STILL = 1e-3
 
-#: What a next speed must exceed to be none of standing, over dt [m/s²] (`NUMERICAL_EPS_SPEED`).
+#: A next speed below this, times dt, is standstill [m/s²] (`NUMERICAL_EPS_SPEED`).
 STANDSTILL = 1e-4
 
 
@@ -80,11 +80,11 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
 
 @njit
 def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float) -> float:
-    """Krauß's safe speed: the highest that a leader which brakes at b cannot turn into a collision.
+    """Krauß's safe speed: the highest at which a leader that brakes at b causes no collision.
 
-    Driven for `headway`, then braked by b·dt a step, it uses up `gap` and the leader's braking
-    distance; so the gap of equilibrium is v·headway, whatever the step. Where dt → 0 this is
-    Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
+    A vehicle that keeps it for `headway` and then slows by b·dt a step uses up `gap` and the
+    leader's braking distance. So the gap of equilibrium is v·headway for any step. For dt → 0 this
+    is Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
     Source: Krauß 1998, Microscopic Modeling of Traffic Flow, §3.1 (eq. 3.7, leader and follower
     alike); in whole steps of braking as SUMO's `MSCFModel::maximumSafeFollowSpeed` without the
     ballistic rule. `gap` is measured beyond the gap at standstill, as there.
@@ -114,8 +114,9 @@ def braking_distance(v: float, b: float, dt: float) -> float:
 def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> float:
     """`speed_towards` for `semi_implicit`: the highest next speed that still allows `v_target`.
 
-    It is driven for a step, then braked by b·dt a step, until at `v_target`: all of that takes
-    `distance`. Source: SUMO's `MSCFModel::freeSpeed`, and `stopSpeed` for v_target = 0.
+    The vehicle drives one step at that speed and then slows by b·dt a step down to `v_target`; all
+    of this takes `distance`.
+    Source: SUMO's `MSCFModel::freeSpeed`, and `stopSpeed` for v_target = 0.
     """
     if distance <= v_target * dt:
         return v_target
@@ -129,7 +130,7 @@ def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> f
 
 @njit
 def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) -> float:
-    """Next speed: as fast as wanted, as the engine can, and as safe [m/s].
+    """Next speed [m/s]: the lowest of the desired, the attainable and the safe one.
 
     Above the desired speed (a limit that begins late) it brakes at b at most.
     Source: Krauß 1998, §3.1, without the random part (SUMO's sigma = 0).
@@ -144,7 +145,7 @@ def speed_towards(v: float, v_target: float, distance: float, b: float, dt: floa
 
     Solves (v + v')/2·dt + (v'² − v_target²)/(2b) = distance for v'; a negative result means that
     the vehicle has to stop within this step. A vehicle that follows this bound brakes at exactly
-    b and not a moment earlier than it must; with v_target = 0 it is a hold line.
+    b and no earlier than it must; with v_target = 0 the bound is a hold line.
     The same construction is Krauß's safe speed (1998, §2) with a ballistic step.
     """
     half = 0.5 * b * dt

@@ -1,4 +1,10 @@
-"""What a controller sees and may command: the only room that `dim` and `baselines` look into.
+"""What a controller sees and may command: the door between the simulator and the controllers.
+
+Beside this room, `dim` and `baselines` may look into `minisim.junction` (geometry, conflicts,
+movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
+and what they refuse), `minisim.streams` (random numbers), and `minisim.carfollowing` with
+`minisim.jit` (equations, for those that predict). None of these leads to the engine room, to the
+hosts or to the results; `make lint` proves it.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -16,8 +22,9 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from minisim.errors import InputError, instance, integer, number, numbers
+from minisim.errors import InputError, instance, number
 from minisim.junction.geometry import Bools, Intersection, Movement
+from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
 from minisim.vehicle import VehicleType
 
 #: Room kept between two corridors that may be driven at once [m]: the static buffer of 0.25 m
@@ -35,37 +42,24 @@ LATERAL_ACCELERATION = 5.5
 COMMIT_MARGIN = 0.1
 
 
-@dataclass(frozen=True)
+@declared
 class Site:
-    """What a controller may know before the first vehicle comes.
+    """What a controller may know before the first vehicle comes."""
 
-    Attributes:
-        intersection: its geometry.
-        vehicle: the vehicles' type.
-        speed_limit: of the roads [m/s].
-        demand: expected inflow of each lane [veh/h].
-        dt: step of the host [s].
-        seed: of the run, for controllers that draw random numbers (`minisim.streams`).
-    """
-
-    intersection: Intersection
-    vehicle: VehicleType
-    speed_limit: float
-    demand: tuple[float, ...]
-    dt: float = 0.1
-    seed: int = 0
+    intersection: Intersection = part("its geometry", Intersection)
+    vehicle: VehicleType = part("the vehicles' type", VehicleType)
+    speed_limit: float = real("of the roads", "m/s", above=0, high=100)
+    demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
+    dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
+    seed: int = whole(
+        "of the run, for controllers that draw random numbers (`minisim.streams`)", default=0, low=0
+    )
 
     def __post_init__(self) -> None:
-        instance("intersection", self.intersection, Intersection)
-        instance("vehicle", self.vehicle, VehicleType)
-        number("speed_limit [m/s]", self.speed_limit, above=0, high=100)
-        object.__setattr__(self, "demand", numbers("demand [veh/h]", self.demand))
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             raise InputError(
                 f"demand must be {self.intersection.n} numbers ≥ 0 [veh/h], got {self.demand}"
             )
-        number("dt [s]", self.dt, low=0.001, high=0.5)
-        integer("seed", self.seed, low=0)
         if self.intersection.room(self.vehicle) <= 0.0:
             raise InputError(
                 f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
@@ -120,7 +114,7 @@ def stopping_distance(speed: float, deceleration: float) -> float:
 def can_stop(vehicle: Observed, deceleration: float) -> bool:
     """Whether comfortable braking still stops the vehicle before the junction.
 
-    Every observer sees that from position and speed alone.
+    Position and speed alone decide it, so every observer comes to the same answer.
     """
     needed = vehicle.speed * vehicle.speed / (2.0 * deceleration)
     return needed + COMMIT_MARGIN <= vehicle.distance or (
@@ -187,8 +181,8 @@ class Brake:
     """Make one vehicle brake at least at `deceleration` [m/s²] until told otherwise; 0 lifts it.
 
     It acts wherever the vehicle is, inside the junction too, and no harder than its brakes can. A
-    vehicle that stands keeps standing. It ends when the vehicle leaves the view for good: nobody
-    could lift it then.
+    vehicle that stands keeps standing. It ends when the vehicle leaves the view for good, since no
+    session could lift it after that.
     """
 
     vehicle: int
@@ -205,68 +199,60 @@ class Wake:
 Command = Go | Hold | Open | Close | Advise | Brake | Wake
 
 
-@dataclass(frozen=True)
+@declared
 class Marking:
-    """A stretch of approach lane, from `start` down to `end` metres before the junction entry.
+    """A stretch of approach lane, from `start` down to `end` metres before the junction entry."""
 
-    Attributes:
-        name: shown in figures ("red", "yellow", "green" are drawn in their colour).
-        start, end: distance before the junction entry [m], start > end ≥ 0.
-        speed: limit on it [m/s], or None. A vehicle slows for it ahead of `start`.
-    """
-
-    name: str
-    start: float
-    end: float
-    speed: float | None = None
+    name: str = text(
+        'shown in figures ("red", "yellow", "green" are drawn in their colour)',
+        label="name of a marking",
+    )
+    start: float = real("before the junction entry", "m", label="start of a marking")
+    end: float = real("before the junction entry", "m", low=0, label="end of a marking")
+    speed: float | None = real(
+        "limit on it; a vehicle slows for it ahead of `start`", "m/s",
+        default=None, above=0, high=100, optional=True, label="speed of a marking",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        instance("name of a marking", self.name, str)
-        number(f"end of marking {self.name} [m]", self.end, low=0)
         number(f"start of marking {self.name} [m]", self.start, above=self.end)
-        if self.speed is not None:
-            number(f"speed of marking {self.name} [m/s]", self.speed, above=0, high=100)
 
 
-@dataclass(frozen=True, kw_only=True)
+def _markings(title: str, value: tuple[Marking, ...]) -> tuple[Marking, ...]:
+    instance(title, value, tuple)
+    for marking in value:
+        instance("marking", marking, Marking)
+    return value
+
+
+@declared(kw_only=True)
 class Plan:
-    """What a session needs of its host.
+    """What a session needs of its host."""
 
-    Attributes:
-        hold_distance: the hold line's distance before the junction entry [m].
-        markings: road markings of every approach lane.
-        marks: wake when a front bumper passes one of these distances [m] before the junction
-            entry; 0 is the entry itself, negative is past it.
-        wake_on_clear: wake when a rear bumper leaves the junction.
-        period: wake every so many seconds, or None.
-        sight: how far before the junction entry a view reaches [m].
-        reach: a view holds a vehicle until its front is at least this far past the junction
-            entry, even when its rear has left the junction before that [m].
-        lanes_open: whether lanes start open; otherwise everyone is held until told to go.
-    """
-
-    hold_distance: float = 0.0
-    markings: tuple[Marking, ...] = ()
-    marks: tuple[float, ...] = ()
-    wake_on_clear: bool = False
-    period: float | None = None
-    sight: float = 50.0
-    reach: float = 0.0
-    lanes_open: bool = False
-
-    def __post_init__(self) -> None:
-        number("hold_distance [m]", self.hold_distance, low=0, high=1000)
-        number("sight [m]", self.sight, low=0)
-        number("reach [m]", self.reach, low=0, high=1000)
-        instance("markings", self.markings, tuple)
-        for marking in self.markings:
-            instance("marking", marking, Marking)
-        instance("wake_on_clear", self.wake_on_clear, bool)
-        instance("lanes_open", self.lanes_open, bool)
-        for mark in numbers("marks [m]", self.marks):
-            number("mark [m]", mark, low=-1000)
-        if self.period is not None:
-            number("period [s]", self.period, above=0)
+    hold_distance: float = real(
+        "the hold line's distance before the junction entry", "m", default=0.0, low=0, high=1000
+    )
+    markings: tuple[Marking, ...] = checked(
+        "on every approach lane", _markings, "markings", default=()
+    )
+    marks: tuple[float, ...] = reals(
+        "wake when a front bumper passes one of these distances before the junction entry; 0 is "
+        "the entry itself, negative is past it",
+        "m", default=(), low=-1000,
+    )  # fmt: skip
+    wake_on_clear: bool = switch("wake when a rear bumper leaves the junction", default=False)
+    period: float | None = real("wake at this interval", "s", default=None, above=0, optional=True)
+    sight: float = real(
+        "how far before the junction entry a view reaches", "m", default=50.0, low=0
+    )
+    reach: float = real(
+        "a view holds a vehicle until its front is at least this far past the junction entry, even "
+        "when its rear has left the junction before that",
+        "m", default=0.0, low=0, high=1000,
+    )  # fmt: skip
+    lanes_open: bool = switch(
+        "lanes start open; otherwise vehicles are held until told to go", default=False
+    )
 
 
 @runtime_checkable
@@ -307,9 +293,9 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Unregulated:
-    """Everyone goes, whoever else does: what happens without any rule.
+    """Every vehicle goes, whatever the others do: what happens without any rule.
 
-    For tests of the host and for teaching; it collides as soon as there is cross traffic.
+    For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """
 
     name: str = "unregulated"

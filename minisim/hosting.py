@@ -1,4 +1,4 @@
-"""What every host of a controller does alike: begin a run, ask the session, report a collision."""
+"""What all hosts share: how a run begins, how a session is woken and asked, how a run stops."""
 
 from __future__ import annotations
 
@@ -24,17 +24,13 @@ from minisim.control import (
     Wake,
 )
 from minisim.engine.collision import Collision
-from minisim.engine.state import (
-    first_tick,
-)
+from minisim.engine.state import NEVER, first_tick, time_of
 from minisim.errors import (
     CollisionError,
     ControllerError,
     InputError,
-    instance,
     integer,
     number,
-    numbers,
     show,
 )
 from minisim.results.run import Run, ScenarioLike
@@ -42,15 +38,46 @@ from minisim.results.run import Run, ScenarioLike
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
-#: Commands by what they are for: building a union of types for each check is slow.
+#: Commands by what they address. Building a union of types for each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
 AFTERMATH = 2.0
 
 
+class Alarm:
+    """When the clock wakes a session: at the period of its plan, and once when it asks for it.
+
+    Args:
+        period: of the plan [s], or None.
+        dt: step [s].
+    """
+
+    def __init__(self, period: float | None, dt: float) -> None:
+        self._dt = dt
+        self._every = NEVER if period is None else max(1, first_tick(period, dt))
+        self._due = NEVER if period is None else 0
+        self._asked = NEVER
+
+    @property
+    def tick(self) -> int:
+        """The next tick at which it rings."""
+        return min(self._asked, self._due)
+
+    def reset(self, tick: int) -> None:
+        """The session is awake at `tick`: what was due until then has been served."""
+        if tick >= self._asked:
+            self._asked = NEVER
+        if tick >= self._due:
+            self._due = tick + self._every
+
+    def set(self, command: Wake) -> None:
+        """Ring once at the time of the command, in place of an earlier one."""
+        self._asked = first_tick(command.time, self._dt)
+
+
 class Beginning(NamedTuple):
-    """A run that is about to begin, whoever hosts it: checked, and the session started."""
+    """A run that is about to begin in any host: checked, and the session started."""
 
     site: Site
     arrivals: Arrivals
@@ -97,7 +124,7 @@ def ask(
 
 
 def counts_of(session: Session) -> dict[str, float]:
-    """What a session has counted; empty where it counts nothing."""
+    """What a session has counted; empty if it counts nothing."""
     return dict(session.counts) if isinstance(session, Counting) else {}
 
 
@@ -112,9 +139,8 @@ def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> No
         integer("lane", command.lane, low=0, high=site.intersection.n - 1)
     elif isinstance(command, Wake):
         if first_tick(number("wake-up time [s]", command.time), site.dt) <= tick:
-            raise InputError(
-                f"wake-up time {command.time:g} s is not after {round(tick * site.dt, 6):g} s"
-            )
+            now = time_of(tick, site.dt)
+            raise InputError(f"wake-up time {command.time:g} s is not after {now:g} s")
     else:
         raise InputError(f"{show(command)} is not a command")
 
@@ -126,7 +152,7 @@ def collision_error(
     seed: int,
     replay: Callable[..., Run],
 ) -> CollisionError:
-    """What stopped a run, with a `replay` that records what led to it."""
+    """The error that stops a run, with a `replay` that records what led to it."""
     what = "; ".join(str(collision) for collision in collisions)
     where = f"scenario {scenario.name}, controller {controller.name}"
     return CollisionError(f"{what} ({where}, seed {seed})", tuple(collisions), replay)
@@ -150,12 +176,9 @@ def _plan_of(session: object, controller: Controller) -> Plan:
 
 def checked_window(window: Iterable[float]) -> tuple[float, float]:
     """Return a `record_window`, or raise `InputError`."""
-    instance("record_window", window, tuple)
     if not isinstance(window, tuple) or len(window) != 2:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
-    start, end = window
-    end = end if end == math.inf else number("end of record_window [s]", end)
-    start = number("start of record_window [s]", start, low=0)
-    if end < start:
-        raise InputError(f"record_window must not end before it starts, got {show(window)}")
-    return numbers("record_window", (start,))[0], end
+    start = number("start of record_window [s]", window[0], low=0)
+    if window[1] == math.inf:
+        return start, math.inf
+    return start, number("end of record_window [s]", window[1], low=start)

@@ -3,9 +3,10 @@
 Switch it off with the environment variable `MINISIM_JIT=0`: every kernel then runs as the
 Python that stands in the file, step by step in a debugger if need be.
 
-Compiled code is kept on disk. It holds whatever it calls and every constant that it reads, from
-any module, while numba looks only at the file that a function stands in; so ours is kept for one
-state of all sources beside the function and beside this file, and a change of any compiles anew.
+Compiled code is kept on disk. It includes all functions that it calls and all constants that it
+reads, from any module, but numba only checks the file of the function itself. So ours is kept for
+one state of all sources beside the function and beside this file: a change in any of them compiles
+it again.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def njit(function: _F) -> _F:
 def njit_inline(function: _F) -> _F:
     """The same for a helper of the inner loop, pasted into its compiled callers.
 
-    LLVM alone does not, and every call would hand over `Law` field by field and count a
-    reference to each array: that takes longer than the arithmetic.
+    LLVM does not do so by itself. Every call would then pass `Law` field by field and count a
+    reference to each array, which takes longer than the arithmetic.
     """
     return _compile(function, inline="always")
 
@@ -64,7 +65,7 @@ def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
 
     class SourcesCache(FunctionCache):
-        """numba's cache on disk; what is there counts only if none of our sources has changed."""
+        """numba's cache on disk; its content is valid only while none of our sources changes."""
 
         def __init__(self, function: Callable[..., object]) -> None:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
@@ -76,9 +77,9 @@ def _cache_class() -> Any:
 
 @lru_cache
 def _digest(folder: Path) -> bytes:
-    """Of all Python sources of a folder, and of those within, as they stand on disk now."""
-    found = hashlib.sha256()
+    """Digest of all Python sources in a folder and its subfolders, as they are on disk now."""
+    digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.py")):
         name = file.relative_to(folder).as_posix().encode()
-        found.update(name + b"\0" + hashlib.sha256(file.read_bytes()).digest())
-    return found.digest()
+        digest.update(name + b"\0" + hashlib.sha256(file.read_bytes()).digest())
+    return digest.digest()

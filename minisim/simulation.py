@@ -25,25 +25,22 @@ from minisim.engine import kernel
 from minisim.engine.collision import Body, Collision, touching
 from minisim.engine.state import (
     DRIVING,
-    NEVER,
     OBSERVED,
     TRACE,
     Records,
-    build_engine,
     build_lanes,
     build_law,
     build_road,
     build_vehicles,
     first_tick,
+    time_of,
 )
-from minisim.errors import (
-    choice,
-    number,
-)
+from minisim.errors import choice, number
 from minisim.hosting import (
     AFTERMATH,
     ON_COLLISION,
     RECORDS,
+    Alarm,
     ask,
     begin,
     checked_window,
@@ -62,7 +59,7 @@ class Simulation:
 
     Args:
         scenario: what to simulate.
-        controller: who decides; its session is private to this run.
+        controller: what decides; its session is private to this run.
         seed: of the run's random streams.
         record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
         record_window: from and to [s].
@@ -100,8 +97,8 @@ class Simulation:
             record=record,
             record_window=checked_window(record_window),
         )
-        self._engine = build_engine(self.site)
         self._vehicles = build_vehicles(self.site, arrivals)
+        self._motion = kernel.build_motion(self.site, self._vehicles)
         self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
@@ -113,8 +110,7 @@ class Simulation:
         self._seen = 0
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
-        self._wake_tick = NEVER
-        self._period_tick = 0 if self.plan.period is not None else NEVER
+        self._alarm = Alarm(self.plan.period, self.site.dt)
         self._started = False
         self._done = False
         self.tick = 0
@@ -122,7 +118,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return round(self.tick * self.site.dt, 6)
+        return time_of(self.tick, self.site.dt)
 
     @property
     def finished(self) -> bool:
@@ -153,21 +149,20 @@ class Simulation:
                 self._lanes,
                 self._road,
                 self._law,
-                self._engine,
+                self._motion,
                 self._trace,
                 self._traced,
                 self._bodies,
                 self._observed,
                 self.tick,
-                min(target, self._wake_tick, self._period_tick),
+                min(target, self._alarm.tick),
             )
             if reasons & kernel.TRACE_FULL:
                 self._keep_trace()
             if reasons & (kernel.TOUCH | kernel.GAP):
                 self._check_collisions()
             self._done = bool(reasons & kernel.DONE)
-            asked = self.tick >= min(self._wake_tick, self._period_tick)
-            if asked or reasons & (kernel.MARK | kernel.CLEAR):
+            if self.tick >= self._alarm.tick or reasons & (kernel.MARK | kernel.CLEAR):
                 self._decide()
 
     def run(self) -> Run:
@@ -204,10 +199,7 @@ class Simulation:
         )
 
     def _decide(self) -> None:
-        if self.tick >= self._wake_tick:
-            self._wake_tick = NEVER
-        if self.plan.period is not None and self.tick >= self._period_tick:
-            self._period_tick = self.tick + max(1, first_tick(self.plan.period, self.site.dt))
+        self._alarm.reset(self.tick)
         commands = ask(
             self._session, self.view(), self.tick,
             controller=self.controller, site=self.site, vehicles=len(self._vehicles),
@@ -225,8 +217,8 @@ class Simulation:
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
-            case Wake(time):
-                self._wake_tick = first_tick(time, self.site.dt)
+            case Wake():
+                self._alarm.set(command)
 
     def _brake(self, row: int, deceleration: float) -> None:
         if not self._vehicles["cleared"][row]:
@@ -234,14 +226,11 @@ class Simulation:
             self._vehicles["brake"][row] = -limited if limited > 0.0 else math.inf
 
     def _check_collisions(self) -> None:
-        """Ask pymunk which bodies touch; in a lane the gap tells."""
-        found = []
+        """Ask pymunk which bodies touch; within a lane the gap decides."""
         rows, bodies = self._near_bodies()
-        for i, j in touching(bodies):
-            found.append((rows[i], rows[j]))
-        found += self._overlaps_in_lane()
+        pairs = [(rows[i], rows[j]) for i, j in touching(bodies)] + self._overlaps_in_lane()
         new = []
-        for i, j in found:
+        for i, j in pairs:
             collision = self._describe(i, j)
             if collision.vehicles not in self._collisions:
                 self._collisions[collision.vehicles] = collision
@@ -269,20 +258,20 @@ class Simulation:
         """Rows of the vehicles whose front has reached the rear of the one ahead."""
         v, length = self._vehicles, self.site.vehicle.length
         exits, branch = self._road.ends[:, 0], self._road.branch
-        found = []
+        pairs = []
         for i in np.flatnonzero(v["status"] == DRIVING).tolist():
             p = v["path"][i]
             same_lane = np.flatnonzero((v["status"] == DRIVING) & (v["lane"] == v["lane"][i]))
             for j in same_lane[same_lane < i].tolist():
                 rear = v["s"][j] - length
                 if rear <= v["s"][i] and rear < branch[v["path"][j], p]:
-                    found.append((j, i))
+                    pairs.append((j, i))
             j = int(v["ahead"][i])
             if j >= 0 and v["status"][j] == DRIVING and v["s"][i] >= exits[p]:
                 rear = v["s"][j] - length - exits[v["path"][j]]
                 if rear <= v["s"][i] - exits[p]:
-                    found.append((j, i))
-        return found
+                    pairs.append((j, i))
+        return pairs
 
     def _describe(self, i: int, j: int) -> Collision:
         v = self._vehicles
@@ -302,7 +291,7 @@ class Simulation:
 
 
 def _replay(stopped: Simulation, seconds: float = 10.0) -> Run:
-    """Run again up to a little after the collision; records the last `seconds` before it."""
+    """Run again until shortly after the collision; record the last `seconds` before it."""
     again = Simulation(
         stopped.scenario,
         stopped.controller,

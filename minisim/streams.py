@@ -1,7 +1,7 @@
 """Named random streams: one `SeedSequence` a run, one child for each purpose.
 
-Whoever draws from one stream cannot shift another: the arrivals of a seed are the same for
-every controller (common random numbers), whatever the controller draws.
+Draws from one stream cannot shift another. So the arrivals of a seed are the same for every
+controller (common random numbers), no matter what the controller draws.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ def stream(seed: int, name: str) -> np.random.Generator:
 
 
 class Draws:
-    """Random numbers by what they are for: the same in whatever order they are asked for.
+    """Random numbers by what they are for: the same in any order of asking.
 
-    A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step. So one
-    more question never shifts the answers to others, as it would in a stream. The hash is BLAKE2b
-    (RFC 7693), whose key is drawn from the stream.
+    A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step. So an extra
+    question never shifts the answers to others, as it would in a stream. The hash is BLAKE2b
+    (RFC 7693); its key is drawn from the stream.
 
     Args:
         seed: of the run.

@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, get_args
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import MAX_DENSITY, Arrivals, Demand
 from minisim.control import (
     Advise,
     Brake,
@@ -38,15 +37,15 @@ from minisim.errors import (
     instance,
     integer,
     number,
-    numbers,
 )
 from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.parameters import declared, part, real, reals, text, word
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
 
-#: Time to serve one vehicle that a controller may take after the demand has ended [s], and time
-#: for the roads. An all-way stop, the slowest sensible rule, needs about 2.5 s a vehicle.
+#: Time that a controller may take for each vehicle after the demand has ended [s], and time for the
+#: roads. An all-way stop, the slowest sensible rule, needs about 2.5 s a vehicle.
 SECONDS_PER_VEHICLE, SECONDS_PER_ROAD = 10.0, 600.0
 
 
@@ -60,38 +59,32 @@ class ContractError(MinisimError, AssertionError):
     """A controller broke its contract; a failed assertion for test runners."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class SmallScenario:
-    """A scenario for tests: SUMO's passenger car at 14 m/s, and roads that empty at the end.
+    """A scenario for tests: SUMO's passenger car at 14 m/s, and roads that empty at the end."""
 
-    Attributes:
-        bearings, side: of the intersection.
-        density: mean inflow a lane while demand lasts [veh/h].
-        demand_time: vehicles come until then [s].
-        drain: how much longer the run goes on [s].
-        vehicle: type of the vehicles.
-        speed_limit: [m/s].
-        arm_length: [m].
-        dt: step [s].
-    """
-
-    bearings: tuple[float, ...] = (0.0, 90.0, 180.0, 270.0)
-    side: Literal["left", "right"] = "left"
-    density: float = 350.0
-    demand_time: float = 300.0
-    drain: float = 0.0
-    vehicle: VehicleType = field(default_factory=VehicleType)
-    speed_limit: float = 14.0
-    arm_length: float = 500.0
-    dt: float = 0.1
-    name: str = "small"
-    profile_name: str = "test"
-    depart_speed: float | None = None
+    bearings: tuple[float, ...] = reals(
+        "of the arms, clockwise from north", "deg", default=(0.0, 90.0, 180.0, 270.0)
+    )
+    side: Literal["left", "right"] = word(
+        "on which vehicles drive", ("left", "right"), default="left"
+    )
+    density: float = real(
+        "mean inflow while demand lasts", "veh/h/lane", default=350.0, low=0, high=MAX_DENSITY
+    )
+    demand_time: float = real("vehicles come until then", "s", default=300.0, above=0, high=1e6)
+    drain: float = real("how much longer the run goes on", "s", default=0.0, low=0, high=1e6)
+    vehicle: VehicleType = part("type of the vehicles", VehicleType, default_factory=VehicleType)
+    speed_limit: float = real("of the roads", "m/s", default=14.0, above=0, high=100)
+    arm_length: float = real("of a road, from the centre", "m", default=500.0)
+    dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
+    name: str = text("of the scenario", default="small")
+    profile_name: str = text("of its profile", default="test")
+    depart_speed: float | None = real(
+        "speed at insertion; none is the highest safe one", "m/s", default=None, optional=True
+    )
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bearings", numbers("bearings", self.bearings))
-        number("drain [s]", self.drain, low=0, high=1e6)
-        number("demand_time [s]", self.demand_time, above=0, high=1e6)
         self.site(0)
 
     @property
@@ -130,7 +123,7 @@ def small_scenario(arms: int = 4, *, density: float = 350.0, **options: Any) -> 
 def drained(
     arms: int = 4, *, density: float = 350.0, demand_time: float = 300.0, **options: Any
 ) -> SmallScenario:
-    """A small scenario that lasts until any controller that serves at all has served everyone."""
+    """A small scenario that leaves any working controller the time to serve every vehicle."""
     number("demand_time [s]", demand_time, above=0, high=1e6)
     vehicles = arms * density * demand_time / 3600.0
     drain = SECONDS_PER_ROAD + SECONDS_PER_VEHICLE * vehicles
@@ -150,8 +143,8 @@ def check_controller(
 
     A controller is a recipe: it compares, hashes, prints and pickles as a value does, and runs
     leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
-    same trips, also from a pickled copy and whatever was run in between. Nobody collides, and
-    after the demand has ended everyone is served.
+    same trips, also from a pickled copy and after any other runs. No vehicles collide, and
+    all are served after the demand has ended.
 
     Args:
         controller: to check.
@@ -159,7 +152,7 @@ def check_controller(
         density: mean inflow a lane [veh/h].
         horizon: how long the demand lasts [s].
         collision_free: whether collisions break the contract.
-        host: who moves the vehicles: "minisim", "sumo" (extra `sumo`), or a function that is
+        host: what moves the vehicles: "minisim", "sumo" (extra `sumo`), or a function that is
             called as `minisim.simulate` is.
 
     Raises:
@@ -234,7 +227,7 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
 
 
 class _Watched:
-    """A controller whose sessions' answers are checked on the way to the host."""
+    """A controller, with a check of its sessions' answers on the way to the host."""
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
@@ -273,7 +266,7 @@ class _WatchedSession:
 
 
 class _Disturbed:
-    """A controller in the middle of whose run another seed is run."""
+    """A controller, with a run of another seed in the middle of each of its runs."""
 
     def __init__(self, controller: Controller, scenario: SmallScenario, run: Simulate) -> None:
         self._controller, self._scenario, self._run = controller, scenario, run

@@ -1,17 +1,67 @@
-"""Vehicle types: size and car-following parameters."""
+"""Vehicle types: size and car-following parameters; and the table of car-following models."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
-from minisim.errors import InputError, choice, number
-
-#: Car-following laws; their order is that of `minisim.engine.state.IDM` and its siblings.
-MODELS = ("idm", "iidm", "krauss", "cc")
+from minisim.errors import InputError
+from minisim.parameters import declared, real, word
 
 
-@dataclass(frozen=True, kw_only=True)
+class Model(NamedTuple):
+    """A car-following model. Its equations are in `minisim.carfollowing`.
+
+    `minisim.engine.laws` says how a run applies them.
+
+    Attributes:
+        meaning: in a few words.
+        braking: what it asks of the brakes in front of a standing obstacle [m/s²], given the
+            vehicle's acceleration and comfortable deceleration.
+        stepwise: whether it speaks of the next speed, at which a vehicle drives the whole step
+            (`minisim.carfollowing.semi_implicit`); otherwise the step is ballistic.
+        margin: a vehicle is inserted this far past its own length, and has arrived this far
+            before the end of the road [m].
+        sumo: SUMO's model of the same law; empty where it has none.
+        stand_ins: SUMO's models of other laws that can drive such vehicles.
+    """
+
+    meaning: str
+    braking: Callable[[float, float], float]
+    stepwise: bool = False
+    margin: float = 0.0
+    sumo: str = ""
+    stand_ins: tuple[str, ...] = ("Krauss",)
+
+
+def _idm_braking(a: float, b: float) -> float:
+    """What the IDM asks of the brakes, and a quarter more [m/s²].
+
+    It brakes at k²/b where k = v²/2s is just enough, and its free-road term takes up to a away
+    again: k²/b − a = k at k = (b + √(b² + 4ab))/2.
+    """
+    return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
+
+
+#: Every car-following model by its name. The order gives the models their numbers in the kernel.
+MODELS: Mapping[str, Model] = {
+    "idm": Model("the IDM", _idm_braking, sumo="IDM"),
+    "iidm": Model("the improved IDM, which keeps the gap s0 + vT at any speed", _idm_braking),
+    # Its safe speed leaves room for braking at b, so it never brakes harder.
+    "krauss": Model(
+        "SUMO's default law without its random part", lambda _, b: b, stepwise=True, sumo="Krauss"
+    ),
+    # A cruise control brakes as hard as the vehicle can. The margin is SUMO's `POSITION_EPS`: it
+    # inserts a vehicle there by `departPos="base"`, the position of the published runs.
+    "cc": Model(
+        "cruise control, only for a `CruiseVehicle`",
+        lambda *_: 0.0, stepwise=True, margin=0.1, sumo="CC", stand_ins=(),
+    ),
+}  # fmt: skip
+
+
+@declared(kw_only=True)
 class VehicleType:
     """Size and car-following parameters of a kind of vehicle (SI units).
 
@@ -19,113 +69,104 @@ class VehicleType:
     width 1.8, minGap 2.5, accel 2.6, decel 4.5, tau 1.0, emergencyDecel 9), so that runs
     compare with SUMO. The exponent is Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
 
-    Attributes:
-        length: bumper to bumper [m].
-        width: [m].
-        acceleration: the IDM's a, Krauß's acceleration [m/s²].
-        deceleration: comfortable braking, the IDM's b [m/s²]. Krauß's law brakes at b whenever
-            it brakes for something foreseen, and takes it that leaders do.
-        headway: time headway T [s]; at least 0.5, the longest step there is: below it the law
-            cannot react in time (Treiber, Kanagaraj 2015 on dt and T).
-        min_gap: bumper gap at standstill s0 [m]; at least 0.5.
-        exponent: free-road exponent δ; Krauß's law has none.
-        max_deceleration: what the brakes can do at most [m/s²]; at least `needed_braking`. Even
-            so weak brakes at high speed can be too weak for a leader that stops: the law then
-            collides, and the run reports it.
-        speed_deviation: standard deviation of each driver's factor on the speed limit (mean 1,
-            cut to 0.2 … 2 as SUMO's speedFactor); 0 makes all drivers alike.
-        model: "idm", "iidm" (improved IDM: keeps the gap s0 + vT up to the desired speed) or
-            "krauss" (SUMO's default law, without its random part); "cc" is an `EngineVehicle`.
+    The headway has a lower bound because a law cannot react within less than the longest step
+    (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
+    (`needed_braking`). Even so they can be too weak for a leader that stops at high speed: the
+    vehicles then collide, and the run reports it.
     """
 
-    length: float = 5.0
-    width: float = 1.8
-    acceleration: float = 2.6
-    deceleration: float = 4.5
-    headway: float = 1.0
-    min_gap: float = 2.5
-    exponent: float = 4.0
-    max_deceleration: float = 9.0
-    speed_deviation: float = 0.0
-    model: str = "idm"
+    length: float = real("bumper to bumper", "m", default=5.0, low=0.5, high=30, label="vehicle length")  # fmt: skip # noqa: E501
+    width: float = real("of the body", "m", default=1.8, low=0.3, high=4, label="vehicle width")
+    acceleration: float = real(
+        "the IDM's a, Krauß's acceleration", "m/s²", default=2.6, above=0, high=100
+    )
+    deceleration: float = real(
+        "comfortable braking, the IDM's b; Krauß's law never brakes harder and expects the same of "
+        "leaders",
+        "m/s²", default=4.5, above=0, high=1000,
+    )  # fmt: skip
+    headway: float = real("time headway T", "s", default=1.0, low=0.5, high=10)
+    min_gap: float = real("bumper gap at standstill s0", "m", default=2.5, low=0.5, high=20)
+    exponent: float = real(
+        "free-road exponent δ; Krauß's law has none", default=4.0, low=1, high=50
+    )
+    max_deceleration: float = real(
+        "what the brakes can do at most", "m/s²", default=9.0, low=0, high=1000
+    )
+    # SUMO's speedFactor is cut to the same range.
+    speed_deviation: float = real(
+        "standard deviation of each driver's factor on the speed limit (mean 1, cut to 0.2 … 2); "
+        "0 makes all drivers alike",
+        default=0.0, low=0, high=0.5,
+    )  # fmt: skip
+    model: str = word(
+        f"car following: {'; '.join(f'{name}, {it.meaning}' for name, it in MODELS.items())}",
+        tuple(MODELS), default="idm", label="car-following model",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        number("vehicle length [m]", self.length, low=0.5, high=30)
-        number("vehicle width [m]", self.width, low=0.3, high=4)
-        number("acceleration [m/s²]", self.acceleration, above=0, high=100)
-        number("deceleration [m/s²]", self.deceleration, above=0, high=1000)
-        number("headway [s]", self.headway, low=0.5, high=10)
-        number("min_gap [m]", self.min_gap, low=0.5, high=20)
-        number("exponent", self.exponent, low=1, high=50)
-        number("max_deceleration [m/s²]", self.max_deceleration, low=0, high=1000)
-        if self.model != "cc" and self.max_deceleration < self.needed_braking:
+        if self.model == "cc" and not isinstance(self, CruiseVehicle):
+            raise InputError("the car-following model 'cc' goes with a CruiseVehicle")
+        if self.max_deceleration < self.needed_braking:
             raise InputError(
                 f"max_deceleration must be at least {self.needed_braking:.2f} m/s², got "
                 f"{self.max_deceleration!r}: with acceleration {self.acceleration:g} and "
                 f"deceleration {self.deceleration:g} the car-following law itself brakes that hard"
             )
-        number("speed_deviation", self.speed_deviation, low=0, high=0.5)
-        choice("car-following model", self.model, MODELS)
-        if self.model == "cc" and not isinstance(self, EngineVehicle):
-            raise InputError("the car-following model 'cc' goes with an EngineVehicle")
 
     @property
     def needed_braking(self) -> float:
-        """What the law asks of the brakes in front of a standing obstacle, and a quarter more.
+        """What the model asks of the brakes in front of a standing obstacle [m/s²]."""
+        return MODELS[self.model].braking(self.acceleration, self.deceleration)
 
-        The IDM brakes at k²/b where k = v²/2s is just enough, and its free-road term takes up to
-        a away again: k²/b − a = k at k = (b + √(b² + 4ab))/2 [m/s²]. Krauß's law brakes at b and
-        not harder: its safe speed leaves room for that, so that is all it needs.
-        """
-        a, b = self.acceleration, self.deceleration
-        if self.model == "krauss":
-            return b
-        return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
+    def top_speed(self, limit: float) -> float:
+        """No vehicle of this type is faster where the speed limit is `limit` [m/s]."""
+        return 2.0 * limit
 
 
-@dataclass(frozen=True, kw_only=True)
-class EngineVehicle(VehicleType):
+@declared(kw_only=True)
+class CruiseVehicle(VehicleType):
     """A vehicle under cruise control with an engine that lags: SUMO's car-following model `CC`.
 
     It ignores speed limits: it drives at `cruise_speed` until a controller advises another
     speed. Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`.
     The defaults are those of SUMO's model (`MSCFModel_CC`, from Plexe) where the authors' vehicle
     type does not override them; headway and spacing of the base class are the ACC's.
-
-    Attributes:
-        cruise_speed: desired speed until advised otherwise (SUMO's `ccDesiredSpeed`) [m/s].
-        cruise_gain: the cruise control's gain (`ccKp`) [1/s].
-        cruise_acceleration: its largest acceleration (`ccAccel`) [m/s²].
-        cruise_deceleration: its strongest braking (`ccDecel`) [m/s²].
-        spacing_gain: the ACC's gain on the spacing error (`lambda`) [1/s].
-        spacing: what the ACC keeps beyond headway and `min_gap`, fixed in SUMO's code [m].
-        lag: time constant of the engine (`tauEngine`) [s].
-        engine_acceleration: the most it can do (`accel`) [m/s²].
-        radar: how far it sees the vehicle ahead, fixed in SUMO's code [m].
     """
 
-    cruise_speed: float = 14.0
-    cruise_gain: float = 1.0
-    cruise_acceleration: float = 1.5
-    cruise_deceleration: float = 1.5
-    spacing_gain: float = 0.1
-    spacing: float = 2.0
-    lag: float = 0.5
-    engine_acceleration: float = 50.0
-    radar: float = 250.0
-    headway: float = 1.5
-    model: str = "cc"
+    cruise_speed: float = real(
+        "desired speed until advised otherwise (SUMO's ccDesiredSpeed)", "m/s",
+        default=14.0, low=0, high=100,
+    )  # fmt: skip
+    cruise_gain: float = real(
+        "the cruise control's gain (ccKp)", "1/s", default=1.0, above=0, high=100
+    )
+    cruise_acceleration: float = real(
+        "its largest acceleration (ccAccel)", "m/s²", default=1.5, above=0, high=100
+    )
+    cruise_deceleration: float = real(
+        "its strongest braking (ccDecel)", "m/s²", default=1.5, above=0, high=100
+    )
+    spacing_gain: float = real(
+        "the ACC's gain on the spacing error (lambda)", "1/s", default=0.1, above=0, high=100
+    )
+    spacing: float = real(
+        "what the ACC keeps beyond headway and min_gap, fixed in SUMO's code", "m",
+        default=2.0, low=0, high=100,
+    )  # fmt: skip
+    lag: float = real("time constant of the engine (tauEngine)", "s", default=0.5, low=0, high=10)
+    engine_acceleration: float = real(
+        "the most that the engine can do (accel)", "m/s²", default=50.0, above=0, high=1000
+    )
+    radar: float = real(
+        "how far it sees the vehicle ahead, fixed in SUMO's code", "m",
+        default=250.0, above=0, high=10_000,
+    )  # fmt: skip
+    headway: float = real("the ACC's time headway", "s", default=1.5, low=0.5, high=10)
+    model: str = word(
+        MODELS["cc"].meaning, ("cc",), default="cc", label="car-following model of a CruiseVehicle"
+    )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        choice("car-following model of an EngineVehicle", self.model, ("cc",))
-        number("cruise_speed [m/s]", self.cruise_speed, low=0, high=100)
-        number("cruise_gain [1/s]", self.cruise_gain, above=0, high=100)
-        number("cruise_acceleration [m/s²]", self.cruise_acceleration, above=0, high=100)
-        number("cruise_deceleration [m/s²]", self.cruise_deceleration, above=0, high=100)
-        number("spacing_gain [1/s]", self.spacing_gain, above=0, high=100)
-        number("spacing [m]", self.spacing, low=0, high=100)
-        number("lag [s]", self.lag, low=0, high=10)
-        number("engine_acceleration [m/s²]", self.engine_acceleration, above=0, high=1000)
-        number("radar [m]", self.radar, above=0, high=10_000)
-        number("headway [s]", self.headway, above=0, high=10)
+    def top_speed(self, limit: float) -> float:
+        """As of any vehicle; the cruise speed may be higher."""
+        return max(super().top_speed(limit), self.cruise_speed)

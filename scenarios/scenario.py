@@ -9,7 +9,7 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
 from minisim.errors import InputError, choice, instance, number, show
 from minisim.junction.geometry import Intersection
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 
 KMH = 1.0 / 3.6
 
@@ -61,7 +61,7 @@ FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 #: has none of: the strongest braking that the cruise control itself asks for.
 AS_RUN = Profile(
     name="as_run",
-    vehicle=EngineVehicle(
+    vehicle=CruiseVehicle(
         length=4.0,
         min_gap=2.0,
         acceleration=4.0,

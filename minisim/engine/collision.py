@@ -1,4 +1,4 @@
-"""Collisions: which bodies overlap, decided by pymunk, and what is reported of it."""
+"""Collisions: pymunk decides which bodies overlap, and `Collision` reports it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Collision(NamedTuple):
     Attributes:
         time: [s].
         vehicles: their ids (rows of the trip table), the smaller one first.
-        movements: what they were driving, such as ("a2", "c3").
+        movements: of both, such as ("a2", "c3").
         positions: front bumpers, from the road entry [m].
         speeds: [m/s].
     """
@@ -38,13 +38,13 @@ class Collision(NamedTuple):
     speeds: tuple[float, float]
 
     def __str__(self) -> str:
-        who = " and ".join(
+        both = " and ".join(
             f"vehicle {v} ({m}, at {s:.1f} m, {speed:.1f} m/s)"
             for v, m, s, speed in zip(
                 self.vehicles, self.movements, self.positions, self.speeds, strict=True
             )
         )
-        return f"at {self.time:.1f} s {who} touched"
+        return f"at {self.time:.1f} s {both} touched"
 
 
 def touching(bodies: Sequence[Body]) -> list[tuple[int, int]]:
@@ -54,7 +54,7 @@ def touching(bodies: Sequence[Body]) -> list[tuple[int, int]]:
     pairs = set()
     for j, body in enumerate(bodies):
         carrier, shape = _rectangle(body)
-        # Asked before it is added, the space answers with the earlier bodies only.
+        # The query comes before the body is added, so it finds earlier bodies only.
         pairs |= {(index[hit.shape], j) for hit in space.shape_query(shape) if hit.shape}
         space.add(carrier, shape)
         index[shape] = j

@@ -1,8 +1,8 @@
 """The arrays that a run consists of.
 
 Vehicles are one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-simply the row before. Lanes are another. What never changes in a run is in `Road` and `Law`. Few
-arguments keep a call into the compiled kernel cheap: unboxing arrays is most of its cost.
+simply the row before. Lanes are another. What never changes during a run is in `Road` and `Law`.
+Few arguments keep a call into the compiled kernel cheap: unboxing arrays is most of its cost.
 """
 
 from __future__ import annotations
@@ -17,20 +17,16 @@ from minisim.arrivals import Arrivals
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
 from minisim.errors import InputError
 from minisim.junction.geometry import Path
-from minisim.junction.meetings import meetings, sagittas
 from minisim.streams import stream
-from minisim.vehicle import MODELS, EngineVehicle, VehicleType
+from minisim.vehicle import MODELS
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
-#: A held vehicle aims at this distance before its hold line [m]: stopping up to 0.3 m before it
-#: is allowed, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
+#: A held vehicle aims at this distance before its hold line [m]. It may stop up to 0.3 m before the
+#: line, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
 STOP_MARGIN = 0.25
-
-#: Values of `Law.model`.
-IDM, IIDM, KRAUSS, CC = range(len(MODELS))
 
 #: Values of the field `status`.
 WAITING, DRIVING, ARRIVED = 0, 1, 2
@@ -53,8 +49,6 @@ VEHICLE = np.dtype(
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
         ("brake", np.float64),  # cap on its acceleration [m/s²]: negative, or infinite
-        ("entered", np.int64),  # tick of entering the junction (engine only)
-        ("stopping", np.int64),  # advised to stand in the step before (engine only)
         ("depart_tick", np.int64),
         ("arrival_tick", np.int64),
         ("waiting_ticks", np.int64),
@@ -71,7 +65,6 @@ LANE = np.dtype(
         ("uncleared", np.int64),  # first row not yet clear of the junction
         ("open", np.int64),
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
-        ("tail", np.int64),  # last row that entered the exit lane of this arm (engine only)
     ]
 )
 
@@ -123,28 +116,6 @@ class Road(NamedTuple):
     marks: Floats
 
 
-class Engine(NamedTuple):
-    """What a run of `minisim.vehicle.EngineVehicle` needs beside `Law` (SI units).
-
-    Attributes:
-        meetings: (p, p, 2), see `minisim.junction.meetings.meetings`.
-        waits: (p, 2): waiting position past the junction entry, sagitta [m].
-    """
-
-    cruise_speed: float
-    cruise_gain: float
-    a: float
-    b: float
-    headway: float
-    spacing_gain: float
-    spacing: float
-    lag: float
-    a_max: float
-    radar: float
-    meetings: Floats
-    waits: Floats
-
-
 class Law(NamedTuple):
     """The scalars of a run: car following, lines and switches (SI units)."""
 
@@ -155,14 +126,14 @@ class Law(NamedTuple):
     headway: float
     min_gap: float
     delta: float
-    model: int  # car-following law, `IDM` and its siblings
+    model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
     semi_implicit: bool  # how positions follow from speeds: by `semi_implicit`, or ballistic
     length: float
     width: float
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
     leave: float  # s until which a vehicle stays in view at least
-    slack: float  # inserted so far past its length, arrived so far before the end of the road
+    margin: float  # see `minisim.vehicle.Model`
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # negative: the highest safe one
     wake_on_clear: bool
@@ -240,14 +211,14 @@ def build_law(
         headway=vehicle.headway,
         min_gap=vehicle.min_gap,
         delta=vehicle.exponent,
-        model=MODELS.index(vehicle.model),
-        semi_implicit=vehicle.model in ("krauss", "cc"),
+        model=list(MODELS).index(vehicle.model),
+        semi_implicit=MODELS[vehicle.model].stepwise,
         length=vehicle.length,
         width=vehicle.width,
         entry=entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        slack=insertion_slack(vehicle),
+        margin=MODELS[vehicle.model].margin,
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -256,38 +227,6 @@ def build_law(
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )
-
-
-def build_engine(site: Site) -> Engine | None:
-    """Collect what vehicles with an engine need; None where they have none."""
-    vehicle, intersection = site.vehicle, site.intersection
-    if not isinstance(vehicle, EngineVehicle):
-        return None
-    waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
-    return Engine(
-        cruise_speed=vehicle.cruise_speed,
-        cruise_gain=vehicle.cruise_gain,
-        a=vehicle.cruise_acceleration,
-        b=vehicle.cruise_deceleration,
-        headway=vehicle.headway,
-        spacing_gain=vehicle.spacing_gain,
-        spacing=vehicle.spacing,
-        lag=vehicle.lag,
-        a_max=vehicle.engine_acceleration,
-        radar=vehicle.radar,
-        meetings=meetings(intersection),
-        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
-    )
-
-
-#: SUMO's `POSITION_EPS` [m]: by `departPos="base"` it inserts a vehicle this far past its length,
-#: and counts it as arrived this far before the end of the road.
-POSITION_EPS = 0.1
-
-
-def insertion_slack(vehicle: VehicleType) -> float:
-    """How far past its length a vehicle is inserted, and how far before the road's end it ends."""
-    return POSITION_EPS if isinstance(vehicle, EngineVehicle) else 0.0
 
 
 #: Reach of a recording of the junction alone, before its entry and past its exit [m].
@@ -300,6 +239,11 @@ NEVER = 2**62
 def first_tick(time: float, dt: float) -> int:
     """First tick at or after `time` [s]."""
     return NEVER if time / dt >= NEVER else math.ceil(time / dt - 1e-6)
+
+
+def time_of(tick: int, dt: float) -> float:
+    """Simulated time at a tick [s], free of rounding."""
+    return round(tick * dt, 6)
 
 
 def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
@@ -337,5 +281,4 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
     lanes["last"] = -1
-    lanes["tail"] = -1
     return lanes

@@ -10,13 +10,14 @@ import numpy as np
 
 from minisim.arrivals import Arrivals
 from minisim.control import Site
-from minisim.engine.state import Records, insertion_slack
+from minisim.engine.state import Records
 from minisim.errors import SumoError
 from minisim.junction.geometry import ARM_NAMES
 from minisim.results.trips import Trips
+from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.vehicle import EngineVehicle
+from minisim.vehicle import MODELS, CruiseVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
 TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
@@ -34,26 +35,15 @@ def write_configuration(folder: Path, job: Job, seed: int, fcd: bool) -> None:
     write_xml(folder / CONFIGURATION, "configuration", _options(job, seed, fcd))
 
 
-def top_speed(site: Site) -> float:
-    """No vehicle is faster [m/s]: the fastest driver's, or the cruise speed."""
-    cruise = site.vehicle.cruise_speed if isinstance(site.vehicle, EngineVehicle) else 0.0
-    return max(2.0 * site.speed_limit, cruise)
-
-
 def _vehicle_type(site: Site, model: str) -> dict[str, object]:
     kind = site.vehicle
     common: dict[str, object] = {
         "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
         "minGap": kind.min_gap, "emergencyDecel": kind.max_deceleration,
-        "maxSpeed": top_speed(site), "speedFactor": 1, "speedDev": 0,
+        "maxSpeed": kind.top_speed(site.speed_limit), "speedFactor": 1, "speedDev": 0,
     }  # fmt: skip
-    if isinstance(kind, EngineVehicle):
-        return common | {
-            "accel": kind.engine_acceleration, "decel": kind.max_deceleration,
-            "ccAccel": kind.cruise_acceleration, "ccDecel": kind.cruise_deceleration,
-            "kp": kind.cruise_gain, "lambda": kind.spacing_gain, "tauEngine": kind.lag,
-            "lanesCount": 1,
-        }  # fmt: skip
+    if isinstance(kind, CruiseVehicle):
+        return common | attributes(kind)
     own = {"delta": kind.exponent} if model == "IDM" else {"sigma": 0}
     return common | {
         "accel": kind.acceleration, "decel": kind.deceleration, "tau": kind.headway, **own,
@@ -74,7 +64,7 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
                 "type": "car",
                 "route": movements[vehicles["path"][i]],
                 "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": site.vehicle.length + insertion_slack(site.vehicle),
+                "departPos": site.vehicle.length + MODELS[site.vehicle.model].margin,
                 "departSpeed": "max" if depart_speed is None else depart_speed,
                 "speedFactor": f"{vehicles['factor'][i]:.9f}",
             },
@@ -99,7 +89,8 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
         "duration-log.disable": "true",
     }
     if not job.teleport:
-        # Nobody is taken off the road, for waiting or for a collision; "none" would look for none.
+        # No vehicle is taken off the road, for waiting or for a collision. The action "none" would
+        # not even look for collisions.
         options |= {
             "time-to-teleport": -1,
             "collision.action": "warn",
@@ -121,19 +112,19 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
         SumoError: there are no trips, or not those of the arrivals.
     """
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
-    # SUMO does not tell of those who want to come when the run is over.
+    # SUMO does not report vehicles that want to enter when the run is over.
     values[arrivals.time > end - 1.5 * job.law.dt] = -1.0, -1.0, 0.0
     try:
         for trip in ET.parse(folder / TRIPS).getroot().iter("tripinfo"):
             values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
     except (OSError, ET.ParseError, LookupError, ValueError) as error:
         raise SumoError(f"SUMO's trips cannot be read: {error}") from error
-    # SUMO tells nothing of vehicles that would have come later.
+    # Nor those that would have come later.
     missing = np.isnan(values).any(axis=1) & (arrivals.time < end - job.law.dt)
     if missing.any():
-        raise SumoError(f"SUMO's trips do not tell of vehicle {int(missing.argmax())}")
+        raise SumoError(f"SUMO's trips lack vehicle {int(missing.argmax())}")
     depart, arrival, waiting = values.T
-    # SUMO inserts once more at the very end: a vehicle without a step is not on the road yet.
+    # SUMO still inserts at the very end. A vehicle that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
     arrived = departed & (arrival >= 0.0)
     travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)

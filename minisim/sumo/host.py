@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from minisim.control import Command, Controller, View
-from minisim.engine.state import build_engine, build_law, build_road, build_vehicles, first_tick
+from minisim.engine.kernel import build_motion
+from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
 from minisim.errors import (
     FileError,
     InputError,
@@ -45,32 +46,26 @@ from minisim.sumo.files import (
     CONFIGURATION,
     FCD,
     read_trips,
-    top_speed,
     write_configuration,
     write_routes,
 )
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import MODELS as CAR_FOLLOWING
+from minisim.vehicle import VehicleType
 
-#: SUMO's car-following models that a run may use, and the vehicles' models that go with each.
-MODELS = {"IDM": ("idm",), "Krauss": ("idm", "iidm", "krauss"), "CC": ("cc",)}
-
-#: The one that a run uses unless told otherwise, by the vehicles' model. There is none for "iidm".
-OWN_MODELS = {"idm": "IDM", "iidm": "IDM", "krauss": "Krauss", "cc": "CC"}
+#: SUMO's car-following models that a run may use.
+MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
 
 #: What may happen at a collision.
 REACTIONS = (*ON_COLLISION, "teleport")
-
-#: Spacing and radar of SUMO's CC, numbers in its code (`MSCFModel_CC`) [m].
-CC_FIXED = (2.0, 250.0)
 
 #: What the child writes on stderr.
 STDERR = "stderr.txt"
 
 INSTALL = "pip install 'minisim[sumo]'"
 
-#: What the child runs. Its messages have to come from the module, not from `__main__`.
+#: What the child runs. The classes of its messages must belong to the module, not to `__main__`.
 CHILD = "from minisim.sumo.worker import main; main()"
 
 #: Called with the steps done and all steps.
@@ -98,20 +93,20 @@ def simulate(
 
     Args:
         scenario: what to simulate.
-        controller: who decides; its session runs here, in the caller's process.
+        controller: what decides; its session runs here, in the caller's process.
         seed: of the arrivals and of SUMO.
         model: SUMO's car-following model: "IDM", "Krauss" (without its random part), or "CC" for
-            an `EngineVehicle`. By default the vehicle's own (`OWN_MODELS`).
+            a `CruiseVehicle`. By default SUMO's model of the vehicles' own law.
         record: None, "junction" or "all": keep trajectories. Their x and y are positions on
             minisim's paths, which SUMO's network repeats.
         record_window: from and to [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
-            "teleport" is what SUMO does by default, and did in the published runs: whoever runs
-            into a vehicle ahead, or waits for 300 s, is put on the next road, or has arrived where
-            there is none; touching inside the junction does not count.
+            "teleport" is what SUMO does by default, and did in the published runs: a vehicle that
+            runs into the one ahead, or waits for 300 s, is put on the next road, or has arrived
+            where there is none; touching inside the junction does not count.
         keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
-            and its trips; by default they are temporary. They stay also when the run fails, and
-            what is raised has a note that names the folder.
+            and its trips; by default they are temporary. They also stay when the run fails, and
+            the exception has a note that names the folder.
         fcd: file for the floating-car data of every step that SUMO itself writes, made when the
             run has ended well.
         gui: show it in sumo-gui.
@@ -120,7 +115,7 @@ def simulate(
     Raises:
         MissingExtraError: SUMO is not installed.
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
-        SumoError: SUMO refused or died; the message tells why as far as it is known.
+        SumoError: SUMO refused or died; the message says why, as far as that is known.
         CollisionError: two bodies touched, unless collisions are only recorded.
         ControllerError: the controller broke its contract.
     """
@@ -151,7 +146,7 @@ class _Request:
     until: float = math.inf
 
     def replay(self, time: float, seconds: float = 10.0) -> Run:
-        """Run again up to a little after `time`; records the last `seconds` before it."""
+        """Run again until shortly after `time`; record the last `seconds` before it."""
         again = replace(
             self, record="all", record_window=(max(0.0, time - seconds), math.inf),
             on_collision="record", keep_files=None, fcd=None, gui=False, progress=None,
@@ -260,8 +255,8 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         record_window=checked_window(request.record_window),
     )
     vehicles = build_vehicles(site, arrivals)
-    network = build_network(site.intersection, site.speed_limit, folder, home)
     write_routes(folder, site, vehicles, model, depart_speed)
+    network = build_network(site.intersection, site.speed_limit, folder, home)
     job = Job(
         command=_command(request.gui),
         folder=str(folder),
@@ -270,8 +265,8 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         plan=plan,
         road=build_road(site, plan),
         law=law,
-        engine=build_engine(site),
-        top_speed=top_speed(site),
+        motion=build_motion(site, vehicles),
+        top_speed=site.vehicle.top_speed(site.speed_limit),
         network=network,
         vehicles=vehicles,
         lanes=site.intersection.n,
@@ -285,28 +280,27 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
-    """SUMO's model for the vehicles; raises `InputError` where it does not fit them."""
-    model = asked or OWN_MODELS[vehicle.model]
-    if vehicle.model not in MODELS[model]:
-        fitting = [name for name, models in MODELS.items() if vehicle.model in models]
-        raise InputError(
-            f"SUMO's model {model} does not drive vehicles of the model {vehicle.model!r}; "
-            f"choose {' or '.join(fitting)}, or {_vehicle_for(model)}"
-        )
-    if isinstance(vehicle, EngineVehicle) and (vehicle.spacing, vehicle.radar) != CC_FIXED:
-        spacing, radar = CC_FIXED
-        raise InputError(
-            f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
-            f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
-        )
-    return model
+    """SUMO's model that is to drive the vehicles; raises `InputError` where it cannot."""
+    own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
+    fitting = [model for model in MODELS if model == own or model in stand_ins]
+    model = own if asked is None else asked
+    if model in fitting:
+        return model
+    choose = f"choose {' or '.join(fitting)}"
+    if asked is None:
+        raise InputError(f"SUMO has no model of the law {vehicle.model!r}; {choose}")
+    raise InputError(
+        f"SUMO's model {model} does not drive vehicles of the model {vehicle.model!r}; "
+        f"{choose}, or {_vehicle_for(model)}"
+    )
 
 
-def _vehicle_for(model: str) -> str:
+def _vehicle_for(asked: str) -> str:
     """What to change about the vehicle for one of SUMO's models to drive it."""
-    if model == "CC":
-        return "an EngineVehicle: use --profile as_run"
-    return f"a vehicle of the model {' or '.join(map(repr, MODELS[model]))}"
+    if asked == "CC":
+        return "a CruiseVehicle: use --profile as_run"
+    models = [name for name, it in CAR_FOLLOWING.items() if asked in (it.sumo, *it.stand_ins)]
+    return f"a vehicle of the model {' or '.join(map(repr, models))}"
 
 
 def _command(gui: bool) -> tuple[str, ...]:
@@ -322,7 +316,7 @@ def _session(request: _Request, beginning: Beginning, job: Job) -> Callable[[Ask
     def answer(asked: Asked) -> list[Command]:
         if request.progress is not None:
             request.progress(asked.tick, job.horizon)
-        view = View(round(asked.tick * dt, 6), asked.vehicles)
+        view = View(time_of(asked.tick, dt), asked.vehicles)
         return ask(
             beginning.session, view, asked.tick,
             controller=request.controller, site=beginning.site, vehicles=len(job.vehicles),
@@ -400,7 +394,7 @@ def _cause(code: int) -> str:
 
 
 def _last_words(complaints: IO[bytes]) -> str:
-    """The end of what it wrote, in one line."""
+    """The last lines that it wrote, as one line."""
     complaints.seek(0)
     lines = complaints.read().decode(errors="replace").split("\n")
     words = "; ".join(line.strip() for line in lines[-8:] if line.strip())

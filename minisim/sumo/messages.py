@@ -1,4 +1,4 @@
-"""What the caller's process and the one that runs libsumo tell each other."""
+"""The messages between the caller's process and the one that runs libsumo."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
-from minisim.engine.state import Engine, Law, Records, Road
+from minisim.engine.kernel import Motion
+from minisim.engine.state import Law, Records, Road
 from minisim.junction.geometry import Movement
 from minisim.sumo.network import Network
 
@@ -21,7 +22,7 @@ class Job(NamedTuple):
         model: car-following model, one of `minisim.sumo.MODELS`.
         plan: of the session.
         road, law: of the run, with its limits, marks and lines.
-        engine: of the vehicles, where they have one (model "CC").
+        motion: as `minisim.engine.kernel.build_motion` has it.
         top_speed: no vehicle is faster [m/s].
         network: lengths in SUMO.
         vehicles: as `minisim.engine.state.build_vehicles` has them.
@@ -39,7 +40,7 @@ class Job(NamedTuple):
     plan: Plan
     road: Road
     law: Law
-    engine: Engine | None
+    motion: Motion | None
     top_speed: float
     network: Network
     vehicles: Records
@@ -51,7 +52,7 @@ class Job(NamedTuple):
 
 
 class Started(NamedTuple):
-    """SUMO runs; `version` is its own."""
+    """SUMO runs, in this version."""
 
     version: str
 
@@ -68,7 +69,7 @@ class Ended(NamedTuple):
 
     Attributes:
         tick: reached.
-        done: whether everybody has arrived.
+        done: whether all vehicles have arrived.
         collisions: each pair of vehicles once.
         time_loss: of every vehicle [s], by id.
         trace: what was recorded.
@@ -82,6 +83,6 @@ class Ended(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """SUMO refused, with its own words."""
+    """SUMO refused; the reason is in its own words."""
 
     reason: str

@@ -2,12 +2,12 @@
 
 netconvert would cut the roads and bend the turns by its own rules. Given the shape of the
 junction and of every turn, it takes ours: entries, exits and arcs lie where minisim has them. What
-is left is read back (`Network`), so a position in SUMO is exact in `s` whatever netconvert did.
+is left is read back (`Network`), so a position in SUMO is exact in `s` in any case.
 
 A junction whose ways are netconvert's own (`Intersection.ways`: those of the published runs) is
 left to netconvert, with its waiting positions and its right of way; the lengths must come out as
-the ways have them. Between equal roads rounding decides which has priority and who waits inside,
-so coordinates begin at the lower left corner there, as netconvert has them by default.
+the ways have them. Between equal roads, rounding decides which has priority and which vehicles wait
+inside. So coordinates begin at the lower left corner there, which is netconvert's default.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def build_network(
 ) -> Network:
     """Write the network into `folder`.
 
-    Nobody has to give way on one with our arcs: a hosted controller is the only rule (`pass`, and
-    no place to wait inside the junction). Turns have the road's speed limit, since the host slows
+    With our arcs no vehicle has to give way: a hosted controller is the only rule (`pass`, and no
+    place to wait inside the junction). Turns have the road's speed limit, since the host slows
     vehicles for them.
 
     Args:
@@ -86,8 +86,8 @@ def build_network(
 def _as_given(intersection: Intersection, network: Network) -> Network:
     """The lengths of the intersection, which netconvert's are but for its rounding.
 
-    One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance. Where
-    vehicles are is told by what they have driven since their insertion, so that does not add up.
+    One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance.
+    Positions follow from what vehicles have driven since their insertion, so errors do not add up.
 
     Raises:
         SumoError: netconvert draws other lengths.
@@ -125,7 +125,7 @@ def run_tool(command: list[str], folder: Path, home: Path) -> None:
 
 
 def sumo_environment(home: Path) -> dict[str, str]:
-    """The environment of SUMO's processes; only they get to see its folder."""
+    """The environment of SUMO's processes; no other process sees its folder."""
     return {**os.environ, "SUMO_HOME": str(home)}
 
 

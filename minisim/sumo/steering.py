@@ -1,12 +1,11 @@
 """How vehicles in SUMO are told what the road ahead and the controller ask of them.
 
 `Follower` steers SUMO's IDM and Krauss. What a held vehicle, a marking or a turn asks for is
-computed by minisim's own kernel functions and told to SUMO as a speed: a desired one
-(`setMaxSpeed`) where a lower limit holds, a commanded one (`setSpeed`) while a vehicle has to
+computed by minisim's own functions (`minisim.engine.laws`) and told to SUMO as a speed: a desired
+one (`setMaxSpeed`) where a lower limit holds, a commanded one (`setSpeed`) while a vehicle has to
 brake for what is ahead. SUMO still drives slower than that behind a leader.
 
-`Cruiser` steers SUMO's `CC`, the model of `minisim.vehicle.EngineVehicle`. It obeys no limit and
-no marking: it is told the advised speed, and a hold line only while that asks for more braking.
+`minisim.sumo.cruising` steers SUMO's `CC`.
 """
 
 from __future__ import annotations
@@ -15,29 +14,20 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
-from minisim.carfollowing import cruise_control
-from minisim.engine import kernel
-from minisim.engine.cruise import follow, realise
-from minisim.engine.state import STOP_MARGIN, Engine, Law, Records
+from minisim.engine import laws
+from minisim.engine.state import STOP_MARGIN, Law, Records
 from minisim.junction.geometry import Movement
 from minisim.sumo.messages import Job
 
 #: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
 #: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
-#: junction it follows whoever comes from the same lane or leaves by the same. That also makes it
-#: yield to whoever crosses, where the controller alone is to say who goes: so it ignores all in
-#: the junction (32) as long as somebody drives there who neither shares lane nor exit. Whom it
-#: would follow there, into the same exit, it is then told to follow by minisim's law.
+#: junction a vehicle follows those that come from its lane or leave by its exit. In this mode it
+#: also yields to those that cross, although the controller alone decides which vehicle goes. So it
+#: ignores all vehicles in the junction (32) as long as one of them shares neither lane nor exit
+#: with it. The one that it would follow into its exit it then follows by minisim's law.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
-#: The published runs' speed mode: nothing but the model. With a safe gap (1) SUMO would cut what
-#: the engine does by what its controller asks for, and with that the lag.
-CRUISING = 0
-
-#: SUMO's number of the controller that is a cruise control with ACC (`Plexe::ACC`).
-ACC = 1
-
-#: SUMO knows no desired speed of zero [m/s]; a vehicle told to stop is commanded to.
+#: SUMO knows no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
 LEAST_SPEED = 0.01
 
 
@@ -45,10 +35,10 @@ class Car:
     """A vehicle; `minisim.engine.state.VEHICLE` explains the values.
 
     Attributes:
-        brake: how hard it was told to brake at least [m/s²]; 0 where it was not.
+        brake: how hard it has to brake at least [m/s²]; 0 without such a command.
         present: whether it is on the road.
-        seen: tick at which it was looked at last.
-        lost_ticks: as there; between two looks that are more than a step apart it is the time
+        seen: tick of the last look at it.
+        lost_ticks: as there. Between two looks that are more than a step apart it is the time
             beyond what the distance takes at the limit.
     """
 
@@ -70,7 +60,7 @@ class Car:
         self.section = self.mark = self.seen = 0
         self.go = self.cleared = self.present = False
         self.advice = math.inf
-        self.desired = math.inf  # as SUMO was told last
+        self.desired = math.inf  # the last value that SUMO has got
         self.commanded = self.ignoring = False
 
 
@@ -100,33 +90,52 @@ class Steering(Protocol):
         """Before a step; the vehicles of each lane, front to back, up to the exit."""
 
     def release(self, car: Car) -> None:
-        """The vehicle has left the junction: nobody but SUMO steers it any more."""
+        """The vehicle has left the junction: from here on SUMO alone drives it."""
+
+
+class Speeds:
+    """The speeds that SUMO is commanded to drive vehicles at."""
+
+    def __init__(self, libsumo: Any) -> None:
+        self._vehicle = libsumo.vehicle
+
+    def command(self, car: Car, speed: float) -> None:
+        """Drive it at this speed [m/s], whatever the model says."""
+        self._vehicle.setSpeed(car.name, max(speed, 0.0))
+        car.commanded = True
+
+    def hand_back(self, car: Car) -> None:
+        """Leave it to the model again."""
+        if car.commanded:
+            self._vehicle.setSpeed(car.name, -1.0)
+            car.commanded = False
 
 
 class Follower:
-    """SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
+    """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
         self.near = -math.inf
         self._law, self._model = job.law, job.model
         self._vehicle = libsumo.vehicle
+        self._speeds = Speeds(libsumo)
         self._limits = limits(job)
         self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
         self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def load(self, cars: Iterable[Car]) -> None:
-        """Nothing: the vehicle type says it all."""
+        """Do nothing: the vehicle type says it all."""
 
     def depart(self, car: Car) -> None:
-        """Let nobody but the controller give way."""
+        """Leave all giving way to the controller."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
 
     def advise(self, car: Car) -> None:
-        """Nothing: `steer` looks at it."""
+        """Do nothing: `steer` looks at it."""
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
-        """Tell SUMO what the road ahead asks of everybody up to the exit in the next step."""
+        """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
         entry = self._law.entry
         self._inside = [car for car in self._inside if not car.cleared]
         known = {car.id for car in self._inside}
@@ -135,7 +144,7 @@ class Follower:
         ]
         inside = {car.path for car in self._inside}
         for lane in lanes:
-            foremost = True  # of those on the approach: it follows others than its lane's, too
+            foremost = True  # on the approach; it also follows vehicles of other lanes
             for car in lane:
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
@@ -152,10 +161,10 @@ class Follower:
         """Leave it to SUMO, at the limit of the exit."""
         limit = self._limits[car.path][1][car.section]
         self._desire(car, min(limit * car.factor, car.advice))
-        self._hand_back(car)
+        self._speeds.hand_back(car)
 
     def _merging(self, car: Car) -> float:
-        """How much the last before it from another lane into its exit counts (`closeness`)."""
+        """How much the vehicle counts that takes its exit before it from another lane."""
         mine, law = self._exit[car.path][0], self._law
         ahead = None
         for other in self._inside:
@@ -166,7 +175,7 @@ class Follower:
         if ahead is None:
             return 0.0
         gap = (ahead.s - self._exit[ahead.path][0]) - law.length - (car.s - mine)
-        return float(kernel.closeness(car.v, gap, ahead.v, law))
+        return float(laws.closeness(car.v, gap, ahead.v, law))
 
     def _steer(self, car: Car, held: bool, z: float) -> None:
         law = self._law
@@ -174,35 +183,33 @@ class Follower:
         starts, speeds = self._limits[car.path]
         v0 = min(speeds[section] * car.factor, car.advice)
         k = section + 1
-        slower = kernel.braking_begins(v, starts[k] - s, law)
+        slower = laws.braking_begins(v, starts[k] - s, law)
         held = held and near(v, law.hold - s, law)
         # SUMO would drop to a lower desired speed at once; the law brakes.
         self._desire(car, max(v0, v))
         braked = car.brake > 0.0
         if not (slower or held or braked or v > v0 or v0 < LEAST_SPEED or z > 0.0):
-            self._hand_back(car)
+            self._speeds.hand_back(car)
             return
         free = self._free(v, v0)
-        acc = min(free, kernel.follow(v, max(v0, LEAST_SPEED), z, law)) if z > 0.0 else free
-        while kernel.braking_begins(v, starts[k] - s, law):
-            acc = min(acc, kernel.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
+        acc = min(free, laws.follow(v, max(v0, LEAST_SPEED), z, law)) if z > 0.0 else free
+        while laws.braking_begins(v, starts[k] - s, law):
+            acc = min(acc, laws.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1
         if held:
-            acc = min(acc, kernel.hold(v, s, law))
+            acc = min(acc, laws.hold(v, s, law))
         if braked:
             acc = min(acc, -car.brake)
         if acc < free or v > v0 or v0 < LEAST_SPEED:
-            speed = v + max(acc, -law.b_max) * law.dt
-            self._vehicle.setSpeed(car.name, max(speed, 0.0))
-            car.commanded = True
+            self._speeds.command(car, v + max(acc, -law.b_max) * law.dt)
         else:
-            self._hand_back(car)
+            self._speeds.hand_back(car)
 
     def _free(self, v: float, v0: float) -> float:
         """Acceleration of the model on an empty road."""
         law = self._law
         if self._model == "IDM":
-            return kernel.follow(v, v0, 0.0, law)
+            return laws.follow(v, v0, 0.0, law)
         return min(law.a, max((v0 - v) / law.dt, -law.b))
 
     def _desire(self, car: Car, speed: float) -> None:
@@ -210,87 +217,6 @@ class Follower:
         if speed != car.desired:
             self._vehicle.setMaxSpeed(car.name, speed)
             car.desired = speed
-
-    def _hand_back(self, car: Car) -> None:
-        if car.commanded:
-            self._vehicle.setSpeed(car.name, -1.0)
-            car.commanded = False
-
-
-class Cruiser:
-    """SUMO's `CC` as a cruise control with ACC: it is told its desired speed."""
-
-    def __init__(self, job: Job, libsumo: Any, engine: Engine) -> None:
-        law = job.law
-        self._law, self._engine = law, engine
-        self._vehicle = libsumo.vehicle
-        top = max(engine.cruise_speed, job.road.section_speed.max())
-        self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
-
-    def load(self, cars: Iterable[Car]) -> None:
-        """Switch the controller on: SUMO inserts by the rule of the active one."""
-        for car in cars:
-            self._vehicle.setSpeedMode(car.name, CRUISING)
-            self._set(car, "ccaht", self._engine.headway)
-            self._set(car, "ccac", ACC)
-            self.advise(car)
-
-    def depart(self, car: Car) -> None:
-        """Advice may have come before the vehicle."""
-        self.advise(car)
-
-    def advise(self, car: Car) -> None:
-        """Tell SUMO the desired speed."""
-        speed = self._desired(car)
-        if speed != car.desired:
-            self._set(car, "ccds", speed)
-            car.desired = speed
-
-    def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
-        """Brake for hold lines, and where told to, if the model itself brakes less."""
-        law = self._law
-        for lane in lanes:
-            ahead = None
-            for car in lane:
-                acc = -car.brake if car.brake > 0.0 else math.inf
-                held = car.s < law.entry and not released(car)
-                if held and near(car.v, law.hold - car.s, law):
-                    acc = min(acc, max(kernel.hold(car.v, car.s, law), -law.b_max))
-                if acc < math.inf and acc < self._own(car, ahead):
-                    self._vehicle.setSpeed(car.name, max(car.v + acc * law.dt, 0.0))
-                    car.commanded = True
-                else:
-                    self.release(car)
-                ahead = car
-
-    def release(self, car: Car) -> None:
-        """Leave it to the model."""
-        if car.commanded:
-            self._vehicle.setSpeed(car.name, -1.0)
-            car.commanded = False
-
-    def _own(self, car: Car, ahead: Car | None) -> float:
-        """Acceleration of the model on the approach, where a command would replace it [m/s²]."""
-        law, engine = self._law, self._engine
-        v0 = self._desired(car)
-        u = cruise_control(car.v, v0, engine.cruise_gain, engine.a, engine.b)
-        if ahead is not None:
-            gap = ahead.s - law.length - car.s
-            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, engine))
-        return realise(car.v, car.a, u, v0 == 0.0, law, engine)
-
-    def _desired(self, car: Car) -> float:
-        return self._engine.cruise_speed if car.advice == math.inf else car.advice
-
-    def _set(self, car: Car, key: str, value: float) -> None:
-        self._vehicle.setParameter(car.name, f"carFollowModel.{key}", repr(value))
-
-
-def steering_of(job: Job, libsumo: Any) -> Steering:
-    """What steers the vehicles of a job."""
-    if job.engine is None:
-        return Follower(job, libsumo)
-    return Cruiser(job, libsumo, job.engine)
 
 
 def limits(job: Job) -> list[tuple[list[float], list[float]]]:
@@ -303,8 +229,8 @@ def limits(job: Job) -> list[tuple[list[float], list[float]]]:
 
 
 def near(v: float, distance: float, law: Law) -> bool:
-    """Whether a hold line `distance` ahead may matter in this step; a metre of room is enough."""
-    return kernel.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
+    """Whether a hold line `distance` ahead may matter in this step, with a metre to spare."""
+    return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
 
 
 def _crossing(path: int, movements: tuple[Movement, ...]) -> frozenset[int]:

@@ -1,11 +1,11 @@
-"""The process that runs libsumo: it moves, the controller's own process decides.
+"""The process that runs libsumo: it moves vehicles, the controller's own process decides.
 
-libsumo holds one simulation a process, and what crashes it would take its caller down, so it has
-a process of its own. That one knows no controller: it advances until a wake-up, sends a view, and
-carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
+libsumo holds one simulation a process, and a crash would take its caller down, so it has a process
+of its own. That process knows no controller: it advances until a wake-up, sends a view, and carries
+out the commands that come back, as `minisim.simulation` does with the compiled kernel.
 
-SUMO follows leaders, integrates and finds collisions; what else vehicles have to mind is told to
-it by `minisim.sumo.steering`.
+SUMO follows leaders, integrates and finds collisions. `minisim.sumo.steering` tells it what else
+vehicles have to obey.
 """
 
 from __future__ import annotations
@@ -33,29 +33,33 @@ from minisim.control import (
     Wake,
 )
 from minisim.engine.collision import Collision
-from minisim.engine.state import NEVER, TRACE, Records, first_tick
+from minisim.engine.state import NEVER, TRACE, Records, time_of
+from minisim.hosting import Alarm
+from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
-from minisim.sumo.steering import Car, limits, steering_of
+from minisim.sumo.steering import Car, Follower, Steering, limits
 
 #: Lines of a recording that are kept as Python objects.
 TRACE_LINES = 100_000
 
-#: Longest time between two looks at a vehicle that nobody needs to know of [s].
+#: Longest time between two looks at a vehicle that no controller needs to know of [s].
 GLANCE = 1.0
 
 
 class Worker:
     """One run in SUMO: `minisim.simulation.Simulation` without the session.
 
-    A tick is the state that SUMO writes at that time: it moves everybody, then inserts whoever
-    is due, so a vehicle's first state is that of its insertion. Vehicles that anybody may need to
-    know of are watched in every step, the others get a glance now and then.
+    A tick is the state that SUMO writes at that time. SUMO first moves all vehicles and then
+    inserts those that are due, so a vehicle's first state is that of its insertion. Vehicles that a
+    controller or a recording may need are watched in every step, the others now and then.
     """
 
     def __init__(self, job: Job, libsumo: Any, caller: Caller) -> None:
         self._job, self._libsumo, self._caller = job, libsumo, caller
         road, law = job.road, job.law
-        self._steering = steering_of(job, libsumo)
+        self._steering: Steering = (
+            Follower(job, libsumo) if job.motion is None else Cruiser(job, libsumo, job.motion)
+        )
         self._limits = limits(job)
         self._marks = road.marks.tolist()
         self._exit, self._end = road.ends[:, 0].tolist(), road.ends[:, 1].tolist()
@@ -79,8 +83,7 @@ class Worker:
         self._lines: list[tuple[int, int, float, float, float, bool]] = []
         self._traces: list[Records] = []
         self._arrived = 0
-        self._wake_tick = NEVER
-        self._period_tick = 0 if job.plan.period is not None else NEVER
+        self._alarm = Alarm(job.plan.period, law.dt)
         self._tick = 0
 
     def run(self) -> Ended:
@@ -91,7 +94,7 @@ class Worker:
         self._libsumo.simulationStep()
         passed = self._observe()
         while self._tick < job.horizon and not self._done and not self._stopped:
-            if passed or self._tick >= min(self._wake_tick, self._period_tick):
+            if passed or self._tick >= self._alarm.tick:
                 self._decide()
             self._steering.steer(self._lanes, self._released)
             self._libsumo.simulationStep()
@@ -118,11 +121,7 @@ class Worker:
 
     def _decide(self) -> None:
         """Ask what the session commands; all answers are collected before any is carried out."""
-        dt, period = self._job.law.dt, self._job.plan.period
-        if self._tick >= self._wake_tick:
-            self._wake_tick = NEVER
-        if period is not None and self._tick >= self._period_tick:
-            self._period_tick = self._tick + max(1, first_tick(period, dt))
+        self._alarm.reset(self._tick)
         for command in self._caller.ask(Asked(self._tick, tuple(self._view()))):
             self._apply(command)
 
@@ -151,8 +150,8 @@ class Worker:
                     self._steering.advise(car)
             case Brake(vehicle, deceleration):
                 self._cars[str(vehicle)].brake = min(deceleration, self._job.law.b_max)
-            case Wake(time):
-                self._wake_tick = first_tick(time, self._job.law.dt)
+            case Wake():
+                self._alarm.set(command)
 
     def _released(self, car: Car) -> bool:
         return car.go or self._open[car.lane]
@@ -181,7 +180,7 @@ class Worker:
         law = self._job.law
         car.present = True
         car.seen = self._tick
-        car.s = law.length + law.slack
+        car.s = law.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         self._lanes[car.lane].append(car)
         self._steering.depart(car)
@@ -205,7 +204,7 @@ class Worker:
         self._glances[self._tick + max(1, int(seconds / law.dt))].append(car)
 
     def _unneeded(self, car: Car) -> bool:
-        """Whether it has passed all that anybody may need to know of."""
+        """Whether it has passed everything that it may be needed for."""
         return car.cleared and self._job.law.record_from == NEVER
 
     def _glance(self, car: Car) -> None:
@@ -246,7 +245,7 @@ class Worker:
     def _position(self, p: int, travelled: float) -> float:
         """`s` on path p of a vehicle that has driven so far since its insertion [m]."""
         law, network = self._job.law, self._job.network
-        inside = travelled + law.length + law.slack - network.approach[p]
+        inside = travelled + law.length + law.margin - network.approach[p]
         if inside <= 0.0:
             return float(law.entry + inside)
         if inside <= network.inside[p]:
@@ -259,7 +258,7 @@ class Worker:
         return self._position(car.path, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
-        """Its rear has left the junction: nobody but SUMO steers it any more."""
+        """Its rear has left the junction: from here on SUMO alone drives it."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
         self._steering.release(car)
@@ -283,27 +282,27 @@ class Worker:
 
     def _collide(self) -> None:
         """Note each pair that SUMO finds touching, once."""
-        for found in self._libsumo.simulation.getCollisions():
-            pair = int(found.collider), int(found.victim)
+        for collision in self._libsumo.simulation.getCollisions():
+            pair = int(collision.collider), int(collision.victim)
             if (key := (min(pair), max(pair))) not in self._collisions:
-                self._collisions[key] = self._describe(found)
+                self._collisions[key] = self._describe(collision)
 
-    def _describe(self, found: Any) -> Collision:
+    def _describe(self, collision: Any) -> Collision:
         movements = self._job.movements
         both = [
-            (car.id, str(movements[car.path]), self._touched(car, found), float(speed))
+            (car.id, str(movements[car.path]), self._touched(car, collision), float(speed))
             for car, speed in (
-                (self._cars[found.collider], found.colliderSpeed),
-                (self._cars[found.victim], found.victimSpeed),
+                (self._cars[collision.collider], collision.colliderSpeed),
+                (self._cars[collision.victim], collision.victimSpeed),
             )
         ]
-        time = round(self._tick * self._job.law.dt, 6)
+        time = time_of(self._tick, self._job.law.dt)
         return Collision(time, *zip(*sorted(both), strict=True))
 
-    def _touched(self, car: Car, found: Any) -> float:
+    def _touched(self, car: Car, collision: Any) -> float:
         """`s` of a vehicle in a collision [m]; one that was taken off the road was near its end."""
         s = self._locate(car) if car.present else None
-        return self._exit[car.path] + float(found.pos) if s is None else s
+        return self._exit[car.path] + float(collision.pos) if s is None else s
 
 
 def _record_start(job: Job) -> float:

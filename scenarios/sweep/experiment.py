@@ -271,5 +271,5 @@ def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
             yield f"{prefix}{key}", value
 
 
-def _shares(shares: tuple[float, ...] | None, equal: str) -> str:
+def _shares(shares: Any, equal: str) -> str:
     return equal if shares is None else ":".join(f"{share:g}" for share in shares)

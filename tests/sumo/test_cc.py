@@ -192,7 +192,7 @@ def test_teleport_takes_who_runs_into_another_off_the_road() -> None:
         (
             FAIR,
             "CC",
-            "CC does not .* 'idm'; choose IDM or Krauss, or an Eng.*: use --profile as_run",
+            "CC does not .* 'idm'; choose IDM or Krauss, or a Cruise.*: use --profile as_run",
         ),
         (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
         (

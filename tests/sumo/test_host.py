@@ -422,7 +422,7 @@ def test_what_netconvert_says_is_passed_on_and_its_files_kept(
         simulate(single(), Unregulated(), keep_files=tmp_path / "other")
     assert caught.value.__notes__ == [f"SUMO's files up to there are in {tmp_path / 'other'}"]
     kept = {file.name for file in (tmp_path / "new" / "folder").iterdir()}
-    assert kept == {"minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"}
+    assert kept == {f"minisim.{what}.xml" for what in ("rou", "nod", "edg", "con")}
 
 
 def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -545,7 +545,7 @@ def test_wrong_arguments_are_told(options: dict[str, Any], message: str) -> None
 def test_sumo_has_no_improved_idm() -> None:
     profile = replace(FAIR, vehicle=VehicleType(model="iidm"))
     scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
-    with pytest.raises(InputError, match=r"IDM does not drive .* 'iidm'; choose Krauss"):
+    with pytest.raises(InputError, match=r"SUMO has no model of the law 'iidm'; choose Krauss"):
         simulate(scenario, Unregulated())
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 

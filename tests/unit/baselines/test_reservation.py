@@ -247,7 +247,7 @@ def test_bad_input() -> None:
     for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}, {"name": None}):
         with pytest.raises(InputError):
             Reservation(**options)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="EngineVehicle"):
+    with pytest.raises(InputError, match="CruiseVehicle"):
         Reservation().start(four_way(profile=AS_RUN).site(0))
     with pytest.raises(InputError, match="site"):
         Manager(None, 0.5)  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
+from minisim.arrivals import Arrivals, Demand, Shares, read_arrivals, write_arrivals
 from minisim.errors import FileError, InputError
 
 ALPHA = 1e-3
@@ -111,6 +111,17 @@ def test_a_lane_without_share_stays_empty() -> None:
     assert len(Demand(density=0.0).draw(3, 3600.0, seed=1)) == 0
 
 
+@pytest.mark.parametrize("shares", [(4.0, 3.0, 2.0, 1.0), [4, 3, 2, 1], "4:3:2:1", "4: 3:2 :1"])
+def test_shares_are_numbers_or_a_text(shares: Shares) -> None:
+    demand = Demand(density=350.0, split=shares, turns=shares)
+    assert demand == Demand(density=350.0, split=(4, 3, 2, 1), turns=(4, 3, 2, 1))
+    assert hash(demand) == hash(Demand(density=350.0, split=(4, 3, 2, 1), turns=(4, 3, 2, 1)))
+
+
+def test_equal_shares_have_a_word() -> None:
+    assert Demand(density=1.0, split="balanced", turns="uniform") == Demand(density=1.0)
+
+
 @pytest.mark.parametrize("turns", [None, (1, 2, 1), (0, 1, 0)])
 def test_manoeuvres_follow_their_shares_independently_of_the_lane(
     turns: tuple[float, ...] | None,
@@ -206,7 +217,9 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
         ({"split": (0, 0)}, "split must be shares"),
         ({"split": (1, -1)}, "split must be shares"),
         ({"split": (1e308, 1e308)}, "split must be shares"),
-        ({"turns": "ab"}, "turns must be a sequence"),
+        ({"turns": "ab"}, "turns is uniform or written like 4:3:2:1, got 'ab'"),
+        ({"split": "uniform"}, "split is balanced or written like"),
+        ({"split": 4}, "split must be a sequence"),
         ({"model": "possion"}, "did you mean 'poisson'"),
         ({"min_headway": -1}, "min_headway"),
     ],

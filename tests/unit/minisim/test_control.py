@@ -106,8 +106,8 @@ def test_plans_are_checked(change: dict[str, object], message: str) -> None:
     ("arguments", "message"),
     [
         (("red", 8.0, 30.0), r"start of marking red .* above 30"),
-        (("red", 8.0, -1.0), "end of marking red"),
-        (("red", 30.0, 8.0, 0.0), "speed of marking red"),
+        (("red", 8.0, -1.0), "end of a marking .* at least 0, got -1"),
+        (("red", 30.0, 8.0, 0.0), "speed of a marking .* above 0"),
         ((5, 30.0, 8.0), "name of a marking must be a str"),
     ],
 )

@@ -32,7 +32,7 @@ from minisim.control import (
 from minisim.errors import CollisionError, ControllerError, InputError
 from minisim.results.trips import METRICS, TRIP_COLUMNS
 from minisim.simulation import Simulation
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.builders import Fixed, digest, replayed
@@ -158,7 +158,7 @@ LAWS = {
     "idm": VehicleType(),
     "iidm": VehicleType(model="iidm"),
     "krauss": VehicleType(model="krauss"),
-    "cc": EngineVehicle(),
+    "cc": CruiseVehicle(),
 }
 
 

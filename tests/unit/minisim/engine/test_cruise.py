@@ -16,10 +16,9 @@ from minisim.carfollowing import (
     semi_implicit,
 )
 from minisim.control import Advise, Command, Plan, Site, Unregulated, View
-from minisim.engine.cruise import accelerate_engines
+from minisim.engine.cruise import accelerate, build_cruise
 from minisim.engine.state import (
     DRIVING,
-    build_engine,
     build_lanes,
     build_law,
     build_road,
@@ -28,7 +27,7 @@ from minisim.engine.state import (
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Meeting, meetings, sagittas
-from minisim.vehicle import EngineVehicle, VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import AS_RUN, Scenario, four_way
 from scenarios.published import published_ways
 
@@ -197,13 +196,13 @@ def test_it_arrives_a_decimetre_before_the_end_of_the_road() -> None:
     assert last < length - 0.1 <= last + 14.0 * DT + 1e-6
 
 
-def test_engine_and_model_go_together() -> None:
-    with pytest.raises(InputError, match="'cc' goes with an EngineVehicle"):
+def test_cruise_control_and_model_go_together() -> None:
+    with pytest.raises(InputError, match="'cc' goes with a CruiseVehicle"):
         VehicleType(model="cc")
-    with pytest.raises(InputError, match="car-following model of an EngineVehicle"):
-        EngineVehicle(model="idm")
+    with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
+        CruiseVehicle(model="idm")
     with pytest.raises(InputError, match=r"lag \[s\]"):
-        EngineVehicle(lag=-1.0)
+        CruiseVehicle(lag=-1.0)
 
 
 # --- who is followed -----------------------------------------------------------------------------
@@ -267,18 +266,20 @@ def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
     what = scenario(*((0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars))
     site = what.site(0)
     plan = Unregulated().start(site).plan
-    road, engine = build_road(site, plan), build_engine(site)
+    road = build_road(site, plan)
     law = build_law(
         site, plan, depart_speed=what.depart_speed, record=None, record_window=(0.0, math.inf)
     )
     vehicles = build_vehicles(site, what.arrivals(0))
     lanes = build_lanes(site, vehicles, plan.lanes_open)
-    assert engine is not None
+    cruise = build_cruise(site, len(vehicles))
+    assert cruise is not None
     rows = []
     for lane, _, s, v, a, entered in cars:
         row = int(lanes[lane]["first"])
         vehicles["status"][row] = DRIVING
-        for name, value in (("s", s), ("v", v), ("a", a), ("entered", entered)):
+        cruise.memory["entered"][row] = entered
+        for name, value in (("s", s), ("v", v), ("a", a)):
             vehicles[name][row] = value
         lanes["next"][lane] = row + 1
         if s >= law.entry:
@@ -286,9 +287,9 @@ def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
             vehicles["advice"][row] = 10.0
         exit_arm = int(road.ends[vehicles["path"][row], 2])
         if s >= road.ends[vehicles["path"][row], 0]:
-            lanes["tail"][exit_arm] = row
+            cruise.last[exit_arm] = row
         rows.append(row)
-    accelerate_engines(vehicles, lanes, road, law, engine)
+    accelerate(vehicles, lanes, road, law, cruise)
     return [float(vehicles["a"][row]) for row in rows]
 
 

@@ -1,0 +1,129 @@
+"""The car-following models of a run, and the bounds that limits and hold lines set.
+
+What depends on `Law.model` stands here. The equations are in `minisim.carfollowing`, and the table
+of models in `minisim.vehicle`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from minisim.carfollowing import (
+    STILL,
+    braking_distance,
+    gap_ratio,
+    idm,
+    iidm,
+    insertion_speed,
+    krauss,
+    safe_speed,
+    speed_towards,
+    stepwise_towards,
+)
+from minisim.engine.state import STOP_MARGIN, Law
+from minisim.jit import njit, njit_inline
+from minisim.vehicle import MODELS
+
+#: Values of `Law.model`.
+IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
+
+
+@njit_inline
+def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
+    """How much a vehicle ahead counts for the law of this run: from 0, not at all, to infinity.
+
+    It is the ratio of the desired to the actual gap under the IDM, and the inverse of Krauß's safe
+    speed. Of several vehicles ahead, the one that counts most decides.
+    """
+    if law.model == KRAUSS:
+        v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+        return 1.0 / v_safe if v_safe > 0.0 else math.inf
+    return gap_ratio(v, gap, v_leader, law.a, law.b, law.headway, law.min_gap)
+
+
+@njit_inline
+def follow(v: float, v0: float, z: float, law: Law) -> float:
+    """Acceleration of the car-following law.
+
+    For a desired speed of 0 the IDM is taken to its limit from above: comfortable braking, and the
+    leader's share on top of it.
+    """
+    if law.model == KRAUSS:
+        v_safe = 1.0 / z if z > 0.0 else math.inf
+        return (krauss(v, v0, v_safe, law.a, law.b, law.dt) - v) / law.dt
+    if v0 <= 0.0:
+        if law.model == IIDM:
+            return -law.b + min(law.a * (1.0 - z * z), 0.0)
+        return -law.b - law.a * z * z
+    if law.model == IIDM:
+        return iidm(v, v0, z, law.a, law.b, law.delta)
+    return idm(v, v0, z, law.a, law.b, law.delta)
+
+
+@njit
+def insertable(gap: float, v_leader: float, law: Law) -> float:
+    """Highest speed at which the law of this run inserts a vehicle; negative when there is none.
+
+    A law without a rule of its own takes any speed, once the gap is that of standstill.
+    Source: SUMO's `insertionFollowSpeed` of each model.
+    """
+    if law.model == IDM or law.model == IIDM:
+        return insertion_speed(gap, v_leader, law.a, law.b, law.headway, law.min_gap)
+    if gap < law.min_gap:
+        return -1.0
+    if law.model == KRAUSS:
+        return safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+    return math.inf
+
+
+@njit_inline
+def braking_begins(v: float, distance: float, law: Law) -> bool:
+    """Whether what is `distance` ahead may matter to comfortable braking in this step."""
+    return 2.0 * law.b * distance <= v * v + 4.0 * law.b * v * law.dt
+
+
+@njit_inline
+def slow_down(v: float, acc: float, target: float, distance: float, law: Law) -> float:
+    """Bound on the acceleration that meets a lower limit ahead by comfortable braking."""
+    if v + acc * law.dt <= target:
+        return acc
+    if law.semi_implicit:
+        v_new = stepwise_towards(target, distance, law.b, law.dt)
+    else:
+        v_new = max(speed_towards(v, target, distance, law.b, law.dt), target)
+    return max((v_new - v) / law.dt, -law.b)
+
+
+@njit_inline
+def hold(v: float, s: float, law: Law) -> float:
+    """Bound on the acceleration of a vehicle without right of way.
+
+    The hold line is like the end of the road: the vehicle brakes comfortably, and no earlier than
+    it must. If that no longer suffices, it stops before the junction, as hard as this needs.
+    """
+    to_line = law.hold - s
+    if law.semi_implicit:
+        return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
+    distance = to_line - STOP_MARGIN
+    if v * v <= 2.0 * law.b * distance:
+        if v == 0.0 and distance < 1e-3:
+            return 0.0
+        v_new = speed_towards(v, 0.0, distance, law.b, law.dt)
+        return (v_new - v) / law.dt if v_new > 0.0 else -v * v / (2.0 * max(distance, 1e-6))
+    if v * v <= 2.0 * law.b * to_line:
+        return -law.b
+    to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
+    return -max(law.b, v * v / (2.0 * to_junction))
+
+
+@njit
+def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float) -> float:
+    """`hold` for `semi_implicit`; a function of its own to keep the inner loop short."""
+    needed = braking_distance(v, b, dt)
+    distance = to_line - STOP_MARGIN
+    if needed <= distance:
+        v_new = stepwise_towards(0.0, distance, b, dt) if distance >= STILL else 0.0
+        return (v_new - v) / dt
+    if needed <= to_line:
+        return -b
+    return -max(b, v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6)))

@@ -1,0 +1,117 @@
+"""SUMO's `CC`, the model of `minisim.vehicle.CruiseVehicle`: its vehicle type, and its steering.
+
+Such a vehicle obeys no limit and no marking. It gets the advised speed, and a command for a hold
+line only while that asks for more braking than the model itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from minisim.carfollowing import cruise_control
+from minisim.engine.cruise import Cruise, follow, realise
+from minisim.engine.laws import hold
+from minisim.engine.state import STOP_MARGIN
+from minisim.errors import InputError
+from minisim.sumo.messages import Job
+from minisim.sumo.steering import Car, Released, Speeds, near
+from minisim.vehicle import CruiseVehicle
+
+#: Spacing and radar, numbers in SUMO's code (`MSCFModel_CC`) [m].
+FIXED = (2.0, 250.0)
+
+#: The published runs' speed mode: nothing but the model. With a safe gap (1) SUMO would cut what
+#: the engine does by what its controller asks for, and with that the lag.
+CRUISING = 0
+
+#: SUMO's number of the controller that is a cruise control with ACC (`Plexe::ACC`).
+ACC = 1
+
+
+def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
+    """What is special about its `vType`.
+
+    Raises:
+        InputError: SUMO's code fixes another value.
+    """
+    if (vehicle.spacing, vehicle.radar) != FIXED:
+        spacing, radar = FIXED
+        raise InputError(
+            f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
+            f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
+        )
+    return {
+        "accel": vehicle.engine_acceleration, "decel": vehicle.max_deceleration,
+        "ccAccel": vehicle.cruise_acceleration, "ccDecel": vehicle.cruise_deceleration,
+        "kp": vehicle.cruise_gain, "lambda": vehicle.spacing_gain, "tauEngine": vehicle.lag,
+        "lanesCount": 1,
+    }  # fmt: skip
+
+
+class Cruiser:
+    """Steers SUMO's `CC` as a cruise control with ACC, by its desired speed."""
+
+    def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
+        law = job.law
+        self._law, self._cruise = law, cruise
+        self._vehicle = libsumo.vehicle
+        self._speeds = Speeds(libsumo)
+        top = max(cruise.cruise_speed, job.road.section_speed.max())
+        self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
+
+    def load(self, cars: Iterable[Car]) -> None:
+        """Switch the controller on: SUMO inserts by the rule of the active one."""
+        for car in cars:
+            self._vehicle.setSpeedMode(car.name, CRUISING)
+            self._set(car, "ccaht", self._cruise.headway)
+            self._set(car, "ccac", ACC)
+            self.advise(car)
+
+    def depart(self, car: Car) -> None:
+        """Set the desired speed again: advice may have come before the vehicle."""
+        self.advise(car)
+
+    def advise(self, car: Car) -> None:
+        """Set the desired speed in SUMO."""
+        speed = self._desired(car)
+        if speed != car.desired:
+            self._set(car, "ccds", speed)
+            car.desired = speed
+
+    def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
+        """Brake for hold lines and on command, if the model itself brakes less."""
+        law = self._law
+        for lane in lanes:
+            ahead = None
+            for car in lane:
+                acc = -car.brake if car.brake > 0.0 else math.inf
+                held = car.s < law.entry and not released(car)
+                if held and near(car.v, law.hold - car.s, law):
+                    acc = min(acc, max(hold(car.v, car.s, law), -law.b_max))
+                if acc < math.inf and acc < self._own(car, ahead):
+                    self._speeds.command(car, car.v + acc * law.dt)
+                else:
+                    self.release(car)
+                ahead = car
+
+    def release(self, car: Car) -> None:
+        """Leave it to the model."""
+        self._speeds.hand_back(car)
+
+    def _own(self, car: Car, ahead: Car | None) -> float:
+        """Acceleration of the model on the approach, where a command would replace it [m/s²]."""
+        law, cruise = self._law, self._cruise
+        v0 = self._desired(car)
+        u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+        if ahead is not None:
+            gap = ahead.s - law.length - car.s
+            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, cruise))
+        return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
+
+    def _desired(self, car: Car) -> float:
+        return self._cruise.cruise_speed if car.advice == math.inf else car.advice
+
+    def _set(self, car: Car, key: str, value: float) -> None:
+        self._vehicle.setParameter(car.name, f"carFollowModel.{key}", repr(value))
