@@ -40,7 +40,11 @@ def published_ways(arms: int) -> tuple[Way, ...]:
 def _way(row: dict[str, str]) -> Way:
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
-    return Way(points, float(row["length_m"]), float(row["wait_m"]))
+    return Way(
+        points, float(row["length_m"]), float(row["wait_m"]),
+        major=row["major"] == "1",
+        yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
+    )  # fmt: skip
 
 
 def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
@@ -64,5 +68,4 @@ def published_arrivals(split: str, density: int, arms: int, controller: str = "d
     if split != RENAMED:
         return arrivals
     lane = np.array([ARM_NAMES.index(letter) for letter in RENAMED_ARMS]).argsort()[arrivals.lane]
-    order = np.lexsort((arrivals.manoeuvre, lane, arrivals.time))
-    return Arrivals(arrivals.time[order], lane[order], arrivals.manoeuvre[order])
+    return Arrivals(arrivals.time, lane, arrivals.manoeuvre)

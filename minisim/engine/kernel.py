@@ -91,7 +91,7 @@ def step(
         reasons |= GAP
     reasons |= move(vehicles, lanes, road, law, tick + 1)
     if motion is not None:
-        cruise.look(vehicles, lanes, road, motion, tick + 1)
+        cruise.look(vehicles, lanes, road, law, motion, tick + 1)
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons

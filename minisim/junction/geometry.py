@@ -58,11 +58,17 @@ class Way(NamedTuple):
         length: what a vehicle drives on it [m]; simulators round.
         wait: from the entry to the waiting position inside the junction that SUMO gives to some
             far turns [m]; 0 where there is none.
+        major: whether the road that it comes from has priority.
+        yields: movements to which it must give way, such as "b2".
+        foes: movements that it crosses or joins, as SUMO has them.
     """
 
     points: tuple[tuple[float, float], ...]
     length: float
     wait: float = 0.0
+    major: bool = False
+    yields: tuple[str, ...] = ()
+    foes: tuple[str, ...] = ()
 
     def resampled(self, count: int) -> Floats:
         """`count` points at equal distances along it, shape (count, 2)."""
