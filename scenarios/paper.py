@@ -7,6 +7,7 @@ The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`)
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
 from types import MappingProxyType
@@ -18,7 +19,14 @@ from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
-from scenarios.published import PUBLISHED_ARMS, RENAMED, RENAMED_ARMS, published_arrivals
+from scenarios.published import (
+    PUBLISHED_ARMS,
+    RENAMED,
+    RENAMED_ARMS,
+    RENAMED_TURNAROUNDS,
+    published_arrivals,
+    published_ways,
+)
 from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario, parse_split
 
 if TYPE_CHECKING:
@@ -166,12 +174,16 @@ def replay(
     """
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled=False)
-    return MAKERS[cell.arms](
+    made = MAKERS[cell.arms](
         cell.density,
         split=_shares(ran.shares or split),
         profile=profile or _profile(cell, ran),
         recorded=published_arrivals(*cell),
     )
+    if cell.split != RENAMED or made.intersection.ways is None:
+        return made
+    ways = published_ways(cell.arms, RENAMED_TURNAROUNDS)
+    return replace(made, intersection=replace(made.intersection, ways=ways))
 
 
 def controller_of(

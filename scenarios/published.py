@@ -24,26 +24,40 @@ RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 PUBLISHED_ARMS = (3, 4, 5)
 
 
+#: Arms at whose far end the road leads back, in the authors' networks of 4 arms: in the first one,
+#: and in that of the runs at 4:1:4:1.
+TURNAROUNDS, RENAMED_TURNAROUNDS = "bc", "abcd"
+
+
 @lru_cache
-def published_ways(arms: int) -> tuple[Way, ...]:
+def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
+
+    Args:
+        arms: how many.
+        turnarounds: arms at whose far end the road leads back; None is as in the networks of the
+            authors.
 
     Raises:
         InputError: another number of arms.
     """
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
     file = resources.files("scenarios") / "data" / "ways" / f"{arms}way.csv"
+    if turnarounds is None:
+        turnarounds = TURNAROUNDS if arms == 4 else ""
     with file.open(encoding="utf-8") as text:
-        return tuple(_way(row) for row in csv.DictReader(text))
+        return tuple(_way(row, arms, turnarounds) for row in csv.DictReader(text))
 
 
-def _way(row: dict[str, str]) -> Way:
+def _way(row: dict[str, str], arms: int, turnarounds: str) -> Way:
+    origin, manoeuvre = ARM_NAMES.index(row["movement"][0]), int(row["movement"][1])
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
     return Way(
         points, float(row["length_m"]), float(row["wait_m"]),
         major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
+        turns_back=ARM_NAMES[(origin + manoeuvre) % arms] in turnarounds,
     )  # fmt: skip
 
 

@@ -52,6 +52,12 @@ CROSS, WAIT = int(Meeting.CROSS), int(Meeting.WAIT)
 #: SUMO's speed below which a vehicle halts (`SUMO_const_haltingSpeed`) [m/s].
 HALTING = 0.1
 
+#: Length of the turnarounds at the far ends of the published roads [m].
+TURNAROUND = 4.67
+
+#: Time headway that SUMO leaves a vehicle behind another that is inserted (`tau`'s default) [s].
+REACTION = 1.0
+
 #: More than any gap [m].
 FAR = 1e9
 
@@ -74,6 +80,7 @@ class Cruise(NamedTuple):
         meetings: (p, 2, p, 2, 4), see `minisim.junction.meetings.meetings`.
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
         yields: (p, p): whether the first way must give way to the second.
+        turns_back: (n,): whether the road of an arm leads back at its far end.
         memory: (k,) of `MEMORY`.
         last: (n,): last row that entered the exit lane of each arm, or -1.
     """
@@ -92,6 +99,7 @@ class Cruise(NamedTuple):
     meetings: Floats
     waits: Floats
     yields: Bools
+    turns_back: Bools
     memory: Records
     last: Ints
 
@@ -117,6 +125,7 @@ def build_cruise(site: Site, count: int) -> Cruise | None:
         meetings=meetings(intersection),
         waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
         yields=_yields(intersection),
+        turns_back=_turns_back(intersection),
         memory=np.zeros(count, MEMORY),
         last=np.full(intersection.n, -1),
     )
@@ -127,6 +136,30 @@ def _yields(intersection: Intersection) -> Bools:
     rights = right_of_way(intersection)
     major, other = rights.major[:, None], rights.major[None, :]
     return np.where(major == other, rights.yields, ~major)
+
+
+def _turns_back(intersection: Intersection) -> Bools:
+    ways = zip(intersection.paths, intersection.ways or (), strict=False)
+    arms = {path.exit_arm for path, way in ways if way.turns_back}
+    return np.array([arm in arms for arm in range(intersection.n)])
+
+
+@njit
+def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -> bool:
+    """Whether no vehicle can be inserted on an arm for one that arrives there.
+
+    Where the road leads back, SUMO takes it that the vehicle at its end might do so, and keeps room
+    for it to stop. Source: `MSLane::isInsertionSuccess`, `MSCFModel::getSecureGap`.
+    """
+    i = cruise.last[arm]
+    if i < 0 or not cruise.turns_back[arm] or vehicles[i]["status"] != DRIVING:
+        return False
+    while vehicles[i]["ahead"] >= 0 and vehicles[vehicles[i]["ahead"]]["status"] == DRIVING:
+        i = vehicles[i]["ahead"]
+    first = vehicles[i]
+    rest = road.ends[first["path"], 1] - first["s"]
+    needed = braking_distance(first["v"], law.b_max, law.dt) + REACTION * first["v"]
+    return bool(rest + TURNAROUND + law.margin - law.min_gap < needed)
 
 
 @njit

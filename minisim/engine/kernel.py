@@ -81,7 +81,7 @@ def step(
 ) -> int:
     """Make one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, tick):
+    if insert(vehicles, lanes, road, law, motion, tick):
         reasons |= MARK
     if motion is None:
         overlap = accelerate(vehicles, lanes, road, law)
@@ -98,7 +98,9 @@ def step(
 
 
 @njit
-def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
+def insert(
+    vehicles: Records, lanes: Records, road: Road, law: Law, motion: Motion | None, tick: int
+) -> bool:
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 
     Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
@@ -110,6 +112,8 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
     for lane in range(len(lanes)):
         i = lanes[lane]["next"]
         if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
+            continue
+        if motion is not None and cruise.blocked(vehicles, road, law, motion, lane):
             continue
         s, p = law.length + law.margin, vehicles[i]["path"]
         section = 0

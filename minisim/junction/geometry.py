@@ -61,6 +61,7 @@ class Way(NamedTuple):
         major: whether the road that it comes from has priority.
         yields: movements to which it must give way, such as "b2".
         foes: movements that it crosses or joins, as SUMO has them.
+        turns_back: whether the road that it leaves by leads back at its far end.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -69,6 +70,7 @@ class Way(NamedTuple):
     major: bool = False
     yields: tuple[str, ...] = ()
     foes: tuple[str, ...] = ()
+    turns_back: bool = False
 
     def resampled(self, count: int) -> Floats:
         """`count` points at equal distances along it, shape (count, 2)."""
