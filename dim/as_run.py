@@ -22,7 +22,9 @@ outside; here each is a named quirk:
    loses it in the yellow zone is told 20 m/s for one step before it is held (the authors set 20
    first and 10 at the end of their loop, to those who still have it);
 9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
-   alphabet wins, whatever its size (`order="size"` is the rule that the paper describes).
+   alphabet wins, whatever its size (`order="size"` is the rule that the paper describes);
+10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
+    error at that vehicle, and nothing is decided in it.
 
 Times, lengths and speeds are those of the authors' driver (see `BOUND`, `RED` and the constants);
 whatever happens, happens at the end of a step and takes effect in the next.
@@ -33,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import takewhile
 
 import networkx as nx
 
@@ -183,6 +186,12 @@ class AsRunRules:
         self._serve(visited, cars, speeds)
         busy = self._visit(visited, speeds)
         busy |= self._green(cars, speeds)
+        lost = next((v for v in self.serving if v not in cars), None)
+        if lost is not None:
+            self.serving.remove(lost)
+            self.action = [v for v in self.action if v != lost]
+            self.chosen = tuple(v for v in self.chosen if v != lost)
+            return speeds
         if not busy:
             self.chosen = self._decide(cars)
         for vehicle in self.chosen:
@@ -195,13 +204,11 @@ class AsRunRules:
             if car.id not in self.serving and self.red_start <= car.driven < self.yellow_start:
                 self.serving.append(car.id)
                 speeds[car.id] = RED_SPEED
-        self.serving = [v for v in self.serving if v in cars and cars[v].driven <= CLEAR]
+        self.serving = [v for v in self.serving if v not in cars or cars[v].driven <= CLEAR]
 
     def _visit(self, visited: list[Car], speeds: dict[int, float]) -> bool:
         """Yellow zone and beyond, one vehicle after the other; whether the junction is busy."""
         busy = False
-        present = {car.id for car in visited}
-        self.action = [v for v in self.action if v in present]
         for car in visited:
             if self.yellow_start <= car.driven <= self.bound:
                 if car.id not in self.chosen:
@@ -221,7 +228,7 @@ class AsRunRules:
         """Green zone: who takes part goes regardless; whether anyone does."""
         going = [
             vehicle
-            for vehicle in self.serving
+            for vehicle in takewhile(cars.__contains__, self.serving)
             if vehicle in self.action and cars[vehicle].driven >= self.green_start
         ]
         speeds.update(dict.fromkeys(going, GREEN_SPEED))
@@ -285,7 +292,7 @@ class AsRunSession:
     def decide(self, view: View) -> Iterable[Command]:
         """One round of the rules; another one in the next step until nothing changes any more."""
         rules = self.rules
-        before = (list(rules.action), rules.chosen)
+        before = (list(rules.serving), list(rules.action), rules.chosen)
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
         speeds = rules.step(cars)
         speeds.update((v, rules.exit_speed) for v, car in cars.items() if car.driven >= FOLLOWED)
@@ -294,7 +301,7 @@ class AsRunSession:
             Advise(v, speed) for v, speed in told.items() if self._desired.get(v) != speed
         ]
         self._desired = {v: speed for v, speed in self._desired.items() if v in cars} | told
-        if before != (rules.action, rules.chosen):
+        if before != (rules.serving, rules.action, rules.chosen):
             commands.append(Wake(view.time + self._dt))
         return commands
 

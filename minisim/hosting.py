@@ -38,6 +38,9 @@ from minisim.results.run import Run, ScenarioLike
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
+#: What may happen at a collision where SUMO or its cruise control drives.
+REACTIONS = (*ON_COLLISION, "teleport")
+
 #: Commands by what they address. Building a union of types for each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 

@@ -35,10 +35,10 @@ from minisim.engine.state import (
     first_tick,
     time_of,
 )
-from minisim.errors import choice, number
+from minisim.errors import InputError, choice, number
 from minisim.hosting import (
     AFTERMATH,
-    ON_COLLISION,
+    REACTIONS,
     RECORDS,
     Alarm,
     ask,
@@ -49,6 +49,7 @@ from minisim.hosting import (
 )
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
+from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which is that of `OBSERVED`.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
@@ -64,6 +65,8 @@ class Simulation:
         record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
         record_window: from and to [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
+            "teleport", for a `CruiseVehicle` only, also does what SUMO did in the published runs:
+            a vehicle that comes closer than `min_gap` to the one ahead on its exit has arrived.
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -86,7 +89,10 @@ class Simulation:
         if record is not None:
             choice("record", record, RECORDS)
         self.record = record
-        self._stop_on_collision = choice("on_collision", on_collision, ON_COLLISION) == "stop"
+        self._stop_on_collision = choice("on_collision", on_collision, REACTIONS) == "stop"
+        teleports = on_collision == "teleport"
+        if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
+            raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
 
         self._demand_time = arrivals.time
         self._road = build_road(self.site, self.plan)
@@ -98,7 +104,7 @@ class Simulation:
             record_window=checked_window(record_window),
         )
         self._vehicles = build_vehicles(self.site, arrivals)
-        self._motion = kernel.build_motion(self.site, self._vehicles)
+        self._motion = kernel.build_motion(self.site, self._vehicles, teleports)
         self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()

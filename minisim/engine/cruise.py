@@ -37,7 +37,7 @@ from minisim.carfollowing import (
 )
 from minisim.control import Site
 from minisim.engine.laws import hold
-from minisim.engine.state import DRIVING, NEVER, Floats, Ints, Law, Records, Road
+from minisim.engine.state import ARRIVED, DRIVING, NEVER, Floats, Ints, Law, Records, Road
 from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, Meeting, meetings, right_of_way, sagittas
@@ -58,6 +58,9 @@ TURNAROUND = 4.67
 #: Time headway that SUMO leaves a vehicle behind another that is inserted (`tau`'s default) [s].
 REACTION = 1.0
 
+#: SUMO's `NUMERICAL_EPS` [m].
+TOLERANCE = 0.001
+
 #: More than any gap [m].
 FAR = 1e9
 
@@ -76,6 +79,7 @@ class Cruise(NamedTuple):
     """What a run of `minisim.vehicle.CruiseVehicle` needs beside `Law` (SI units).
 
     Attributes:
+        teleports: whether a vehicle that runs into another on its exit is taken off the road.
         crossing_foes: whether the radar sees vehicles that only cross.
         meetings: (p, 2, p, 2, 4), see `minisim.junction.meetings.meetings`.
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
@@ -95,6 +99,7 @@ class Cruise(NamedTuple):
     lag: float
     a_max: float
     radar: float
+    teleports: bool
     crossing_foes: bool
     meetings: Floats
     waits: Floats
@@ -104,7 +109,7 @@ class Cruise(NamedTuple):
     last: Ints
 
 
-def build_cruise(site: Site, count: int) -> Cruise | None:
+def build_cruise(site: Site, count: int, teleports: bool) -> Cruise | None:
     """Collect what a run of `count` vehicles needs; None where they have no cruise control."""
     vehicle, intersection = site.vehicle, site.intersection
     if not isinstance(vehicle, CruiseVehicle):
@@ -121,6 +126,7 @@ def build_cruise(site: Site, count: int) -> Cruise | None:
         lag=vehicle.lag,
         a_max=vehicle.engine_acceleration,
         radar=vehicle.radar,
+        teleports=teleports,
         crossing_foes=vehicle.sumo == "1.18",
         meetings=meetings(intersection),
         waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
@@ -230,11 +236,14 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
 @njit
 def look(
     vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise, tick: int
-) -> None:
+) -> bool:
     """Note after a step which vehicles have entered the junction, and which an exit lane.
 
     The vehicle ahead on an exit lane is the one that entered that lane before.
+
+    Returns whether a vehicle was taken off the road.
     """
+    lost = False
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             mine = cruise.memory[i]
@@ -248,6 +257,37 @@ def look(
                 exit_arm = int(road.ends[p, 2])
                 vehicles[i]["ahead"] = cruise.last[exit_arm]
                 cruise.last[exit_arm] = i
+            if cruise.teleports and mine["left"] != 0 and vehicles[i]["status"] == DRIVING:
+                lost |= teleport(vehicles, road, law, cruise, i, tick)
+    return lost
+
+
+@njit
+def teleport(
+    vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int
+) -> bool:
+    """Take a vehicle off the road that has run into the one ahead on its exit; whether it has.
+
+    SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
+    Source: `MSLane::detectCollisionBetween`; `MSVehicleTransfer`, which finds no road behind.
+    """
+    j = vehicles[i]["ahead"]
+    if j < 0 or vehicles[j]["status"] != DRIVING:
+        return False
+    ends = road.ends
+    rear = vehicles[j]["s"] - law.length - ends[vehicles[j]["path"], 0]
+    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= law.min_gap - TOLERANCE:
+        return False
+    vehicles[i]["status"] = ARRIVED
+    vehicles[i]["arrival_tick"] = tick
+    vehicles[i]["cleared"] = 1
+    for k in range(len(vehicles)):  # those behind it follow the one before it
+        if vehicles[k]["ahead"] == i:
+            vehicles[k]["ahead"] = j
+    arm = int(ends[vehicles[i]["path"], 2])
+    if cruise.last[arm] == i:
+        cruise.last[arm] = j
+    return True
 
 
 @njit

@@ -27,9 +27,9 @@ WAITING_SPEED = 0.1
 Motion = cruise.Cruise
 
 
-def build_motion(site: Site, vehicles: Records) -> Motion | None:
+def build_motion(site: Site, vehicles: Records, teleports: bool = False) -> Motion | None:
     """What the law of motion of these vehicles brings along; None where it brings nothing."""
-    return cruise.build_cruise(site, len(vehicles))
+    return cruise.build_cruise(site, len(vehicles), teleports)
 
 
 @njit
@@ -90,8 +90,8 @@ def step(
     if overlap:
         reasons |= GAP
     reasons |= move(vehicles, lanes, road, law, tick + 1)
-    if motion is not None:
-        cruise.look(vehicles, lanes, road, law, motion, tick + 1)
+    if motion is not None and cruise.look(vehicles, lanes, road, law, motion, tick + 1):
+        reasons |= CLEAR
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons

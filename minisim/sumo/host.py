@@ -31,7 +31,7 @@ from minisim.errors import (
 )
 from minisim.hosting import (
     AFTERMATH,
-    ON_COLLISION,
+    REACTIONS,
     RECORDS,
     Beginning,
     ask,
@@ -56,9 +56,6 @@ from minisim.vehicle import VehicleType
 
 #: SUMO's car-following models that a run may use.
 MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
-
-#: What may happen at a collision.
-REACTIONS = (*ON_COLLISION, "teleport")
 
 #: What the child writes on stderr.
 STDERR = "stderr.txt"
