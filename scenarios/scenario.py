@@ -55,7 +55,7 @@ PAPER = Profile(
 FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
-#: (length 4, minGap 2, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel` is a slip of
+#: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel` is a slip of
 #: the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed limits
 #: ignored, step 0.01 s. `deceleration` is for controllers and hold lines, which the authors' DIM
 #: has none of: the strongest braking that the cruise control itself asks for.
@@ -68,6 +68,7 @@ AS_RUN = Profile(
         deceleration=1.5,
         max_deceleration=1000.0,
         cruise_acceleration=4.0,
+        max_speed=20.0,
     ),
     speed_limit=14.0,
     depart_speed=0.0,

@@ -99,6 +99,7 @@ class Cruise(NamedTuple):
     lag: float
     a_max: float
     radar: float
+    max_speed: float
     teleports: bool
     crossing_foes: bool
     meetings: Floats
@@ -126,6 +127,7 @@ def build_cruise(site: Site, count: int, teleports: bool) -> Cruise | None:
         lag=vehicle.lag,
         a_max=vehicle.engine_acceleration,
         radar=vehicle.radar,
+        max_speed=vehicle.max_speed,
         teleports=teleports,
         crossing_foes=vehicle.sumo == "1.18",
         meetings=meetings(intersection),
@@ -190,6 +192,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             led = math.inf  # what the leader on its own lane or way asks for
             behind = 2  # the part of its way on which that is; -1 is its own lane, 2 no leader
             if s < leave:
+                u = min(u, (cruise.max_speed - v) / law.dt)
                 wait = law.entry + cruise.waits[p, 0]
                 for j in range(i - 1, first - 1, -1):
                     ahead = vehicles[j]
