@@ -202,10 +202,13 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     on_way = ahead["path"] == p and ahead["s"] >= law.entry and rear < leave
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
-                        led = follow(v, rear - s - law.min_gap, ahead["v"], cruise)
-                        u = min(u, led)
+                        asked = follow(v, rear - s - law.min_gap, ahead["v"], cruise)
+                        u = min(u, asked)
                         nearest = min(nearest, rear - s)
-                        behind = -1 if on_lane else (1 if rear >= wait else 0)
+                        if behind == 2:
+                            led = asked
+                            behind = -1 if on_lane else (1 if rear >= wait else 0)
+                    if on_way and ahead["s"] >= wait:
                         break
                 j = cruise.last[int(ends[p, 2])]
             else:
