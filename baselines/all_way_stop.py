@@ -1,52 +1,50 @@
-"""The all-way stop: everybody stops at the line, and goes in the order of stopping.
+"""The all-way stop: every vehicle stops at the line, and they go in the order of stopping.
 
-The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), but for
-one thing: SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
+The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), with one
+difference. SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
 for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it has left their way, so
-that nobody can collide whatever it does there.
+no two can collide whatever it does there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
-from minisim.errors import instance, number
 from minisim.junction.clearing import clearing_distances
+from minisim.parameters import declared, real, spelled
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
 STANDING = 0.1
 #: A vehicle stands at the line when its front is at most this far before it [m].
 LINE = 1.0
-#: Views reach that far beyond [m].
+#: How far views reach beyond that [m].
 SIGHT_MARGIN = 0.5
 
 
-@dataclass(frozen=True)
+@declared
 class AllWayStop:
-    """A junction where every vehicle stops, and who stopped first goes first.
+    """A junction where every vehicle stops, and the first to stop is the first to go.
 
     The first vehicle of each lane queues from the moment when it stands at the line; equal times
-    go by arm. A vehicle goes as soon as it has stood for `reaction`, nobody conflicting has stood
-    for longer, and every conflicting vehicle that was let go has left its way. So those who do not
-    conflict go together, and may overtake in the queue; but nobody is passed over for ever, since
-    whoever waits keeps every later conflicting vehicle back.
+    go by arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle has
+    stood for longer, and every conflicting vehicle that was let go has left its way. So vehicles
+    that do not conflict go together, and may overtake in the queue. But none is passed over for
+    ever, since a waiting vehicle keeps every later conflicting one back.
 
-    Attributes:
-        reaction: how long a driver stands before it goes [s]: SUMO's `jmAllwayStopWait`, whose
-            default is a single step. 1 s is the reaction time in SUMO's safety measures
-            (device SSM, MDRAC).
-        name: short name.
     """
 
-    reaction: float = 1.0
-    name: str = "all-way-stop"
+    # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
+    # safety measures (device SSM, MDRAC).
+    reaction: float = real(
+        "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
+    )
 
-    def __post_init__(self) -> None:
-        number("reaction [s]", self.reaction, low=0, high=60)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `all-way-stop:reaction=0`."""
+        return spelled("all-way-stop", self)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""
@@ -54,11 +52,11 @@ class AllWayStop:
 
 
 class AllWayStopSession:
-    """Who stands since when, and who was let go.
+    """Since when each vehicle stands, and which were let go.
 
-    It is called when somebody comes to the line, when the junction gets clear, and when it asked
-    for it: at the earliest time at which somebody at the line can stand, has stood long enough, or
-    can have his way free.
+    It is called when a vehicle comes to the line, when the junction gets clear, and when it asks
+    for that: at the earliest time at which a vehicle at the line can stand, has stood long enough,
+    or can find its way free.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
@@ -72,7 +70,7 @@ class AllWayStopSession:
         self._gone: set[int] = set()
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Let go whose turn it is; timers ring on whole steps, half a step early at most."""
+        """Let go every vehicle whose turn it is; timers ring at most half a step early."""
         self._gone.intersection_update([v.id for v in view.vehicles])
         crossing = [v for v in view.vehicles if v.id in self._gone or v.distance < 0.0]
         heads = self._heads(view)
@@ -106,7 +104,7 @@ class AllWayStopSession:
         return [vehicle for vehicle in heads.values() if vehicle.distance <= LINE]
 
     def _stop_time(self, vehicle: Observed, now: float) -> float:
-        """When a held vehicle can stand at the earliest: it brakes comfortably [s]."""
+        """The earliest time at which a held vehicle can stand, braking comfortably [s]."""
         return now + (vehicle.speed - STANDING) / self._vehicle.deceleration
 
     def _free_time(
@@ -116,10 +114,10 @@ class AllWayStopSession:
         crossing: Iterable[Observed],
         now: float,
     ) -> float:
-        """When the vehicle may go at the earliest; infinite if that hangs on another wake-up [s].
+        """The earliest time at which a vehicle may go; infinite if another wake-up decides it [s].
 
-        Now, if no conflicting vehicle has stood for longer or is in the way. One that is in the
-        way leaves it no sooner than by accelerating all it can.
+        That is now, if no conflicting vehicle has stood for longer or is in the way. One in the way
+        leaves it no sooner than at full acceleration.
         """
         clearing = self._clearing[self._index(vehicle)]
         if any(clearing[self._index(other)] > 0.0 for other in waiting):

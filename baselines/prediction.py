@@ -20,7 +20,7 @@ from minisim.jit import njit
 Floats = npt.NDArray[np.float64]
 
 
-class Motion(NamedTuple):
+class Following(NamedTuple):
     """Car following of a site's vehicles (SI units), as `minisim.vehicle.VehicleType` has it."""
 
     dt: float
@@ -35,8 +35,8 @@ class Motion(NamedTuple):
     limit: float
 
     @classmethod
-    def of(cls, site: Site) -> Motion:
-        """The motion of a site's vehicles on its roads."""
+    def of(cls, site: Site) -> Following:
+        """The law of a site's vehicles on its roads."""
         vehicle = site.vehicle
         return cls(
             dt=site.dt,
@@ -52,7 +52,7 @@ class Motion(NamedTuple):
         )
 
 
-class Way(NamedTuple):
+class Course(NamedTuple):
     """What a prediction needs of a path.
 
     Attributes:
@@ -66,11 +66,11 @@ class Way(NamedTuple):
     exit_arm: int
 
 
-def ways(site: Site) -> tuple[Way, ...]:
-    """The ways of all movements of a site."""
+def courses(site: Site) -> tuple[Course, ...]:
+    """The courses of all movements of a site."""
     junction = site.intersection
     return tuple(
-        Way(
+        Course(
             path.exit - path.entry,
             min(site.speed_limit, junction.turn_speed(path.movement, LATERAL_ACCELERATION)),
             path.exit_arm,
@@ -98,8 +98,8 @@ NO_LEADER = Leader(np.empty(0), np.empty(0))
 
 
 def predict(
-    motion: Motion,
-    way: Way,
+    law: Following,
+    course: Course,
     position: float,
     speed: float,
     *,
@@ -111,8 +111,8 @@ def predict(
     """Positions [m] and speeds [m/s] of a vehicle, one a step from now on, if it may drive on.
 
     Args:
-        motion: its car following.
-        way: its way through the junction.
+        law: its car following.
+        course: through the junction.
         position: past the junction entry [m].
         speed: [m/s].
         lane: the vehicle ahead in its lane.
@@ -124,10 +124,10 @@ def predict(
         None where it does not get through within the horizon, or where a leader appears beside or
         behind it, which would be an emergency.
     """
-    steps = math.ceil(horizon / motion.dt)
+    steps = math.ceil(horizon / law.dt)
     s, v = np.empty(steps), np.empty(steps)
     count = _drive(
-        motion, way.crossing, way.turn, position, speed, beyond,
+        law, course.crossing, course.turn, position, speed, beyond,
         lane.s, lane.v, lane.until,
         exit_lane.s, exit_lane.v, exit_lane.shift,
         s, v,
@@ -137,7 +137,7 @@ def predict(
 
 @njit
 def _drive(
-    motion: Motion,
+    law: Following,
     crossing: float,
     turn: float,
     position: float,
@@ -154,7 +154,7 @@ def _drive(
 ) -> int:
     """Fill `s_out` and `v_out`; the steps filled, or 0 where the vehicle does not get through."""
     s, v = position, speed
-    end = crossing + motion.length + beyond
+    end = crossing + law.length + beyond
     for k in range(len(s_out)):
         s_out[k], v_out[k] = s, v
         if s >= end:
@@ -163,27 +163,23 @@ def _drive(
         first = True  # no vehicle is between it and the junction
         if k < len(lane_s):
             first = lane_s[k] >= 0.0
-            rear = lane_s[k] - motion.length
+            rear = lane_s[k] - law.length
             if rear < lane_until:
                 if rear <= s:
                     return 0
-                z = gap_ratio(
-                    v, rear - s, lane_v[k], motion.a, motion.b, motion.headway, motion.min_gap
-                )
+                z = gap_ratio(v, rear - s, lane_v[k], law.a, law.b, law.headway, law.min_gap)
         if k < len(exit_s) and exit_s[k] >= 0.0 and (first or s >= 0.0):
-            gap = exit_s[k] + exit_shift - motion.length - s
+            gap = exit_s[k] + exit_shift - law.length - s
             if gap <= 0.0:
                 return 0
-            z = max(
-                z, gap_ratio(v, gap, exit_v[k], motion.a, motion.b, motion.headway, motion.min_gap)
-            )
-        v0 = turn if 0.0 <= s < crossing else motion.limit
-        if motion.improved:
-            acc = iidm(v, v0, z, motion.a, motion.b, motion.delta)
+            z = max(z, gap_ratio(v, gap, exit_v[k], law.a, law.b, law.headway, law.min_gap))
+        v0 = turn if 0.0 <= s < crossing else law.limit
+        if law.improved:
+            acc = iidm(v, v0, z, law.a, law.b, law.delta)
         else:
-            acc = idm(v, v0, z, motion.a, motion.b, motion.delta)
-        if s < 0.0 and v + acc * motion.dt > turn:
-            slower = max(speed_towards(v, turn, -s, motion.b, motion.dt), turn)
-            acc = min(acc, max((slower - v) / motion.dt, -motion.b))
-        s, v = ballistic(s, v, max(acc, -motion.b_max), motion.dt)
+            acc = idm(v, v0, z, law.a, law.b, law.delta)
+        if s < 0.0 and v + acc * law.dt > turn:
+            slower = max(speed_towards(v, turn, -s, law.b, law.dt), turn)
+            acc = min(acc, max((slower - v) / law.dt, -law.b))
+        s, v = ballistic(s, v, max(acc, -law.b_max), law.dt)
     return 0

@@ -1,28 +1,29 @@
 """Space-time reservation, first come first served, on pairwise conflict zones.
 
 Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
-passage; the manager looks ahead how it would drive, and grants the passage if the space that it
-needs is free at the time. Theirs is a grid of tiles, ours the conflict zones of the movements
+passage. The manager predicts how it would drive, and grants the passage if the space that it needs
+is free at the time. Theirs is a grid of tiles. Ours are the conflict zones of the movements
 (`minisim.junction.zones`): only pairs matter, and for a pair their stretches are exact.
 
 The protocol
-- The first vehicle of a lane asks, and whoever follows a holder; from `reach` before the junction
-  on. Its passage is predicted at full acceleration up to the limits (`baselines.prediction`),
-  behind the vehicle ahead in its lane and behind the last to enter its exit lane before it.
-- The passage is granted when with every other holder in conflict one of the two has left its zone
+- The first vehicle of a lane asks, and so does one behind a holder, from `reach` before the
+  junction on. Its passage is predicted at full acceleration up to the limits
+  (`baselines.prediction`), behind the vehicle ahead in its lane and behind the last to enter
+  its exit lane before it.
+- The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Into one exit lane holders go in the order of
   their grants, so a later grant never slows down an earlier one.
-- Whoever is refused drives up to its stop line, slowing down as late as is comfortable, and is
+- A refused vehicle drives up to its stop line, slowing down as late as is comfortable. It is
   considered again every `period`, in the order of first requests.
 
-What safety rests on: not on far predictions. Every `period` the manager compares holders with
-what was predicted. For one that differs it predicts anew, from what it sees. A holder that no
-longer fits, with a new prediction, among all others, loses its reservation if it can still stop;
-so does whoever follows it. So when a vehicle becomes unable to stop, its passage fits those of all
-others that can not, and whoever still can yields to it. What remains is the error of a prediction
-over a vehicle's last few seconds before its zones, from a state that is at most a period old, and
-`buffer` is there for it. In minisim it is small: up to 0.15 m beyond the point of no return (4
-arms, 350 veh/h/lane), from leaders further ahead than the two that a prediction looks at.
+Safety does not rest on far predictions. Every `period` the manager compares holders with what was
+predicted. For one that differs it predicts anew, from what it sees. A holder that no longer fits
+among all others, with a new prediction, loses its reservation if it can still stop; so does a
+vehicle that follows it. So when a vehicle becomes unable to stop, its passage fits those of all
+others that cannot stop, and those that can yield to it. What remains is the error of a prediction
+over a vehicle's last few seconds before its zones, from a state that is at most a period old.
+`buffer` is there for that error. In minisim it is small: up to 0.15 m beyond the point of no return
+(4 arms, 350 veh/h/lane), from leaders further ahead than the two that a prediction looks at.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from baselines.prediction import NO_LEADER, Floats, Leader, Motion, predict, ways
+from baselines.prediction import NO_LEADER, Floats, Following, Leader, courses, predict
 from minisim.control import (
     Command,
     Go,
@@ -44,46 +45,42 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.zones import conflict_zones
+from minisim.parameters import declared, real, spelled
 from minisim.vehicle import CruiseVehicle
 
-#: Differences from the prediction that are none [m], [m/s].
+#: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
 
 #: How far past the junction exit a rear is followed, for those behind it [m].
 BEYOND = 60.0
 
 
-@dataclass(frozen=True)
+@declared
 class Reservation:
-    """Space-time reservation, first come first served, for vehicles that follow the IDM.
+    """Space-time reservation, first come first served, for vehicles that follow the IDM."""
 
-    Attributes:
-        reach: how far before the junction vehicles ask [m]; None is as late as they can without
-            slowing down for a refusal: stopping distance at the limit, and a period's way. Asking
-            earlier keeps room for those who are far from those who are near: at 350 veh/h/lane
-            (fair) mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
-        buffer: between one vehicle's leaving a conflict zone and the other's entering its own [s]:
-            0.25 s on either side, as at the edge tiles of the AIM4 simulator.
-        period: time between two looks at holders and requests [s].
-        name: short name.
+    # Asking earlier keeps room for vehicles far away from those that are near: at 350 veh/h/lane
+    # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
+    reach: float | None = real(
+        "how far before the junction vehicles ask; none is as late as they can without slowing "
+        "down for a refusal: the stopping distance at the limit, and a period's way", "m",
+        low=1, high=1000, optional=True, default=None,
+    )  # fmt: skip
+    # 0.25 s on either side, as at the edge tiles of the AIM4 simulator.
+    buffer: float = real(
+        "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
+        low=0, high=10, default=0.5,
+    )  # fmt: skip
+    period: float = real(
+        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
+    )
 
-    Raises:
-        InputError: a value out of range.
-    """
-
-    reach: float | None = None
-    buffer: float = 0.5
-    period: float = 0.5
-    name: str = "reservation"
-
-    def __post_init__(self) -> None:
-        if self.reach is not None:
-            number("reach [m]", self.reach, low=1, high=1000)
-        number("buffer [s]", self.buffer, low=0, high=10)
-        number("period [s]", self.period, low=0.01, high=10)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `reservation:buffer=1`."""
+        return spelled("reservation", self)
 
     def start(self, site: Site) -> ReservationSession:
         """Begin a run; raises `InputError` for vehicles whose motion is not predicted."""
@@ -131,10 +128,10 @@ class Slot:
 
 
 class Manager:
-    """Who holds which reservation, and which are possible; times in steps of the host.
+    """Which vehicles hold which reservation, and which are possible; times in steps of the host.
 
     Args:
-        site: where.
+        site: of the run.
         buffer: see `Reservation` [s].
 
     Attributes:
@@ -149,8 +146,8 @@ class Manager:
                 "use the profile paper or fair"
             )
         self.slots: dict[int, Slot] = {}
-        self._motion = Motion.of(site)
-        self._ways = ways(site)
+        self._motion = Following.of(site)
+        self._ways = courses(site)
         self._zones: list[dict[int, tuple[float, float]]] = [
             {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
             for row in conflict_zones(site).tolist()
@@ -161,9 +158,9 @@ class Manager:
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int, ahead: Slot | None) -> Slot | None:
-        """The passage of a vehicle behind `ahead` in its lane; None where there is none in sight.
+        """The passage of a vehicle behind `ahead` in its lane; None where none is in sight.
 
-        Behind the holder that is last to enter the same exit lane, too, but for itself.
+        It also drives behind the last other holder to enter the same exit lane.
         """
         p = seen.lane * self._manoeuvres + seen.manoeuvre - 1
         way = self._ways[p]
@@ -213,12 +210,12 @@ class Manager:
         return True
 
     def _before_other(self, first: Slot, second: Slot, merges: bool) -> bool:
-        """Whether `first` is through before `second` comes; into one exit lane, enters before."""
+        """Whether `first` is through before `second` comes, and enters a common exit lane first."""
         through = first.zones[second.movement][1] + self._buffer <= second.zones[first.movement][0]
         return through and (not merges or first.enters < second.enters)
 
     def _before(self, exit_arm: int, seen: Observed) -> Slot | None:
-        """The last holder to enter an exit lane before a vehicle; of all, where it holds none."""
+        """The last holder to enter an exit lane before a vehicle, or of all where it holds none."""
         own = self.slots.get(seen.id)
         latest = math.inf if own is None else own.enters
         rivals = [
@@ -252,7 +249,7 @@ class ReservationSession:
         self._requests: dict[int, None] = {}  # in the order of first requests
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Check the reservations, then consider the requests in the order of the first ones."""
+        """Check the reservations, then consider the requests in the order in which they came."""
         now = round(view.time / self._dt)
         manager = self.manager
         seen = {vehicle.id: vehicle for vehicle in view.vehicles}
@@ -279,10 +276,10 @@ class ReservationSession:
     def _revoke(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
     ) -> Iterator[int]:
-        """Renew what differs from its prediction; the ids of those who lose their reservation.
+        """Renew what differs from its prediction; the ids of vehicles that lose their reservation.
 
-        First those who can not stop: they keep theirs in any case, and if one no longer fits,
-        every reservation of those who can stop is checked again.
+        Vehicles that cannot stop come first. They keep theirs in any case, and if one of them no
+        longer fits, every reservation of a vehicle that can stop is checked again.
         """
         slots = self.manager.slots
         stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}

@@ -1,57 +1,54 @@
 """V2I-C: a serving list at the roadside advises every vehicle when to reach its stop line.
 
 Source: Li, Liu, PLOS ONE 15(7), 2020, e0235644, and the authors' own code. A unit at the junction
-keeps a list of the vehicles in its range in the order in which they came. It knows of each when
-it will have left the junction, and tells whoever conflicts with vehicles ahead of it in the list
-to arrive when the last of those leaves. Where we differ, we differ for safety's sake:
+lists the vehicles in its range in the order in which they came. It knows when each will have left
+the junction. A vehicle in conflict with some ahead of it in the list is told to arrive when the
+last of those leaves. Where we differ, we differ for safety's sake:
 
 - distances are those to the true stop line, and a vehicle has left when its rear bumper is out of
   the junction; the conflicts are those of the geometry, merging included;
 - a speed is advice: the vehicle accelerates and brakes as its car following does, never above the
   limit, and stops at its line unless the unit has let it go;
 - the right of way is given only when every conflicting vehicle ahead in the list *has* left, even
-  when the time until then is estimated to be 0; it is never taken back. Whoever conflicts and
+  when the time until then is estimated to be 0. It is never taken back. A conflicting vehicle that
   comes later waits in the same way, so two vehicles in conflict never hold it at once;
-- leaving times are capped (`leaving_time`), for distance by speed explodes at low speed, and a
-  vehicle that crawls would stop those behind it in the list far from the junction.
+- leaving times are capped (`leaving_time`), because distance over speed explodes at low speed, and
+  a crawling vehicle would stop those behind it in the list far from the junction.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
-from minisim.errors import instance, number
+from minisim.errors import instance
+from minisim.parameters import declared, real, spelled
 
 #: Added to speeds that divide, as in the authors' code [m/s].
 CRAWL = 1e-5
 
 
-@dataclass(frozen=True)
+@declared
 class V2IC:
-    """The V2I controller of Li and Liu on this intersection.
+    """V2I-C, the controller of Li and Liu: a roadside unit with a serving list advises speeds."""
 
-    Attributes:
-        reach: how far before the junction vehicles register [m]; 200 in the authors' code.
-        period: time between two pieces of advice while anybody waits [s]. The authors' 0.01 s is
-            their simulation step. On 4 arms at 350 veh/h/lane the mean time loss is 8.9 s at
-            0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), for an eighth of the work.
-        name: short name.
+    # 200 m in the authors' code.
+    reach: float = real(
+        "how far before the junction vehicles register", "m", low=1, high=2000, default=200.0
+    )
+    # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
+    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), for an eighth of the
+    # work.
+    period: float = real(
+        "time between two pieces of advice while any vehicle waits", "s",
+        low=0.01, high=10, default=1.0,
+    )  # fmt: skip
 
-    Raises:
-        InputError: a value out of range.
-    """
-
-    reach: float = 200.0
-    period: float = 1.0
-    name: str = "v2ic"
-
-    def __post_init__(self) -> None:
-        number("reach [m]", self.reach, low=1, high=2000)
-        number("period [s]", self.period, low=0.01, high=10)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `v2ic:reach=100`."""
+        return spelled("v2ic", self)
 
     def start(self, site: Site) -> V2ICSession:
         """Begin a run."""
@@ -75,7 +72,7 @@ def time_to_cover(distance: float, speed: float, acceleration: float, limit: flo
 def advised_speed(distance: float, speed: float, time: float, limit: float) -> float:
     """Speed to command so that a vehicle covers `distance` in `time` [m/s], within [0, limit].
 
-    2·D/M − v, where uniform braking ends: v − dec·M with dec = 2·(v·M − D)/M². Whoever stands at
+    This is 2·D/M − v, where uniform braking ends: v − dec·M with dec = 2·(v·M − D)/M². A vehicle at
     the line, or past it, stays. A time of 0 or less asks for no braking.
     """
     if distance <= 0.0:
@@ -86,14 +83,14 @@ def advised_speed(distance: float, speed: float, time: float, limit: float) -> f
 
 
 class ServingList:
-    """Who is served, in order of registration, and what follows from it.
+    """The vehicles to serve, in order of registration, and what follows from that.
 
     Args:
-        site: where.
+        site: of the run.
 
     Attributes:
         order: ids of the registered vehicles, in order of registration.
-        granted: ids of those with the right of way.
+        granted: ids of the vehicles with the right of way.
     """
 
     def __init__(self, site: Site) -> None:
@@ -107,7 +104,7 @@ class ServingList:
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
 
     def register(self, seen: dict[int, Observed]) -> None:
-        """Drop who has left, append who is new, nearest first."""
+        """Drop vehicles that have left, append new ones, nearest first."""
         self.order = [vehicle for vehicle in self.order if vehicle in seen]
         known = set(self.order)
         self.granted &= known
@@ -116,7 +113,7 @@ class ServingList:
         self.order += [vehicle.id for vehicle in new]
 
     def serve(self, seen: dict[int, Observed]) -> Iterable[Command]:
-        """One round through the list: the right of way for whoever is free, advice for the rest.
+        """One round through the list: the right of way for the free, advice for the rest.
 
         Args:
             seen: the registered vehicles by id.
@@ -142,8 +139,8 @@ class ServingList:
     def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
         """Time until a vehicle has left, `distance` ahead at its present speed [s].
 
-        No more than `blocked` (until it can be let go) and a start from rest at this place. Never
-        0, for whoever is listed has not left.
+        It is no more than `blocked` (until it can be let go) and a start from rest at this place,
+        and never 0, for a listed vehicle has not left.
         """
         from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)
@@ -154,8 +151,8 @@ class V2ICSession:
 
     Attributes:
         serving: the list.
-        plan: a wake-up where vehicles register and where they have left; advice in between is
-            asked for only while somebody waits.
+        plan: a wake-up where vehicles register and where they have left; in between only while
+            any waits.
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:

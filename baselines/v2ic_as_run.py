@@ -1,32 +1,30 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
-`baselines.v2ic` is the controller as it is meant. This module holds what the comparison in the
-paper ran instead, quirk by quirk, and nothing else knows of them:
+`baselines.v2ic` is the intended controller. This module holds what the comparison in the paper ran
+instead, quirk by quirk, and no other module knows of them:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
    junction begins at 488.7 m; so the "stop line" is 108.7 m before the junction, and vehicles
    leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
 2. *right-hand conflicts*: the conflicts are those of right-hand traffic, the network is
    left-hand: of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
-3. *no stop line*: vehicles never stop for one; they are advised speeds, and whoever cannot keep
-   out of the way drives on;
+3. *no stop line*: vehicles never stop for one; they are advised speeds, and a vehicle that cannot
+   keep out of the way drives on;
 4. *free for a moment is free*: at its release a vehicle is expected to leave after (v_des − v)/a,
-   though the speed is cut to 20 m/s: 1.3 s instead of 11 s, for one step, in the visit of those
+   though the speed is cut to 20 m/s. That is 1.3 s instead of 11 s, for one step, for the vehicles
    behind it in the list;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
    so vehicles leave at 20 m/s;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
    advice of 0 stops a vehicle at once.
 
-Vehicles drive the loop of the authors' driver every 0.01 s; what it sets, takes effect in the
-next step.
+The loop of the authors' driver runs every 0.01 s, and what it sets takes effect in the next step.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -34,8 +32,9 @@ import shapely
 
 from baselines.v2ic import CRAWL
 from minisim.control import Advise, Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.geometry import Intersection
+from minisim.parameters import declared, real, spelled
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
@@ -44,7 +43,7 @@ STOP_LINE = 20.0  #: of the "stop line" before the reference, and of what is cle
 PLATOON = 4.0  #: length of a platoon of one vehicle [m]
 ACCELERATION = 2.6  #: of the release formula [m/s²]
 TOP_SPEED = 20.0  #: advice is cut to this [m/s]
-NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks nobody [s]
+NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks no vehicle [s]
 
 #: Distance driven at which a vehicle leaves the list [m].
 LEFT = REFERENCE + PLATOON + STOP_LINE
@@ -58,33 +57,25 @@ INSERTION = 0.1
 #: Room for rounding where a mark and a distance are compared [m].
 ROUNDING = 1e-9
 
-#: Far from the centre enough that opposite far turns do not meet, as on the junction of several
-#: lanes that the conflicts were written for [m].
+#: A junction radius at which opposite far turns do not meet, as on the junction of several lanes
+#: that the conflicts were written for [m].
 WIDE = 20.0
 
 
-@dataclass(frozen=True)
+@declared
 class V2ICAsRun:
-    """V2I-C as the authors of the paper ran it, for 4 arms; it may collide.
+    """V2I-C as the authors of the paper ran it, for 4 arms; it may collide."""
 
-    Attributes:
-        approach_speed: desired from insertion to the first advice [m/s]: 16.6 in the balanced
-            runs, 14 (the vehicle's own) in the others.
-
-    Raises:
-        InputError: no such speed.
-    """
-
-    approach_speed: float = 16.6
-
-    def __post_init__(self) -> None:
-        number("approach_speed [m/s]", self.approach_speed, above=0, high=100)
+    approach_speed: float = real(
+        "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "
+        "vehicle's own) in the others", "m/s",
+        above=0, high=100, default=16.6,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`v2ic-as-run`, and the approach speed where it is not that of the balanced runs."""
-        speed = "" if self.approach_speed == 16.6 else f"-{self.approach_speed:g}"
-        return f"v2ic-as-run{speed}"
+        """Its spelling, such as `v2ic-as-run:approach_speed=14`."""
+        return spelled("v2ic-as-run", self)
 
     def start(self, site: Site) -> V2ICAsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""
@@ -93,7 +84,7 @@ class V2ICAsRun:
 
 @lru_cache
 def right_hand_conflicts() -> tuple[frozenset[int], ...]:
-    """Of each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
+    """For each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
 
     Movements are numbered as `Intersection.movements` does. Only centre lines count.
     """
@@ -116,7 +107,7 @@ class Platoon(NamedTuple):
         movement: index of its movement.
         driven: distance since insertion [m].
         speed: [m/s].
-        order: sorts those who register in the same step, as the authors' driver spawned them.
+        order: sorts vehicles that register in the same step, as the authors' driver spawned them.
     """
 
     movement: int
@@ -130,7 +121,7 @@ class AsRunList:
 
     Attributes:
         order: ids in the serving list, in order of registration.
-        granted: ids of those that were released ("priority 0").
+        granted: ids of the vehicles that were released ("priority 0").
     """
 
     def __init__(self) -> None:
@@ -163,7 +154,7 @@ class AsRunList:
         return speeds
 
     def _register(self, platoons: dict[int, Platoon]) -> None:
-        """Append who has come, remove who has left; in most steps it is neither."""
+        """Append vehicles that came, remove those that left; in most steps there are none."""
         if any(v not in platoons or platoons[v].driven >= LEFT for v in self.order):
             self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
             self.granted.intersection_update(self.order)
@@ -177,12 +168,12 @@ class AsRunList:
 
 
 class V2ICAsRunSession:
-    """One run: reads the host's views, tells what changes.
+    """One run: reads the host's views, and commands what changes.
 
     Attributes:
         rules: the authors' loop body.
         plan: what the host has to provide: a wake-up at insertion, where vehicles register, and
-            where they leave the list; in between every step is asked for while anybody waits.
+            where they leave the list; in between at every step while any waits.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
@@ -208,7 +199,7 @@ class V2ICAsRunSession:
         self._desired: dict[int, float] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
-        """One round of the rules; another one in the next step while anybody waits."""
+        """One round of the rules, and another in the next step while any vehicle waits."""
         rules, desired = self.rules, self._desired
         speeds = {v.id: self._approach_speed for v in view.vehicles if v.id not in desired}
         speeds.update(rules.step(self._platoons(view)))
@@ -225,7 +216,7 @@ class V2ICAsRunSession:
         return commands
 
     def _platoons(self, view: View) -> dict[int, Platoon]:
-        """Who may be in the list: the others do not count, and they are most of the view."""
+        """The vehicles that may be in the list; the others are most of the view."""
         platoons = {}
         for vehicle, lane, manoeuvre, distance, speed, _, demand_time in view.vehicles:
             driven = self._origin - distance + ROUNDING

@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from dim.decision import DecisionTable
 from dim.perception import COMMITS, Percept
-from minisim.errors import choice, instance
+from minisim.parameters import declared, part, word
 
-#: Who may enter while others cross. "clear": nobody new (the paper). "harmonious": a participant
-#: in harmony with all of them (ours); behind a vehicle of its own lane it just follows.
+#: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious": a
+#: participant in harmony with all of them (ours); behind a vehicle of its own lane it just follows.
 GATES = ("clear", "harmonious")
 
 
-@dataclass(frozen=True)
+@declared
 class Rules:
-    """The public rules: all vehicles hold the same ones, and nothing else in common.
+    """The public rules: all vehicles hold the same ones, and nothing else in common."""
 
-    Attributes:
-        table: the decision of every case.
-        gate: who may enter while others cross, see `GATES`.
-        commit: when a vehicle is committed, see `perception.COMMITS`.
-    """
-
-    table: DecisionTable
-    gate: str = "clear"
-    commit: str = "stoppable"
-
-    def __post_init__(self) -> None:
-        instance("table", self.table, DecisionTable)
-        choice("gate", self.gate, GATES)
-        choice("commit rule", self.commit, COMMITS)
+    table: DecisionTable = part("the decision of every case", DecisionTable)
+    gate: str = word(
+        "which vehicles may enter while others cross, see `GATES`", GATES, default="clear"
+    )
+    commit: str = word(
+        "when a vehicle is committed, see `perception.COMMITS`", COMMITS,
+        default="stoppable", label="commit rule",
+    )  # fmt: skip
 
 
 class Agent:
-    """One vehicle's side of Algorithm 1; it remembers only whether it holds the right of way.
+    """One vehicle's side of Algorithm 1; it only remembers whether it holds the right of way.
 
     Attributes:
         vehicle: its id.
@@ -53,17 +45,18 @@ class Agent:
     def decide(self, percept: Percept, table: DecisionTable | None = None) -> bool:
         """Whether it goes, from what it perceives now (lines 4–12 of Algorithm 1).
 
-        Crossing, it keeps going; by the paper's commit rule it also goes when it rolled past
-        half of the green zone after losing its right of way ("it is granted the right of way by
-        others"). By the stoppable rule such a vehicle is stopping, and waits. Not yet its lane's
-        front vehicle, or held out by the gate, it does what it did before. Otherwise it goes
-        exactly if it belongs to the clique; where it does not know somebody's intent, exactly if
-        it belongs to the clique of every case that may be meant. So all who go belong to the
-        clique of the true case, however little each of them knows.
+        - A crossing vehicle keeps going. By the paper's commit rule it also goes when it rolled
+          past half of the green zone after losing its right of way ("it is granted the right of
+          way by others"). By the stoppable rule such a vehicle is stopping, and waits.
+        - A vehicle that is not yet the first of its lane, or that the gate holds out, does what it
+          did before.
+        - Any other goes exactly if it belongs to the clique. Where it does not know another's
+          intent, it goes exactly if it belongs to the clique of every possible case. So all that go
+          belong to the clique of the true case, however little each of them knows.
 
         Args:
             percept: what it sees.
-            table: of the lane priorities in force now, where these change; by default the rules'.
+            table: for the lane priorities now in force, where these change; by default the rules'.
         """
         rules = self.rules
         table = rules.table if table is None else table

@@ -1,33 +1,34 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
 The paper describes one algorithm; the runs behind its figures followed another. This module holds
-what they did, so that those runs can be replayed vehicle by vehicle, and it holds all of it: no
-other module knows of these rules. What is meant and what is a slip cannot be told apart from
-outside; here each is a named quirk:
+what these runs did, so that they can be replayed vehicle by vehicle. It holds all of it: no other
+module knows of these rules. What is intended and what is a slip cannot be told from outside, so
+each is a named quirk here:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
-   road, and `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
-2. *speeds by decree*: nobody slows down for a zone; on entering it the desired speed is replaced
-   (14 m/s on the road, 10 in the red zone, 0 without and 10 with the right of way, 20 behind);
+   road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
+2. *speeds by decree*: no vehicle slows down for a zone. When it enters one, its desired speed is
+   replaced (14 m/s on the road, 10 in the red zone, 0 without and 10 with the right of way, 20
+   behind);
 3. *names decide*: vehicles are visited in the alphabetical order of their names, `v<second of
    demand>.<lane>_<manoeuvre>`, so that v100 comes before v99;
-4. *short action list*: only as many vehicles as there are arms take part, whoever is visited
-   first; places are given back 506 m after insertion;
+4. *short action list*: only as many vehicles take part as there are arms, first visited, first
+   listed; a vehicle gives its place back 506 m after insertion;
 5. *several of a lane*: the action list may hold two vehicles of one lane; of two with the same
    movement only the later entry can be chosen;
-6. *busy junction*: nothing is decided while anyone is between `bound` and 508 m;
-7. *green zone goes*: whoever is in the action list and within 2 m of `bound` drives on without
-   any right of way, at a desired speed of 50 m/s, and keeps the junction busy;
-8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then; who
-   loses it in the yellow zone is told 20 m/s for one step before it is held (the authors set 20
-   first and 10 at the end of their loop, to those who still have it);
+6. *busy junction*: nothing is decided while any vehicle is between `bound` and 508 m;
+7. *green zone goes*: a vehicle in the action list and within 2 m of `bound` drives on without any
+   right of way, at a desired speed of 50 m/s, and keeps the junction busy;
+8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then. A
+   vehicle that loses it in the yellow zone is told 20 m/s for one step before it is held (the
+   authors set 20 first, and 10 at the end of their loop for those that still have it);
 9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
    alphabet wins, whatever its size (`order="size"` is the rule that the paper describes);
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
     error at that vehicle, and nothing is decided in it.
 
-Times, lengths and speeds are those of the authors' driver (see `BOUND`, `RED` and the constants);
-whatever happens, happens at the end of a step and takes effect in the next.
+Times, lengths and speeds are those of the authors' driver (see `BOUND`, `RED` and the constants).
+Everything happens at the end of a step and takes effect in the next.
 """
 
 from __future__ import annotations
@@ -36,14 +37,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import takewhile
+from typing import Any
 
 import networkx as nx
 
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, number
+from minisim.errors import InputError, instance
 from minisim.junction.geometry import Movement
+from minisim.parameters import checked, declared, part, real, spelled, word
 
 #: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
 #: numbers are the authors' (`JUNC_BOUND` of their three drivers).
@@ -58,8 +61,8 @@ FREED = 506.0  #: distance driven at which a place in the action list is given b
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
 #: Distance driven from which on a vehicle is told 20 m/s for good [m]. The authors have no such
-#: limit, but the last word to any vehicle comes before 531 m in the three of their runs where it
-#: was looked up; a host need not show us vehicles for longer.
+#: limit, but in the three runs where it was looked up no vehicle is told anything after 531 m. A
+#: host need not show us vehicles for longer.
 FOLLOWED = 600.0
 
 #: A vehicle stays in view a little longer, so that it is still there when it has passed that [m].
@@ -78,41 +81,43 @@ INSERTION = 0.1
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
+def _names(title: str, value: Any) -> str:
+    """Check `AsRunDim.names`."""
+    instance(title, value, str)
+    if len(set(value)) != len(value):
+        raise InputError(f"{title} must be different letters, got {value!r}")
+    return str(value)
+
+
+@declared
 class AsRunDim:
-    """DIM as the authors ran it, for 3, 4 and 5 arms.
+    """DIM as the authors ran it for the published numbers, on 3, 4 and 5 arms; it may collide."""
 
-    Attributes:
-        order: "lanes" as in every published run, or "size" as the paper describes.
-        matrix: harmony of the movements; None is the paper's table.
-        names: what the authors called the arms, clockwise from north. Names decide who is first;
-            in the runs at 4:1:4:1 they were "acbd" instead of in alphabetical order.
-        exit_speed: desired behind the junction, 20 as in every published run of DIM [m/s].
-
-    Raises:
-        InputError: an unknown order, names that do not tell the arms apart, or an exit speed that
-            is not positive.
-    """
-
-    order: str = "lanes"
-    matrix: HarmonyMatrix | None = None
-    names: str = "abcde"
-    exit_speed: float = EXIT_SPEED
-
-    def __post_init__(self) -> None:
-        choice("order", self.order, ORDERS)
-        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
-        instance("names", self.names, str)
-        if len(set(self.names)) != len(self.names):
-            raise InputError(f"names must be different letters, got {self.names!r}")
-        number("exit_speed [m/s]", self.exit_speed, above=0.0)
+    order: str = word(
+        "what comes first: the highest-priority lanes, as in every published run, or the largest "
+        "clique, as the paper describes",
+        ORDERS, default="lanes",
+    )  # fmt: skip
+    matrix: HarmonyMatrix | None = part(
+        "harmony of the movements; none is the paper's table",
+        HarmonyMatrix,
+        kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
+        optional=True, default=None,
+    )  # fmt: skip
+    names: str = checked(
+        "the authors' letters of the arms, clockwise from north; they decide which vehicle is "
+        'first, and in the runs at 4:1:4:1 they were "acbd"',
+        _names, "different letters", default="abcde",
+    )  # fmt: skip
+    exit_speed: float = real(
+        "speed desired behind the junction, 20 in every published run of DIM", "m/s",
+        above=0.0, default=EXIT_SPEED,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`dim-as-run`, with `-size` and `-exit-14` where it differs from the published runs."""
-        size = "" if self.order == "lanes" else "-size"
-        leaves = "" if self.exit_speed == EXIT_SPEED else f"-exit-{self.exit_speed:g}"
-        return f"dim-as-run{size}{leaves}"
+        """Its spelling, such as `dim-as-run:order=size`."""
+        return spelled("dim-as-run", self)
 
     def start(self, site: Site) -> AsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""
@@ -149,9 +154,9 @@ class AsRunRules:
     """The authors' loop body: lists of vehicles and the desired speeds that follow from them.
 
     Attributes:
-        serving: ids of those from the red zone on until they are clear.
-        action: ids of those that take part, in order of entry.
-        chosen: ids of those with the right of way.
+        serving: ids of the vehicles from the red zone on until they are clear.
+        action: ids of the participants, in order of entry.
+        chosen: ids of the vehicles with the right of way.
     """
 
     def __init__(
@@ -225,7 +230,7 @@ class AsRunRules:
         return busy
 
     def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
-        """Green zone: who takes part goes regardless; whether anyone does."""
+        """Green zone: participants go regardless; whether there is one."""
         going = [
             vehicle
             for vehicle in takewhile(cars.__contains__, self.serving)
@@ -263,7 +268,7 @@ def winner(
 
 
 class AsRunSession:
-    """One run: reads the host's views, tells what changes.
+    """One run: reads the host's views, and commands what changes.
 
     Attributes:
         rules: the authors' loop body.
@@ -290,7 +295,7 @@ class AsRunSession:
         self._desired: dict[int, float] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
-        """One round of the rules; another one in the next step until nothing changes any more."""
+        """One round of the rules, repeated in the next step until nothing changes any more."""
         rules = self.rules
         before = (list(rules.serving), list(rules.action), rules.chosen)
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}

@@ -1,32 +1,34 @@
 """DIM as a controller: one agent per vehicle, hosted.
 
-The host calls at wake-ups only, while the vehicles of the paper look around all the time. A few
-wake-ups suffice, because between them no agent would change its mind:
+The vehicles of the paper look around all the time. The host calls at a few wake-ups only, and
+these suffice, because between them no agent would change its mind:
 
-- Somebody new takes part when a front bumper passes the start of the yellow zone (wake-up), or
-  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps
-  everyone where he is; the gate "harmonious" asks for a wake-up at the entry.
-- Somebody who takes part begins to cross only when it holds the right of way, since whoever
-  waits can stop. The gate "clear" then freezes what was decided. Under "harmonious" the choice
-  among the rest stays the same: what is left of the best clique is the best clique among the
-  movements in harmony with the one that went, for two cliques compare by the smallest lane rank
-  that only one of them has, and a lane that both have does not count.
-- Somebody stops crossing when its rear bumper leaves the junction (wake-up).
+- A new vehicle takes part when its front bumper passes the start of the yellow zone (a wake-up), or
+  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps every
+  vehicle where it is; the gate "harmonious" asks for a wake-up at the entry.
+- A participant begins to cross only when it holds the right of way, since a waiting vehicle can
+  stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
+  stays the same. What is left of the best clique is the best clique among the movements in harmony
+  with the one that went: two cliques compare by the smallest lane rank that only one of them has,
+  and a lane that both have does not count.
+- A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
-Four exceptions are looked after. Under `commit="paper"` a vehicle without right of way may roll
-past half of the green zone, where it is granted it: another mark. On a host whose brakes differ, a
-vehicle that loses its right of way may look committed until it stands: then the session looks again
-every step. Where lane priorities change with time (`dim.priorities`), it looks again when they do.
-And where perception errs, vehicles do not see the same, so nothing of the above holds: they look
-around with a period (`Perception.period`).
+There are four exceptions:
+
+- Under `commit="paper"` a vehicle without right of way may roll past half of the green zone, where
+  it is granted the right of way. That is another mark.
+- On a host whose brakes differ, a vehicle that loses its right of way may look committed until it
+  stands. The session then looks again every step.
+- Where lane priorities change with time (`dim.priorities`), it looks again when they do.
+- Where perception errs, vehicles do not see the same, and none of the above holds. They look around
+  with a period (`Perception.period`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal
 
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
@@ -42,9 +44,12 @@ from dim.priorities import (
     memory_of,
     rotating,
 )
+from dim.senses.noise import NoisyPerception
+from dim.senses.tally import Tally
 from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, number, show
+from minisim.errors import InputError, choice, instance, show
+from minisim.parameters import checked, declared, part, real, spelled, word
 
 #: Lane priorities that change with time.
 CHANGING = ("rotating", "waiting")
@@ -53,76 +58,76 @@ CHANGING = ("rotating", "waiting")
 SIGHT_MARGIN = 0.5
 
 
-@dataclass(frozen=True)
+def _priorities(title: str, value: Any) -> Any:
+    """Check `Dim.priorities`."""
+    if isinstance(value, str):
+        return choice(title, value, ("inflow", *CHANGING))
+    if not isinstance(value, (tuple, list)):
+        raise InputError(f"{title} must be lane ranks or 'inflow', got {show(value)}")
+    return lane_ranks(value, len(value))
+
+
+@declared
 class Dim:
-    """Decentralised intersection management: the paper's controller and our variants.
+    """Decentralised intersection management: vehicles decide alone, by the paper's rules or ours.
 
-    Attributes:
-        order: "size", the largest clique first, or "lanes", the highest-priority lanes first.
-        commit: "stoppable", committed when comfortable braking no longer stops it before the
-            junction, or "paper", past half of the green zone.
-        gate: who may enter while others cross: "clear", nobody new (the paper); "harmonious",
-            whoever is in harmony with all of them, where vehicles of one lane just follow each
-            other.
-        priorities: rank of each lane, 0 first; "inflow" ranks by descending demand, ties by
-            lane; "rotating" and "waiting" change with time, see `dim.priorities`; None is the
-            lanes' own order.
-        zones: the road markings.
-        matrix: harmony of the movements; None derives it from geometry and vehicle.
-        perception: what vehicles see of each other.
-        turn_time: how long a lane comes first in "rotating" and among equals in "waiting" [s].
-        sensor_range: how far vehicles see the others' approach lanes and yellow zones [m]; what
-            "waiting" may remember depends on it.
-        monitor: a safety monitor in every vehicle, or None.
-        period: look around every so many seconds too; None is as often as the perception needs,
-            which is never where it is exact.
-
-    Raises:
-        InputError: an unknown rule, or priorities that are no ranks.
+    `gate="harmonious"`, priorities other than the lanes' own order, and the monitor are ours.
     """
 
-    order: str = "size"
-    commit: str = "stoppable"
-    gate: str = "clear"
-    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = None
-    zones: Zones = field(default_factory=Zones)
-    matrix: HarmonyMatrix | None = None
-    perception: Perception = field(default_factory=ExactPerception)
-    turn_time: float = TURN_TIME
-    sensor_range: float = SENSOR_RANGE
-    monitor: Monitor | None = None
-    period: float | None = None
-
-    def __post_init__(self) -> None:
-        choice("order", self.order, ORDERS)
-        choice("commit rule", self.commit, COMMITS)
-        choice("gate", self.gate, GATES)
-        if isinstance(self.priorities, str):
-            choice("priorities", self.priorities, ("inflow", *CHANGING))
-        elif self.priorities is not None:
-            object.__setattr__(self, "priorities", _own_ranks(self.priorities))
-        instance("zones", self.zones, Zones)
-        instance("matrix", self.matrix, (HarmonyMatrix, type(None)))
-        instance("perception", self.perception, Perception)
-        instance("monitor", self.monitor, (Monitor, type(None)))
-        number("turn_time [s]", self.turn_time, low=1, high=3600)
-        number("sensor_range [m]", self.sensor_range, low=1, high=1000)
-        if self.period is not None:
-            number("period [s]", self.period, above=0)
+    order: str = word(
+        "what comes first: the largest clique, or the highest-priority lanes",
+        ORDERS, default="size",
+    )  # fmt: skip
+    commit: str = word(
+        "when a vehicle is committed: when comfortable braking no longer stops it before the "
+        "junction, or past half of the green zone",
+        COMMITS, default="stoppable", label="commit rule",
+    )  # fmt: skip
+    gate: str = word(
+        "which vehicles may enter while others cross: none (the paper), or those in harmony with "
+        "all of them; vehicles of one lane just follow each other",
+        GATES, default="clear",
+    )  # fmt: skip
+    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = checked(
+        "rank of each lane, 0 first: given, by descending demand, or changing with time (see "
+        "`dim.priorities`); none is the lanes' own order",
+        _priorities, "ranks | inflow | rotating | waiting", optional=True, default=None,
+    )  # fmt: skip
+    zones: Zones = part("the road markings", Zones, kinds={"zones": Zones}, default=Zones())
+    matrix: HarmonyMatrix | None = part(
+        "harmony of the movements; none derives it from geometry and vehicle",
+        HarmonyMatrix,
+        kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
+        optional=True, default=None,
+    )  # fmt: skip
+    perception: Perception = part(
+        "what vehicles see of each other",
+        Perception,
+        kinds={"exact": ExactPerception, "noisy": NoisyPerception},
+        default=ExactPerception(),
+    )
+    turn_time: float = real(
+        'how long a lane comes first in "rotating" and among equals in "waiting"', "s",
+        default=TURN_TIME, low=1, high=3600,
+    )  # fmt: skip
+    sensor_range: float = real(
+        "how far vehicles see the others' approach lanes and yellow zones; what \"waiting\" may "
+        "remember depends on it", "m",
+        default=SENSOR_RANGE, low=1, high=1000,
+    )  # fmt: skip
+    monitor: Monitor | None = part(
+        "a safety monitor in every vehicle", Monitor, kinds={"on": Monitor},
+        optional=True, default=None,
+    )  # fmt: skip
+    period: float | None = real(
+        "time between two looks, besides the wake-ups; none is what the perception needs", "s",
+        above=0, optional=True, default=None,
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """`dim`, and the rules in which it differs from the default: `dim-harmonious`."""
-        variants = {
-            self.gate: self.gate != "clear",
-            "lanes": self.order == "lanes",
-            "paper-commit": self.commit == "paper",
-            str(self.priorities): isinstance(self.priorities, str),
-            "priorities": isinstance(self.priorities, tuple),
-            self.perception.name: self.perception.name != "exact",
-            "monitored": self.monitor is not None,
-        }
-        return "-".join(["dim", *(name for name, differs in variants.items() if differs)])
+        """Its spelling, such as `dim:gate=harmonious`."""
+        return spelled("dim", self)
 
     def start(self, site: Site) -> DimSession:
         """Begin a run.
@@ -159,18 +164,24 @@ class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
     Attributes:
-        rules: those that all agents hold.
+        rules: the rules that all agents hold.
         reader: how they read what they see.
         see: what each of them sees.
         plan: what the host has to provide.
 
     Args:
-        dim, site: whose run it is, and where.
-        follows: whether the vehicle of an id follows DIM; others are seen, but not hosted.
+        dim: the recipe.
+        site: where it runs.
+        follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
+        truth: what vehicles would see of a view without an error, for the tally of errors.
     """
 
     def __init__(
-        self, dim: Dim, site: Site, follows: Callable[[int], bool] = lambda _: True
+        self,
+        dim: Dim,
+        site: Site,
+        follows: Callable[[int], bool] = lambda _: True,
+        truth: Callable[[View], View] = lambda view: view,
     ) -> None:
         instance("dim", dim, Dim)
         instance("site", site, Site)
@@ -191,32 +202,38 @@ class DimSession:
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
+        self._start = zones.yellow_start + ROUNDING
         self._ranks = _ranking(dim, site)
         self.see = dim.perception.start(site)
-        self._watch = (
-            dim.monitor.start(site, matrix, zones.yellow_start + ROUNDING) if dim.monitor else None
-        )
+        self._watch = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
+        self._truth = truth
+        errs = dim.perception.period is not None
+        self._tally = Tally(self.rules, self.reader, self._start) if errs else None
+
+    @property
+    def counts(self) -> Mapping[str, float]:
+        """What its wrong perception did so far (`dim.senses.tally`); empty where it is exact."""
+        return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Let every vehicle from the yellow zone on perceive and decide; tell what changed."""
+        """Let every vehicle from the yellow zone on perceive and decide; report what changed."""
         commands: list[Command] = []
-        agents: dict[int, Agent] = {}  # whoever has left the view is forgotten
-        start = self.plan.marks[0] + ROUNDING
+        agents: dict[int, Agent] = {}  # those that left the view are forgotten
         look_again = waiting = False
         table, until = self.table(view)
         seen = percept = None
         sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
-            if ego.distance > start or not self._follows(vehicle):
+            if ego.distance > self._start or not self._follows(vehicle):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent
             sight = sights[vehicle] = self.see(view, ego)
-            if sight is not seen or percept is None:  # all who see the same read the same
+            if sight is not seen or percept is None:  # vehicles that see the same read the same
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
             goes = agent.decide(percept, table)
@@ -233,6 +250,8 @@ class DimSession:
             going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
             commands += self._watch.look(view, sights, going)
             look_again |= self._watch.needed
+        if self._tally is not None:
+            self._tally.count(self._truth(view), sights, table, commands)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:
@@ -240,7 +259,7 @@ class DimSession:
         return commands
 
     def table(self, view: View) -> tuple[DecisionTable, float]:
-        """The table of the ranks in force now, and until when they are [s]; same view, same."""
+        """The table of the ranks now in force, and until when they hold [s]."""
         if self._ranks is None:
             return self.rules.table, math.inf
         ranks, until = self._ranks(view)
@@ -249,9 +268,9 @@ class DimSession:
 
 
 def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
-    """How the ranks of this run follow from what is seen, or None where they never change.
+    """How the ranks of this run follow from a view, or None where they never change.
 
-    All who take part know the same ranks, so a session works them out once for everybody.
+    All participants know the same ranks, so a session works them out once for all.
     """
     n = site.intersection.n
     if dim.priorities == "rotating":
@@ -263,9 +282,3 @@ def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
             view.time, n, watch.look(view.time, view.vehicles), memory, dim.turn_time
         )
     return None
-
-
-def _own_ranks(priorities: object) -> tuple[int, ...]:
-    if not isinstance(priorities, (tuple, list)):
-        raise InputError(f"priorities must be lane ranks or 'inflow', got {show(priorities)}")
-    return lane_ranks(priorities, len(priorities))

@@ -1,4 +1,4 @@
-"""Who crosses: from the participants' movements to one right of way, the same for everybody.
+"""Which vehicles cross: one right of way from the participants' movements, the same for all.
 
 The participants are the nodes of a graph, with an edge where two movements are in harmony; a
 clique of it can cross at once (paper, "Decentralized Intersection Management"). Which of several
@@ -129,9 +129,9 @@ def explain(
 class DecisionTable:
     """The decision of every case: the paper's "generated offline, queried online".
 
-    A case says what the front vehicle of each lane wants, 0 for nobody: n^n − 1 cases with
-    somebody. It is written as the integer Σ manoeuvre·n^lane, so every integer 1 … n^n − 1 is a
-    case and 0 is the empty junction. An entry is computed with networkx when it is first asked
+    A case says what the front vehicle of each lane wants, 0 where there is none: n^n − 1 cases
+    with a vehicle. It is written as the integer Σ manoeuvre·n^lane, so every integer 1 … n^n − 1 is
+    a case and 0 is the empty junction. An entry is computed with networkx when it is first asked
     for, and kept. Right of way is an integer with bit i set for lane i.
 
     Attributes:
@@ -142,8 +142,8 @@ class DecisionTable:
             one of the movements `crossing`, an integer with bit k set for the k-th movement.
             Movements of one lane follow each other and are not in conflict.
         surely: (case, unknown, crossing) -> lanes with the right of way whatever manoeuvre the
-            participants of the lanes `unknown` (bit i for lane i) take, who are missing in the
-            case, among those whom `crossing` admits.
+            participants of the lanes `unknown` (bit i for lane i) take, which are missing in the
+            case, among those that `crossing` admits.
 
     Raises:
         InputError: unknown order, or priorities that are no permutation of the lanes.
@@ -251,7 +251,7 @@ def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Moveme
 
 
 def maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
-    """All maximal cliques, in no order that anyone may rely on; each sorted by lane."""
+    """All maximal cliques, in no reliable order; each sorted by lane."""
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(m.origin for m in participants)
     graph.add_edges_from((a.origin, b.origin) for a, b in _edges(participants, matrix))

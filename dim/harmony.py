@@ -179,6 +179,12 @@ class HarmonyMatrix:
         # An unpickled array would be writable: go through the constructor.
         return HarmonyMatrix, (self.n, self.values)
 
+    @property
+    def spelling(self) -> str:
+        """What command lines and names of controllers call it; empty for all but the paper's."""
+        paper = self.n in PAPER_ARMS and self == HarmonyMatrix.paper(self.n)
+        return f"paper({self.n})" if paper else ""
+
     def __repr__(self) -> str:
         # The digest tells matrices apart wherever a controller's repr is kept as provenance.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]

@@ -1,42 +1,46 @@
 """The safety monitor: each vehicle's last resort when others do not do what it reads them to want.
 
-The decision protects whoever reads the others' intents right. A monitor does not decide; it looks,
-in one vehicle and at what that vehicle sees, at those who are crossing or can no longer stop:
+The decision protects vehicles that read the others' intents right. A monitor does not decide. It
+belongs to one vehicle, uses what that vehicle sees, and watches the others that cross or can no
+longer stop:
 
 - *What another may do* is what it was read to want, as long as its motion does not contradict
-  that. A vehicle beside every path that it could be on by that reading, or one that was read to
-  want this and then that, may do whatever its position on the fan of its lane's paths still allows.
+  that. Two kinds of vehicles may do whatever their position on the fan of their lane's paths still
+  allows: one beside every path that it could be on by that reading, and one that was read
+  differently at different times.
 - *Where it matters* is the conflict area of the two paths (`minisim.junction.occupancy`). The ego
-  has to be able to stop before it, however far the other goes, unless it is out of it in good time.
-- *Then it brakes*: when the braking that this takes is no longer less than comfortable, as hard as
-  it takes. Where it is too late for that it compares whether going on or braking touches.
+  has to be able to stop before that area, however far the other goes, unless it is out of it in
+  good time.
+- *When it brakes*: as soon as this takes at least comfortable braking, and as hard as it takes.
+  Where it is too late to stop, the monitor compares whether going on or braking makes the two
+  touch.
 
-Who crosses by unanimous decisions is in harmony with all others who do (the protocol's proof, see
-`dim.proofs.protocol`). So with exact perception, and `commit="stoppable"`, nobody is ever in the
-way of anybody as far as a monitor can tell, it never brakes, and a run is the same as without it.
+Vehicles that cross by unanimous decisions are in harmony with each other (the protocol's proof, see
+`dim.proofs.protocol`). So with exact perception and `commit="stoppable"`, no vehicle is ever in
+another's way as far as a monitor can tell. It never brakes, and a run is the same as without it.
 
-Two who brake for each other must not stand for ever: of two that stand, the one further in goes
-first, of equals the one of the first lane, unless the other stands in its way. Both can see that.
+Two vehicles that brake for each other must not stand for ever. Of two that stand, the one further
+in goes first, and of equals the one of the first lane, unless the other stands in its way. Both can
+see that.
 
-Nor must those who wait for each other: vehicles that read each other differently may each find
-that it is not its turn. Somebody always has a right of way, so where nobody crosses and everybody
-has been standing for a while, somebody has misread. Then the first lane goes, alone, for which no
-intent needs to be known.
+Vehicles that wait for each other must not do so for ever either: where they read each other
+differently, each may conclude that it is not its turn. There is always a right of way. So where no
+vehicle crosses and all have been standing for a while, some have misread. Then the first lane goes
+alone, for which no intent needs to be known.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
 from dim.perception import UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
-from minisim.errors import number
 from minisim.junction.occupancy import Area, area, passes, showing
+from minisim.parameters import declared, real
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
 #: safe [s]: a post-encroachment time below it is critical (Várhelyi, AAP 30(6), 1998).
@@ -51,47 +55,42 @@ TOLERANCE = 0.3
 #: a vehicle at 20 km/h takes through the junction.
 LOOK_AHEAD = 4.0
 
-#: Who is slower than this stands [m/s]; SUMO's definition of waiting.
+#: A slower vehicle stands [m/s]; SUMO's definition of waiting.
 STANDING = 0.1
 
 #: What a vehicle that stops leaves between itself and where it must not be [m].
 ROOM = 0.25
 
 
-#: How long all who take part stand before the first of them goes alone [s]: what an all-way stop
+#: How long all participants stand before the first of them goes alone [s]: what an all-way stop
 #: takes between two vehicles at most, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
 PATIENCE = 2.0
 
 
-@dataclass(frozen=True)
+@declared
 class Monitor:
-    """A last resort for every vehicle, beside what it decides.
+    """A last resort for every vehicle, beside what it decides."""
 
-    Attributes:
-        time_margin: least time between leaving a conflict area and another's entering it [s].
-        look_ahead: how far ahead motion is predicted [s].
-        tolerance: how far beside a path a vehicle may seem to be while it is on it [m].
-        deceleration: how hard it brakes at most [m/s²]; None is what the brakes can do.
-        patience: how long all who take part stand before the first of them goes alone [s].
-
-    Raises:
-        InputError: a number out of range.
-    """
-
-    time_margin: float = TIME_MARGIN
-    look_ahead: float = LOOK_AHEAD
-    tolerance: float = TOLERANCE
-    deceleration: float | None = None
-    patience: float = PATIENCE
-
-    def __post_init__(self) -> None:
-        number("time_margin [s]", self.time_margin, low=0, high=10)
-        number("look_ahead [s]", self.look_ahead, low=0.5, high=30)
-        number("tolerance [m]", self.tolerance, above=0, high=1)
-        number("patience [s]", self.patience, low=0.5, high=60)
-        if self.deceleration is not None:
-            # Less than 1 m/s² is no braking even on ice.
-            number("deceleration of the monitor [m/s²]", self.deceleration, low=1, high=1000)
+    time_margin: float = real(
+        "least time between leaving a conflict area and another's entering it", "s",
+        default=TIME_MARGIN, low=0, high=10,
+    )  # fmt: skip
+    look_ahead: float = real(
+        "how far ahead motion is predicted", "s", default=LOOK_AHEAD, low=0.5, high=30
+    )
+    tolerance: float = real(
+        "how far beside a path a vehicle may seem to be while it is on it", "m",
+        default=TOLERANCE, above=0, high=1,
+    )  # fmt: skip
+    # Less than 1 m/s² is no braking even on ice.
+    deceleration: float | None = real(
+        "how hard it brakes at most; none is what the brakes can do", "m/s²",
+        low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
+    )  # fmt: skip
+    patience: float = real(
+        "how long all that take part stand before the first of them goes alone", "s",
+        default=PATIENCE, low=0.5, high=60,
+    )  # fmt: skip
 
     def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
         """Begin a run.
@@ -108,7 +107,7 @@ class Watch:
     """The monitors of all vehicles in one run; each uses what its own vehicle sees.
 
     Attributes:
-        needed: whether anybody might get in the way of another before the next wake-up.
+        needed: whether a vehicle might get in another's way before the next wake-up.
     """
 
     def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
@@ -132,10 +131,10 @@ class Watch:
     def goes(
         self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
     ) -> bool:
-        """Whether a vehicle goes: as it decided, or alone where all stand and wait.
+        """Whether a vehicle goes, either as it decided, or alone where all stand and wait.
 
         Args:
-            view: the true one; of others only where they are and how fast is taken from it.
+            view: the true one; only positions and speeds of the others are taken from it.
             seen: what the ego sees.
             decided: whether it goes by its own decision.
             ranks: of the lanes, 0 first.
@@ -165,12 +164,12 @@ class Watch:
         return True
 
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
-        """Who has to brake, and how hard.
+        """Which vehicles have to brake, and how hard.
 
         Args:
-            view: the true one; of others only where they are and how fast is taken from it.
-            seen: what each vehicle in it that can decide sees, by id.
-            going: ids of those who hold a right of way.
+            view: the true one; only positions and speeds of the others are taken from it.
+            seen: what each deciding vehicle sees, by its id.
+            going: ids of the vehicles with the right of way.
         """
         crossing = [v for v in view.vehicles if self._crosses(v)]
         inside = {v.id for v in crossing}
@@ -205,7 +204,7 @@ class Watch:
         return vehicle.distance < 0.0 or not can_stop(vehicle, self._b)
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
-        """How hard the ego has to brake for another, whatever that may do [m/s²]; 0 not at all."""
+        """How hard the ego must brake for another, whatever that one does [m/s²]; or 0."""
         mine = ego.lane * (self._n - 1) + ego.manoeuvre - 1
         asked = 0.0
         for theirs in self._possible(other, readings):
@@ -241,11 +240,11 @@ class Watch:
         if self._passes_first(ego, other, shared, mirrored):
             return 0.0
         if not first and stopping_distance(ego.speed, self._b_max) + ROOM <= ego.distance:
-            room = min(room, ego.distance)  # there it keeps nobody from clearing the junction
+            room = min(room, ego.distance)  # where it blocks no vehicle that clears the junction
         return self._braking_for(ego, other, room - ROOM, shared)
 
     def _open(self, mine: int, x: float, other: Observed) -> bool:
-        """Whether nobody is in the ego's way as long as the other stands where its body is."""
+        """Whether the ego's way is free as long as the other stands where its body is."""
         body = other.lane * (self._n - 1) + other.manoeuvre - 1  # a path that it is on
         return passes(self._site, mine, x, body, -other.distance)
 

@@ -8,12 +8,11 @@ into the few facts that Algorithm 1 needs, the same way for every vehicle.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
-from minisim.errors import choice, instance, integer, number
+from minisim.parameters import declared, part, real, whole, word
 
 #: When a vehicle before the junction is committed. "stoppable": it can no longer stop before the
 #: junction by comfortable braking. "paper": it is past half of the green zone.
@@ -34,36 +33,27 @@ class Perception(Protocol):
     """A recipe for the vehicles' senses: hashable, picklable, never changed by a run."""
 
     @property
-    def name(self) -> str:
-        """Short name; "exact" where everybody sees everything as it is."""
-
-    @property
     def period(self) -> float | None:
         """How often vehicles must look [s]; None where what they see changes at wake-ups only.
 
-        DIM's few wake-ups suffice as long as all see the same (`dim.controller`). Once what one
-        sees may change by itself, vehicles have to look again and again.
+        DIM's few wake-ups suffice as long as all vehicles see the same (`dim.controller`). Where
+        what one sees may change by itself, vehicles have to look again and again.
         """
 
     def start(self, site: Site) -> See:
         """Begin a run: random streams and memory, if there are any, belong to the result."""
 
 
-@dataclass(frozen=True)
+@declared
 class ExactPerception:
-    """Everyone sees everything, at once and as it is: the paper's assumption."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return "exact"
+    """Every vehicle sees everything, at once and as it is: the paper's assumption."""
 
     @property
     def period(self) -> None:
-        """The wake-ups suffice."""
+        """None: the wake-ups suffice."""
 
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
-        """The view itself, which a session therefore reads once for all vehicles."""
+        """The view itself, which a session reads once for all vehicles."""
         return see_all
 
 
@@ -78,7 +68,7 @@ class Percept(NamedTuple):
     Attributes:
         participants: ids of the vehicles that take part, by lane: the front vehicle of each lane,
             if its front bumper is between the start of the yellow zone and the junction and
-            it is not committed. While it is, nobody of its lane takes part.
+            it is not committed. While it is committed, no vehicle of its lane takes part.
         crossing: ids of the vehicles that are crossing: committed, or any part of the body in
             the junction.
         case: the participants' movements as an integer, see `DecisionTable`.
@@ -95,27 +85,17 @@ class Percept(NamedTuple):
     unknown: int = 0
 
 
-@dataclass(frozen=True)
+@declared
 class Reader:
-    """How a view is read, by public rules that every vehicle shares.
+    """How a view is read, by public rules that every vehicle shares."""
 
-    Attributes:
-        n: number of arms.
-        zones: the road markings.
-        deceleration: the vehicles' comfortable braking [m/s²].
-        commit: when a vehicle is committed, see `COMMITS`.
-    """
-
-    n: int
-    zones: Zones
-    deceleration: float
-    commit: str = "stoppable"
-
-    def __post_init__(self) -> None:
-        integer("number of arms", self.n, low=3, high=12)
-        instance("zones", self.zones, Zones)
-        number("deceleration [m/s²]", self.deceleration, above=0)
-        choice("commit rule", self.commit, COMMITS)
+    n: int = whole("number of arms", low=3, high=12, label="number of arms")
+    zones: Zones = part("the road markings", Zones)
+    deceleration: float = real("the vehicles' comfortable braking", "m/s²", above=0)
+    commit: str = word(
+        "when a vehicle is committed, see `COMMITS`", COMMITS, default="stoppable",
+        label="commit rule",
+    )  # fmt: skip
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
@@ -128,7 +108,7 @@ class Reader:
         return not can_stop(vehicle, self.deceleration)
 
     def read(self, view: View) -> Percept:
-        """Who takes part and who is crossing, in a view ordered by lane and front to back."""
+        """Participants and crossing vehicles of a view, ordered by lane and front to back."""
         n, start = self.n, self.zones.yellow_start + ROUNDING
         participants, crossing = [], []
         case = occupied = unknown = 0

@@ -1,18 +1,18 @@
-"""Who comes first where cliques tie: lane priorities that all vehicles know without a message.
+"""Which lane comes first where cliques tie: priorities that all vehicles know without a message.
 
 Fixed ranks starve the last lane. The two rules here change the ranks as time passes, and need
 nothing that a vehicle cannot know by itself:
 
-- "rotating" needs a shared clock (satellite navigation gives one): for so many seconds each lane
-  comes first in turn, and the others follow clockwise.
-- "waiting" puts the lane first whose front vehicle passed the start of its yellow zone longest
-  ago. A vehicle that comes late was not there to see that. What it has seen is the time since the
-  junction came into its sensors' range: at least `memory` = (range − yellow zone's start) / speed
-  limit before it takes part itself, for nobody drives faster. So all waits count as `memory` at
-  most, and then everybody who takes part knows everybody's: who passed before a late vehicle began
-  to watch has waited longer than that. Lanes that tie rank as "rotating" has them.
+- "rotating" needs a shared clock, such as satellite navigation gives. Each lane comes first for so
+  many seconds in turn, and the others follow clockwise.
+- "waiting" puts the lane first whose front vehicle passed the start of its yellow zone longest ago.
+  A vehicle that comes later did not see that. It has seen what happened since the junction came
+  into its sensors' range. When it takes part itself, it has watched for at least `memory` =
+  (range − yellow zone's start) / speed limit, for no vehicle drives faster. So all waits count as
+  `memory` at most. Then every participant knows all waits: a vehicle that passed before a late one
+  began to watch has waited longer than that. Lanes that tie rank as "rotating" has them.
 
-Both are the same for all who look at one moment, whenever each of them came.
+Both give the same ranks to all vehicles that look at one moment, whenever each of them came.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from minisim.control import Observed, Site
 from minisim.errors import InputError
 
 #: How long each lane comes first [s]. Longer than any vehicle crosses: from a stand 2 m before
-#: it, 22 m at 2.6 m/s² take 4.1 s; so every turn of a lane sees a decision.
+#: it, 22 m at 2.6 m/s² take 4.1 s. So every turn of a lane sees a decision.
 TURN_TIME = 10.0
 
 #: How far vehicles see the others' approach lanes and yellow zones [m]. Manoeuvres have been read
@@ -51,7 +51,7 @@ class Ranking(NamedTuple):
 
 
 def turn_at(time: float, n: int, turn_time: float = TURN_TIME) -> tuple[int, float]:
-    """Whose turn it is by the shared clock, and when it ends [s]."""
+    """The lane whose turn it is by the shared clock, and when its turn ends [s]."""
     turns = math.floor((time + SAME_TIME) / turn_time)
     return turns % n, (turns + 1) * turn_time
 
@@ -65,14 +65,14 @@ def rotating(time: float, n: int, turn_time: float = TURN_TIME) -> Ranking:
 def longest_waiting(
     time: float, n: int, since: dict[int, float], memory: float, turn_time: float = TURN_TIME
 ) -> Ranking:
-    """Ranks by waiting time, of which nobody counts more than `memory`.
+    """Ranks by waiting time, counted up to `memory`.
 
     Args:
         time: now [s].
         n: number of lanes.
-        since: lane -> when its front vehicle passed the start of the yellow zone [s]; vehicles
-            who were there before one began to watch may have any time at least `memory` ago.
-        memory: for how long everybody who takes part has watched, at least [s].
+        since: lane -> when its front vehicle passed the start of the yellow zone [s]; for a vehicle
+            that was there before the observer, any time at least `memory` ago.
+        memory: least time for which every participant has watched [s].
         turn_time: of the rotating ranks, which break ties [s].
     """
     turns = rotating(time, n, turn_time)
@@ -84,7 +84,7 @@ def longest_waiting(
 
 
 def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> float:
-    """For how long every vehicle has watched when it begins to take part, at least [s].
+    """Least time for which a vehicle has watched when it begins to take part [s].
 
     Raises:
         InputError: the sensors do not reach beyond the yellow zone.
@@ -99,7 +99,7 @@ def memory_of(site: Site, zones: Zones, sensor_range: float = SENSOR_RANGE) -> f
 
 
 class Watch:
-    """When each vehicle passed the start of the yellow zone, as one observer has seen it.
+    """When each vehicle passed the start of the yellow zone, as one observer saw it.
 
     Attributes:
         start: of the yellow zone [m before the junction].
@@ -110,7 +110,7 @@ class Watch:
         self._passed: dict[int, float] = {}
 
     def look(self, time: float, vehicles: Iterable[Observed]) -> dict[int, float]:
-        """Note who is new past the start; returns lane -> when its front vehicle passed.
+        """Note the vehicles that are new past the start; lane -> when its front vehicle passed [s].
 
         Vehicles that are already there at the first look count as having just come.
         """

@@ -2,39 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from minisim.control import COMMIT_MARGIN, Marking, Site, stopping_distance
-from minisim.errors import InputError, number
+from minisim.errors import InputError
+from minisim.parameters import declared, real
 
 KMH = 1.0 / 3.6
 
 
-@dataclass(frozen=True)
+@declared
 class Zones:
     """Red, yellow and green zone, in this order towards the junction (paper, same section).
 
-    A vehicle slows down in the red zone; it takes part in decisions from the start of the yellow
-    zone; it waits for its right of way at the hold line, the end of the yellow zone; the green
+    A vehicle slows down in the red zone. It takes part in decisions from the start of the yellow
+    zone and waits for its right of way at the hold line, the end of the yellow zone. The green
     zone is the buffer in which a vehicle that loses its right of way still stops.
-
-    Attributes:
-        red, yellow, green: lengths [m].
-        red_speed: the speed to which the red zone slows [m/s]; it holds up to the junction.
     """
 
-    red: float = 30.0
-    yellow: float = 6.0
-    green: float = 2.0
-    red_speed: float = 20.0 * KMH
-
-    def __post_init__(self) -> None:
-        number("red zone [m]", self.red, low=0, high=1000)
-        number("yellow zone [m]", self.yellow, above=0, high=1000)
-        # A vehicle that brakes for the hold line must never look unable to stop before the
-        # junction, or the others would wait for it.
-        number("green zone [m]", self.green, low=COMMIT_MARGIN, high=1000)
-        number("red_speed [m/s]", self.red_speed, above=0, high=100)
+    red: float = real(
+        "length of the red zone", "m", default=30.0, low=0, high=1000, label="red zone"
+    )
+    yellow: float = real(
+        "length of the yellow zone", "m", default=6.0, above=0, high=1000, label="yellow zone"
+    )
+    # A vehicle that brakes for the hold line must never look unable to stop before the junction,
+    # or the others would wait for it.
+    green: float = real(
+        "length of the green zone", "m", default=2.0, low=COMMIT_MARGIN, high=1000,
+        label="green zone",
+    )  # fmt: skip
+    red_speed: float = real(
+        "speed to which the red zone slows; it holds up to the junction", "m/s",
+        default=20.0 * KMH, above=0, high=100,
+    )  # fmt: skip
 
     @property
     def hold_distance(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import style
+from figures import plots, style
 from minisim.junction.geometry import ARM_NAMES, Floats
 from minisim.results.trajectories import LANE, MANOEUVRE, TIME, VEHICLE, S
 from scenarios.crossval import Result
@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 
 METRICS: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
 
-#: Colour, marker and line of each source: told apart without colour too.
-LOOKS: Final = {
-    "minisim": (style.BLUE, "o", "-"),
-    "SUMO": (style.ORANGE, "s", "--"),
-    "published": (style.BLACK, "D", ":"),
-}
+#: Each source: told apart without colour too.
+MINISIM = style.Look("minisim", style.BLUE, "o", "-")
+SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
+PUBLISHED = style.Look("published", style.BLACK, "D", ":")
 #: Lines are drawn so far apart that their interval bars do not cover each other [veh/h/lane].
 DODGE: Final = 2.5
 
@@ -54,7 +52,7 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
         drawable = [result for result in ordered if any(len(ours) for ours, _ in _both(result))]
-        if drawable:  # in a short run nobody may have arrived
+        if drawable:  # in a short run it may be that no vehicle has arrived
             yield _file("trips", *group), f"{title}: every trip", trips_figure(drawable)
     for result in results:
         if result.film is not None and result.film.parting is not None:
@@ -76,18 +74,25 @@ def means_figure(results: Sequence[Result]) -> Figure:
     panels = figure.subplots(1, len(METRICS))
     figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
     for axes, (metric, name) in zip(panels, METRICS.items(), strict=True):
-        for k, host in enumerate(("minisim", "sumo")):
+        densities = [result.case.density for result in results]
+        for look, host, aside in ((MINISIM, "minisim", -DODGE / 2), (SUMO, "sumo", DODGE / 2)):
             intervals = [getattr(result.row(metric), host) for result in results]
-            label = "SUMO" if host == "sumo" else host
-            _line(
-                axes, label, DODGE * (k - 0.5), results,
-                [i.mean for i in intervals], [i.half_width for i in intervals],
+            plots.draw_line(
+                axes, [density + aside for density in densities],
+                [plots.Estimate(i.mean, i.mean - i.half_width, i.mean + i.half_width)
+                 for i in intervals],
+                look, **plots.BOLD,
             )  # fmt: skip
-        paper = [(r, v) for r in results if (v := r.case.reference(metric, "all")) is not None]
+        paper = [
+            (density, plots.Estimate(value, value, value))
+            for density, result in zip(densities, results, strict=True)
+            if (value := result.case.reference(metric, "all")) is not None
+        ]
         if paper:
-            _line(axes, "published", 0.0, [r for r, _ in paper], [v for _, v in paper])
+            x, values = zip(*paper, strict=True)
+            plots.draw_line(axes, x, values, PUBLISHED, **plots.BOLD)
         style.plot_axes(axes, name, "density [veh/h/lane]", "mean [s]")
-        axes.set_xticks(sorted({result.case.density for result in results}))
+        axes.set_xticks(sorted(set(densities)))
         axes.margins(x=0.08, y=0.1)
         axes.set_ylim(bottom=0.0)
     _head(figure, panels[0], results[0])
@@ -134,15 +139,15 @@ def parting_figure(result: Result) -> Figure:
     figure.subplots_adjust(
         left=0.085, right=0.985, top=1.0 - 0.95 / height, bottom=0.55 / height, hspace=0.14
     )
-    for frame, look in ((film.minisim, LOOKS["minisim"]), (film.sumo, LOOKS["SUMO"])):
+    for frame, look in ((film.minisim, MINISIM), (film.sumo, SUMO)):
         shown = frame[(frame[TIME] >= start) & (frame[TIME] <= start + SHOWN_BEFORE + SHOWN_AFTER)]
         near = shown[(shown[S] >= entry + SHOWN_FROM) & (shown[S] <= entry + SHOWN_TO)]
-        colour, _, dashes = look
-        width = 1.3 if dashes == "-" else 1.8
+        width = 1.3 if look is MINISIM else 1.8
         for _, trip in near.groupby(VEHICLE):
             axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
-            axes.plot(trip[TIME], trip[S] - entry, color=colour, linestyle=dashes, linewidth=width)
-            if dashes == "-":
+            axes.plot(trip[TIME], trip[S] - entry, color=look.colour, linestyle=look.dashes,
+                      linewidth=width)  # fmt: skip
+            if look is MINISIM:
                 _name_trip(axes, trip, entry)
     for axes, lane in zip(panels, ARM_NAMES, strict=False):
         style.plot_axes(axes, "", "", f"lane {lane} [m]")
@@ -155,8 +160,8 @@ def parting_figure(result: Result) -> Figure:
         markerfacecolor="none", markeredgecolor=style.VERMILLION, markeredgewidth=1.8,
     )  # fmt: skip
     panels[-1].set_xlabel("time [s]", fontsize=9.5, color=style.INK)
-    for host in ("minisim", "SUMO"):
-        panels[0].plot([], [], color=LOOKS[host][0], linestyle=LOOKS[host][2], label=host)
+    for look in (MINISIM, SUMO):
+        panels[0].plot([], [], color=look.colour, linestyle=look.dashes, label=look.label)
     panels[0].plot(
         [], [], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, label="first apart"
     )
@@ -164,34 +169,18 @@ def parting_figure(result: Result) -> Figure:
     return figure
 
 
-def _line(
-    axes: Axes,
-    source: str,
-    aside: float,
-    results: Sequence[Result],
-    means: Sequence[float],
-    half_widths: Sequence[float] | None = None,
-) -> None:
-    colour, marker, dashes = LOOKS[source]
-    densities = np.array([result.case.density for result in results])
-    axes.errorbar(
-        densities + aside, means, yerr=half_widths, color=colour, marker=marker, linestyle=dashes,
-        linewidth=1.8, markersize=5.5, capsize=3.5, elinewidth=1.2, label=source, zorder=3,
-    )  # fmt: skip
-
-
 def _distributions(axes: Axes, result: Result, metric: str) -> None:
     """Share of the trips up to a time, in both hosts, and the distance of the two."""
     values = {
-        "minisim": np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
-        "SUMO": np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
+        MINISIM: np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
+        SUMO: np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
     }
-    for host, found in values.items():
-        colour, _, dashes = LOOKS[host]
-        ordered = np.sort(found)
+    for look, seconds in values.items():
+        ordered = np.sort(seconds)
         shares = np.arange(1, len(ordered) + 1) / len(ordered)
         axes.step(
-            ordered, shares, where="post", color=colour, linestyle=dashes, linewidth=1.6, label=host
+            ordered, shares, where="post", color=look.colour, linestyle=look.dashes, linewidth=1.6,
+            label=look.label,
         )  # fmt: skip
     low, high = np.quantile(np.concatenate(list(values.values())), (0.0, TAIL))
     room = 0.03 * max(high - low, 1.0)
@@ -229,7 +218,7 @@ def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
-    """Write who it is, and what it wants, beside the start of its line."""
+    """Write the vehicle and its movement beside the start of its line."""
     first = trip.iloc[0]
     axes.text(
         first[TIME] - 0.25, first[S] - entry + 2.0,

@@ -11,14 +11,15 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from minisim.errors import InputError
-from minisim.results.trajectories import replacing
+from minisim.files import replacing
+from scenarios.controllers import VARIANTS
+from scenarios.controllers import Look as Look
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
@@ -34,45 +35,29 @@ ZONES: Mapping[str, str] = MappingProxyType(
 RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
 
 
-class Look(NamedTuple):
-    """How a series is drawn, the same in every figure; told apart in grey print too.
-
-    Attributes:
-        label: in legends.
-        colour, marker, dashes: of its line.
-    """
-
-    label: str
-    colour: str
-    marker: str
-    dashes: Literal["-", "--", "-.", ":"]
-
-
 BROWN, GREY = "#7A4A1E", "#5C6470"
 
-#: Series (`scenarios.studies.study.Case`) -> look.
-LOOKS: Mapping[str, Look] = MappingProxyType({
-    "dim": Look("DIM", BLUE, "o", "-"),
-    "dim-harmonious": Look("DIM, harmonious gate", SKY, "p", "-"),
-    "fixed-time": Look("fixed-time signal", VERMILLION, "s", "--"),
-    "adaptive": Look("adaptive signal", ORANGE, "^", "-."),
-    "v2ic": Look("V2I-C", GREEN, "D", ":"),
-    "all-way-stop": Look("all-way stop", INK, "X", "--"),
-    "reservation": Look("reservation", PURPLE, "v", "-."),
-    "longest-queue": Look("longest queue first", BROWN, "<", ":"),
-    "dim-3": Look("3 arms", GREEN, "^", "--"),
-    "dim-4": Look("4 arms", BLUE, "o", "-"),
-    "dim-5": Look("5 arms", VERMILLION, "p", "-."),
-    "dim-monitored": Look("DIM with safety monitor", PURPLE, "v", "-."),
-    "dim-lanes": Look("DIM, lanes first", GREEN, "^", "--"),
-    "dim-rotating": Look("DIM, rotating priority", VERMILLION, "s", "--"),
-    "dim-waiting": Look("DIM, longest-waiting priority", GREEN, "D", ":"),
+#: Colours by the names that the table of controllers has for them.
+COLOURS: Mapping[str, str] = MappingProxyType({
+    "blue": BLUE, "sky": SKY, "green": GREEN, "vermillion": VERMILLION, "orange": ORANGE,
+    "purple": PURPLE, "brown": BROWN, "ink": INK, "grey": GREY,
 })  # fmt: skip
+
+#: Series that are no controllers: DIM by the number of arms.
+ARMS: Mapping[str, Look] = MappingProxyType(
+    {
+        "dim-3": Look("3 arms", "green", "^", "--"),
+        "dim-4": Look("4 arms", "blue", "o", "-"),
+        "dim-5": Look("5 arms", "vermillion", "p", "-."),
+    }
+)
 
 
 def look(series: str) -> Look:
-    """The look of a series; one without a look of its own is grey."""
-    return LOOKS.get(series, Look(series, GREY, "h", "-"))
+    """The look of a series, with its colour as matplotlib takes it; grey where it has none."""
+    variant = VARIANTS.get(series)
+    known = ARMS.get(series) or (variant and variant.look) or Look(series, "grey", "h", "-")
+    return known._replace(colour=COLOURS[known.colour])
 
 
 #: Formats that a figure can be written in.

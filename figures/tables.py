@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from minisim.errors import InputError
-from minisim.results.trajectories import replacing
+from minisim.files import markdown_table, write_text
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,7 @@ class Table:
 
     def markdown(self) -> str:
         """As a Markdown table."""
-        rule = ["---" if k < self.labels else "---:" for k in range(len(self.headings))]
-        lines = [self.headings, tuple(rule), *self.rows]
-        table = "\n".join(f"| {' | '.join(row)} |" for row in lines)
+        table = markdown_table(self.headings, self.rows, range(self.labels))
         notes = "".join(f"\n{note}\n" for note in self.notes)
         return f"**{self.title}**\n\n{table}\n{notes}"
 
@@ -72,8 +70,7 @@ def save_table(table: Table, path: Path) -> None:
     suffix = path.suffix.removeprefix(".")
     if suffix not in WRITERS:
         raise InputError(f"a table file ends in {', '.join(f'.{k}' for k in WRITERS)}; got {path}")
-    with replacing(path) as part:
-        part.write_text(WRITERS[suffix](table), encoding="utf-8")
+    write_text(path, WRITERS[suffix](table))
 
 
 _LATEX = str.maketrans({

@@ -101,9 +101,11 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     Raises:
         InputError: no finite numbers, a negative one, or only zeros.
     """
-    if value is None or value == equal:
+    if value is None:
         return None
     if isinstance(value, str):
+        if value == equal:
+            return None
         try:
             value = tuple(map(float, value.split(":")))
         except ValueError:

@@ -280,6 +280,14 @@ class Counting(Session, Protocol):
 
 
 @runtime_checkable
+class Kinds(Session, Protocol):
+    """A session whose vehicles are of several kinds, by which summaries group them."""
+
+    def kind(self, vehicle: int) -> str:
+        """Kind of a vehicle, such as "human"."""
+
+
+@runtime_checkable
 class Controller(Protocol):
     """A recipe for sessions: hashable, picklable, never changed by a run."""
 
@@ -293,12 +301,15 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Unregulated:
-    """Every vehicle goes, whatever the others do: what happens without any rule.
+    """All vehicles go at once: what happens without any rule.
 
     For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """
 
-    name: str = "unregulated"
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        return "unregulated"
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""

@@ -1,7 +1,7 @@
 """What minisim raises, and the checks that turn bad input into one clear sentence.
 
-Every message names the value, what is allowed and where it came from, so that the
-command line can print it as it is.
+A message names the value, what is allowed and where it came from, so that the command line can
+print it as it is.
 """
 
 from __future__ import annotations
@@ -26,13 +26,12 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched and the caller did not ask to record and go on.
+    """Two bodies touched, and the caller did not ask to record that and go on.
 
     Attributes:
         collisions: the `minisim.engine.collision.Collision`s of the step at which the run stopped.
-        replay: call it to run again up to a little after it, with the trajectories of the last
-            seconds (10 unless told) recorded; returns a `Run`. None on a copy from another
-            process.
+        replay: a function that runs again until a little later and returns a `Run` with the
+            trajectories of the last seconds, 10 by default. None on a copy from another process.
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class MissingExtraError(MinisimError):
 
 
 class ExecutorError(MinisimError):
-    """Whoever was given runs gave them up; they have not failed, and may be tried again."""
+    """An executor gave up runs that it had; they have not failed, and may be tried again."""
 
 
 class SumoError(MinisimError):
@@ -79,7 +78,7 @@ def number(
     Raises:
         InputError: not a real number, not finite, or out of range.
     """
-    # The usual case first, for every command is checked: abstract types are slow to ask for.
+    # The usual case first, since every command is checked and `isinstance` of Real is slow.
     if type(value) is float and low <= value <= high and above < value < below:
         return value
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -122,8 +121,10 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Raise `InputError` unless `value` is a `kind`; a class where one of its objects belongs is
-    none, though it has the methods that a protocol asks for."""
+    """Raise `InputError` unless `value` is a `kind`.
+
+    A class is refused where an object of it belongs, though it has the methods of a protocol.
+    """
     if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         wanted = " or ".join(k.__name__ for k in kinds)
@@ -132,7 +133,7 @@ def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
 
 
 def items(name: str, value: object, of: str) -> list[Any]:
-    """Return what `value`, any sequence but a string, holds (`of` says what), or raise."""
+    """Return the items of `value`, any sequence but a string, or raise; `of` says what they are."""
     if not isinstance(value, str | bytes) and isinstance(value, Iterable):
         try:
             return list(value)
@@ -143,15 +144,16 @@ def items(name: str, value: object, of: str) -> list[Any]:
 
 def numbers(name: str, value: object) -> tuple[float, ...]:
     """Return `value`, any sequence of finite numbers, as a tuple of floats, or raise."""
-    found = items(name, value, "numbers")
-    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(found))
+    return tuple(
+        number(f"{name}[{i}]", item) for i, item in enumerate(items(name, value, "numbers"))
+    )
 
 
 def show(value: object) -> str:
-    """`repr(value)`, cut to a line; Python refuses to print integers of thousands of digits."""
+    """`repr(value)`, cut to 200 characters."""
     try:
         text = repr(value)
-    except ValueError:
+    except ValueError:  # Python refuses to print integers of thousands of digits
         return f"a {type(value).__name__} too large to print"
     return text if len(text) <= 200 else f"{text[:200]}…"
 

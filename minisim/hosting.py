@@ -16,6 +16,7 @@ from minisim.control import (
     Counting,
     Go,
     Hold,
+    Kinds,
     Open,
     Plan,
     Session,
@@ -131,6 +132,11 @@ def counts_of(session: Session) -> dict[str, float]:
     return dict(session.counts) if isinstance(session, Counting) else {}
 
 
+def kinds_of(session: Session, vehicles: int) -> tuple[str, ...]:
+    """The kind of each vehicle; empty where the session knows no kinds."""
+    return tuple(map(session.kind, range(vehicles))) if isinstance(session, Kinds) else ()
+
+
 def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
     if isinstance(command, TO_VEHICLES):
         integer("vehicle", command.vehicle, low=0, high=vehicles - 1)
@@ -162,7 +168,9 @@ def collision_error(
 
 
 def _check_scenario(scenario: object) -> None:
-    needed = ("name", "profile_name", "density", "horizon", "depart_speed", "site", "arrivals")
+    needed = (
+        "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
+    )  # fmt: skip
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
 

@@ -62,6 +62,7 @@ def _compile(function: _F, inline: Literal["never", "always"]) -> _F:
 
 @lru_cache
 def _cache_class() -> Any:
+    import numba
     from numba.core.caching import FunctionCache
 
     class SourcesCache(FunctionCache):
@@ -70,7 +71,10 @@ def _cache_class() -> Any:
         def __init__(self, function: Callable[..., object]) -> None:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
-            self._cache_file._source_stamp = {_digest(folder), _digest(Path(__file__).parent)}
+            sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
+            # numba reads the version first, and nothing else of an index with another one. The rest
+            # may hold classes that no longer exist.
+            self._cache_file._version = self._cache_file._source_stamp = sources
 
     return SourcesCache
 

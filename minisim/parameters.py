@@ -11,16 +11,20 @@
 `declared` makes a frozen dataclass whose constructor checks every such field and raises
 `InputError` with one sentence. Rules between fields go into `__post_init__`, which runs after
 that. The class docstring gets a list of the parameters; `parameters` gives them as data, for help
-texts and for readers of command lines and files.
+texts and for readers of command lines and files. `spelled` writes a recipe as such a reader takes
+it, which makes its name.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass
 from functools import cache
+from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
 
 from minisim.errors import choice, instance, integer, number, numbers, show
@@ -32,6 +36,9 @@ _T = TypeVar("_T")
 Check = Callable[[str, Any], Any]
 
 _KEY = "parameter"
+
+#: The words of a `switch`.
+SWITCH = ("true", "false")
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ class Parameter:
         check: see `Check`.
         kinds: word -> what makes the value of that name, for a field that holds another recipe.
         words: what a text may be, for a field that is one of some words.
+        optional: whether None is allowed too.
     """
 
     meaning: str
@@ -55,6 +63,7 @@ class Parameter:
     check: Check
     kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
     words: tuple[str, ...] = ()
+    optional: bool = False
 
     def title(self, name: str) -> str:
         """What messages call it: its label or name, and its unit."""
@@ -141,7 +150,8 @@ def switch(meaning: str, *, label: str = "", default: Any = MISSING) -> Any:
         instance(title, value, bool)
         return value
 
-    return _field(meaning, "", "true | false", label, check, False, default)
+    made = _field(meaning, "", " | ".join(SWITCH), label, check, False, default)
+    return _with(made, words=SWITCH)
 
 
 def text(meaning: str, *, label: str = "", default: Any = MISSING) -> Any:
@@ -275,6 +285,53 @@ def parameters(kind: Any) -> tuple[Declared, ...]:
     )
 
 
+def spelled(name: str, recipe: object) -> str:
+    """A recipe as command lines and files name it: `dim:gate=harmonious,order=lanes`.
+
+    It has the parameters that differ from their defaults. A value without a text of its own, such
+    as a matrix, is named by its class and a digest, so that different recipes have different names.
+    """
+    arguments = _arguments(recipe)
+    return f"{name}:{arguments}" if arguments else name
+
+
+def _arguments(recipe: Any) -> str:
+    values = ((it, getattr(recipe, it.name)) for it in parameters(recipe.__class__))
+    return ",".join(
+        f"{it.name}={spelled_value(value, it.parameter.kinds)}"
+        for it, value in values
+        if it.default is MISSING or value != it.default
+    )
+
+
+def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:
+    """One value of a spelling; `kinds` are the words for nested recipes, as of `part`."""
+    if value is None or isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return value if _is_word(value) else repr(value)
+    if isinstance(value, Integral):
+        return str(int(value))
+    if isinstance(value, Real):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(float(value))
+    if isinstance(value, tuple | list):
+        inner = ",".join(spelled_value(one, kinds) for one in value)
+        return f"({inner},)" if len(value) == 1 else f"({inner})"
+    for known, maker in kinds.items():
+        if type(value) is maker:
+            arguments = _arguments(value)
+            return f"{known}({arguments})" if arguments else known
+    # An object may have a `spelling` of its own, which a maker in `kinds` takes.
+    own: str = getattr(value, "spelling", "")
+    return own or f"{type(value).__name__}#{hashlib.sha256(repr(value).encode()).hexdigest()[:8]}"
+
+
+def _is_word(text: str) -> bool:
+    reserved = keyword.iskeyword(text) or text.lower() in (*SWITCH, "none")
+    return text.isascii() and text.isidentifier() and not reserved
+
+
 @cache
 def _checks(kind: Any) -> tuple[tuple[str, str, Check], ...]:
     return tuple((name, it.title(name), it.check) for name, it, _ in parameters(kind))
@@ -296,8 +353,11 @@ def _field(
     if optional:
         allowed = f"{allowed} | none"
     metadata = {
-        _KEY: Parameter(meaning, unit, allowed, label, check_unless_none if optional else check)
-    }
+        _KEY: Parameter(
+            meaning, unit, allowed, label, check_unless_none if optional else check,
+            optional=optional,
+        )
+    }  # fmt: skip
     if default_factory is not MISSING:
         return dataclasses.field(default_factory=default_factory, metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)

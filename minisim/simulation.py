@@ -46,6 +46,7 @@ from minisim.hosting import (
     checked_window,
     collision_error,
     counts_of,
+    kinds_of,
 )
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
@@ -202,6 +203,7 @@ class Simulation:
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path"]].copy(),
             counts=counts_of(self._session),
+            kinds=kinds_of(self._session, len(self._vehicles)),
         )
 
     def _decide(self) -> None:

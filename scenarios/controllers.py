@@ -1,8 +1,24 @@
-"""Controllers by their command-line names."""
+"""The table of controllers, and how one is named.
+
+A controller is named the same way on the command line, in files and in Python:
+
+    dim                                        its defaults
+    dim:gate=harmonious,monitor=on             parameters, see `minisim controllers dim`
+    mymodule:MyController(k=3)                 a class of your own, from the working directory or
+    path/to/file.py:MyController(k=3)          installed
+    {name = "dim", gate = "harmonious"}        a table, as TOML has it
+
+An installed package may add names by entry points of the group `minisim.controllers`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
 
 from baselines import (
     V2IC,
@@ -14,59 +30,220 @@ from baselines import (
     Reservation,
     V2ICAsRun,
 )
-from dim import AsRunDim, Dim, Monitor, NoisyPerception
-from dim.senses.noise import CLASSIFIER, UNSIGNALLED
+from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
-from minisim.errors import choice
+from minisim.errors import InputError, choice, show
+from scenarios.loading import load_class
 from scenarios.scenario import AS_RUN, Profile, profile_named
+from scenarios.spelling import Call, build, call_of, parse_arguments
 
 
-def _dim(profile: Profile) -> Controller:
-    """DIM as the profile has it: the authors' own rules go with the vehicle of their runs."""
-    return AsRunDim() if profile.name == AS_RUN.name else Dim()
+class Look(NamedTuple):
+    """How a series is drawn, the same in every figure; told apart in grey print too.
+
+    Attributes:
+        label: in legends.
+        colour: by its name in `figures.style.COLOURS`.
+        marker, dashes: of its line.
+    """
+
+    label: str
+    colour: str
+    marker: str
+    dashes: Literal["-", "--", "-.", ":"]
 
 
-def _v2ic(profile: Profile) -> Controller:
-    """V2I-C as the profile has it: the published one goes with the vehicle of the paper's runs."""
-    return V2ICAsRun() if profile.name == AS_RUN.name else V2IC()
+class Variant(NamedTuple):
+    """A controller with some of its parameters, as studies compare it.
+
+    Attributes:
+        arguments: that differ from the defaults, as they are spelled; empty for none.
+        look: in figures; None is grey.
+        rival: whether it is compared with all others on equal terms.
+    """
+
+    arguments: str = ""
+    look: Look | None = None
+    rival: bool = False
 
 
-#: Name -> what makes the controller for a profile. A new controller needs one line here.
-CONTROLLERS: dict[str, Callable[[Profile], Controller]] = {
-    "dim": _dim,
-    "dim-harmonious": lambda _: Dim(gate="harmonious"),
-    "dim-lanes": lambda _: Dim(order="lanes"),
-    "dim-inflow": lambda _: Dim(priorities="inflow"),
-    "dim-rotating": lambda _: Dim(priorities="rotating"),
-    "dim-waiting": lambda _: Dim(priorities="waiting"),
-    "dim-lanes-rotating": lambda _: Dim(order="lanes", priorities="rotating"),
-    "dim-lanes-waiting": lambda _: Dim(order="lanes", priorities="waiting"),
-    "dim-paper-commit": lambda _: Dim(commit="paper"),
-    "dim-monitored": lambda _: Dim(monitor=Monitor()),
-    "dim-symmetric-0.15": lambda _: Dim(perception=NoisyPerception(CLASSIFIER, "symmetric")),
-    "dim-unsignalled": lambda _: Dim(perception=NoisyPerception(unsignalled=UNSIGNALLED)),
-    "dim-occlusion": lambda _: Dim(perception=NoisyPerception(occlusion=True)),
-    "dim-as-run": lambda _: AsRunDim(),
-    "dim-as-run-size": lambda _: AsRunDim(order="size"),
-    "dim-as-run-exit-14": lambda _: AsRunDim(exit_speed=14.0),
-    "fixed-time": lambda _: FixedTime(),
-    "fixed-time-equal": lambda _: FixedTime(equal_greens=True, name="fixed-time-equal"),
-    "adaptive": lambda _: Adaptive(),
-    "actuated": lambda _: Actuated(),
-    "all-way-stop": lambda _: AllWayStop(),
-    "longest-queue": lambda _: LongestQueue(),
-    "v2ic": _v2ic,
-    "v2ic-as-run": lambda _: V2ICAsRun(),
-    "v2ic-as-run-14": lambda _: V2ICAsRun(approach_speed=14.0),
-    "reservation": lambda _: Reservation(),
-    "unregulated": lambda _: Unregulated(),
-}
+class Entry(NamedTuple):
+    """A controller by name.
+
+    Attributes:
+        name: before any parameters.
+        make: its class, which declares the parameters; the first line of its docstring says what
+            it is.
+        variants: that have a look or are rivals.
+        safe: whether these never collide, whatever the number of arms.
+        as_run: what the name alone means under the profile `as_run`; empty is no other.
+    """
+
+    name: str
+    make: type[Any]
+    variants: tuple[Variant, ...] = (Variant(),)
+    safe: bool = True
+    as_run: str = ""
+
+    def spellings(self) -> dict[str, Variant]:
+        """The variants by name."""
+        return {
+            f"{self.name}:{one.arguments}" if one.arguments else self.name: one
+            for one in self.variants
+        }
 
 
-def controller_named(name: str, profile: str | Profile = "paper") -> Controller:
-    """The controller of a command-line name, set up for a profile.
+#: Every controller of ours, the paper's four first; figures show rivals in this order.
+CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
+    entry.name: entry
+    for entry in (
+        Entry("dim", Dim, (
+            Variant("", Look("DIM", "blue", "o", "-"), rival=True),
+            Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
+            Variant("order=lanes", Look("DIM, lanes first", "green", "^", "--")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "s", "--")),
+            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "D", ":")),
+            Variant("order=lanes,priorities=waiting"),
+            Variant("monitor=on", Look("DIM with safety monitor", "purple", "v", "-.")),
+        ), as_run="dim-as-run"),
+        Entry("fixed-time", FixedTime, (
+            Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
+        )),
+        Entry("adaptive", Adaptive, (
+            Variant("", Look("adaptive signal", "orange", "^", "-."), rival=True),
+        )),
+        Entry("v2ic", V2IC, (
+            Variant("", Look("V2I-C", "green", "D", ":"), rival=True),
+        ), as_run="v2ic-as-run"),
+        Entry("all-way-stop", AllWayStop, (
+            Variant("", Look("all-way stop", "ink", "X", "--"), rival=True),
+        )),
+        Entry("reservation", Reservation, (
+            Variant("", Look("reservation", "purple", "v", "-."), rival=True),
+        )),
+        Entry("longest-queue", LongestQueue, (
+            Variant("", Look("longest queue first", "brown", "<", ":"), rival=True),
+        )),
+        Entry("actuated", Actuated),
+        Entry("dim-as-run", AsRunDim, safe=False),
+        Entry("v2ic-as-run", V2ICAsRun, safe=False),
+        Entry("unregulated", Unregulated, safe=False),
+    )
+})  # fmt: skip
+
+#: Every variant of the table by its name.
+VARIANTS: Mapping[str, Variant] = MappingProxyType({
+    name: variant
+    for entry in CONTROLLERS.values()
+    for name, variant in entry.spellings().items()
+})  # fmt: skip
+
+#: Names of all that are compared on equal terms, in the order of figures.
+RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
+
+#: Names of all that never collide and serve any number of arms.
+SAFE = tuple(name for entry in CONTROLLERS.values() if entry.safe for name in entry.spellings())
+
+_CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
+
+
+def controller_named(
+    spec: str | Mapping[str, Any] | Controller, profile: str | Profile = "paper"
+) -> Controller:
+    """The controller that a text or table names, set up for a profile; a controller is itself.
+
+    Args:
+        spec: see the module's docstring.
+        profile: under `as_run`, "dim" and "v2ic" alone mean what was run for the paper.
 
     Raises:
-        InputError: unknown name (with the nearest one) or profile.
+        InputError: an unknown name or parameter (with the nearest one), a value that is not
+            allowed, a class that cannot be loaded or made, or one that is no controller.
     """
-    return CONTROLLERS[choice("controller", name, CONTROLLERS)](profile_named(profile))
+    as_run = profile_named(profile).name == AS_RUN.name
+    if isinstance(spec, str):
+        return _made(_read(spec), spec, as_run)
+    if isinstance(spec, Mapping):
+        named = call_of(spec)
+        read = _read(named.name)
+        both = {**read.named, **named.named}
+        return _made(Call(read.name, read.places, both), named.name, as_run)
+    return _checked(spec, show(spec))
+
+
+class Described(NamedTuple):
+    """What makes controllers of some name.
+
+    Attributes:
+        make: the class, or a function of a plugin.
+        title: what messages call it.
+    """
+
+    make: Any
+    title: str
+
+
+def described(name: str) -> Described:
+    """What makes the controllers of a name or `module:Class`; raises `InputError`."""
+    written = _CLASS.fullmatch(name)
+    if written is not None and name not in CONTROLLERS:
+        return Described(load_class(written[1], written[2]), name)
+    if name in CONTROLLERS:
+        return Described(CONTROLLERS[name].make, name)
+    plugin = plugins()[choice("controller", name, [*CONTROLLERS, *plugins()])]
+    try:
+        return Described(plugin.load(), name)
+    except (Exception, SystemExit) as error:  # code of others may raise anything
+        raise InputError(
+            f"controller {name} of package {package_of(plugin)} cannot be loaded: "
+            f"{type(error).__name__}: {error}"
+        ) from error
+
+
+@cache
+def plugins() -> Mapping[str, EntryPoint]:
+    """The controllers that installed packages register, by name; ours come first."""
+    return {
+        point.name: point
+        for point in entry_points(group="minisim.controllers")
+        if point.name not in CONTROLLERS
+    }
+
+
+def package_of(plugin: EntryPoint) -> str:
+    """The package that registers a controller."""
+    return plugin.dist.name if plugin.dist is not None else plugin.module
+
+
+def _read(text: str) -> Call:
+    """A name with its arguments, as a text has them."""
+    head, colon, rest = text.partition(":")
+    written = _CLASS.fullmatch(text)
+    if written is not None and (head not in CONTROLLERS or rest[:1].isupper()):
+        module, kind, arguments = written.groups()
+        return parse_arguments(f"{module}:{kind}", arguments or "")
+    if not colon:
+        return Call(text)
+    choice("controller", head, [*CONTROLLERS, *plugins()])
+    call = parse_arguments(head, rest)
+    if call.places or not call.named:
+        raise InputError(
+            f"parameters of {head} are written {head}:key=value,key=value, got {show(text)}"
+        )
+    return call
+
+
+def _made(call: Call, text: str, as_run: bool) -> Controller:
+    name = call.name
+    if as_run and not call.named and name in CONTROLLERS:
+        name = CONTROLLERS[name].as_run or name
+    make, title = described(name)
+    return _checked(build(title, make, call), text)
+
+
+def _checked(made: object, what: str) -> Controller:
+    if isinstance(made, type) or not isinstance(made, Controller):
+        lacks = [part for part in ("name", "start") if not hasattr(made, part)]
+        why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
+        raise InputError(f"{what} is no controller: {why}")
+    return made

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
 from rich.table import Table
 
-from minisim.errors import InputError, MinisimError, integer, number, numbers
-from minisim.results.trajectories import replacing
+from minisim.errors import InputError, MinisimError
+from minisim.files import markdown_table, write_table, write_text
+from minisim.parameters import declared, real, reals, whole
+from minisim.results.metrics import heading
 from minisim.version import __version__
 from scenarios.controllers import controller_named
 from scenarios.library import four_way
+from scenarios.recipe import Recipe
 from scenarios.statistics import Interval, mean_interval
 from scenarios.sweep import sweep
-from scenarios.sweep.experiment import Experiment
 from scenarios.sweep.pool import workers
 
 if TYPE_CHECKING:
@@ -29,44 +30,33 @@ if TYPE_CHECKING:
 #: Controllers of the tour and how they are called in its table and figure.
 CONTROLLERS = {
     "dim": "DIM, paper's gate",
-    "dim-harmonious": "DIM, harmonious gate",
+    "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
 #: Averaged over seeds: column of a sweep -> heading.
 METRICS = {
-    "waiting_time_s": "waiting [s]",
-    "travel_time_s": "travel [s]",
-    "depart_delay_s": "departure delay [s]",
-    "unfinished": "unfinished",
+    name: heading(name)
+    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 }
 PROFILE = "fair"
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class Tour:
-    """What the tour simulates.
+    """What the tour simulates."""
 
-    Attributes:
-        densities: [veh/h/lane].
-        seeds: runs a point.
-        horizon: of each run [s].
-        film_start, film_seconds: of the animation, at the highest density [s].
-    """
-
-    densities: tuple[float, ...] = (150.0, 200.0, 250.0, 300.0, 350.0)
-    seeds: int = 5
-    horizon: float = 3600.0
-    film_start: float = 600.0
-    film_seconds: float = 60.0
+    densities: tuple[float, ...] = reals(
+        "mean inflows a lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
+    )
+    seeds: int = whole("runs a point", low=2, default=5)
+    horizon: float = real("of each run", "s", above=0, default=3600.0)
+    film_start: float = real("of the animation, at the highest density", "s", low=0, default=600.0)
+    film_seconds: float = real("length of the animation", "s", above=0, default=60.0)
     controllers: tuple[str, ...] = field(default=tuple(CONTROLLERS))
 
     def __post_init__(self) -> None:
-        integer("seeds", self.seeds, low=2)
-        if not numbers("densities", self.densities):
+        if not self.densities:
             raise InputError("a tour needs at least one density [veh/h/lane]")
-        number("horizon [s]", self.horizon, above=0)
-        number("film_start [s]", self.film_start, low=0)
-        number("film_seconds [s]", self.film_seconds, above=0)
 
     @classmethod
     def quick(cls, seeds: int = 2) -> Tour:
@@ -76,10 +66,10 @@ class Tour:
             film_seconds=10.0,
         )  # fmt: skip
 
-    def experiments(self) -> list[Experiment]:
+    def experiments(self) -> list[Recipe]:
         """Every density under every controller with every seed."""
         return [
-            Experiment(
+            Recipe(
                 four_way(density, profile=PROFILE, horizon=self.horizon),
                 controller_named(name, PROFILE),
                 seed,
@@ -91,16 +81,10 @@ class Tour:
 
     def film(self) -> Run:
         """The run of the animation."""
-        from minisim.simulation import simulate
-
         end = self.film_start + self.film_seconds
-        return simulate(
-            four_way(self.densities[-1], profile=PROFILE, horizon=end),
-            controller_named(self.controllers[0], PROFILE),
-            seed=1,
-            record="all",
-            record_window=(self.film_start, end),
-        )
+        scenario = four_way(self.densities[-1], profile=PROFILE, horizon=end)
+        recipe = Recipe(scenario, controller_named(self.controllers[0], PROFILE), seed=1)
+        return recipe.run(record="all", record_window=(self.film_start, end))
 
 
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
@@ -158,8 +142,8 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The result for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, heading in enumerate(_headings()):
-        table.add_column(heading, justify="left" if k == 1 else "right")
+    for k, title in enumerate(_headings()):
+        table.add_column(title, justify="left" if k == 1 else "right")
     rows = _cells(points)
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         table.add_row(*row, end_section=following is not None and following[0] != row[0])
@@ -168,20 +152,9 @@ def demo_table(points: pd.DataFrame) -> Table:
 
 def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
     """Write demo.csv and demo.md, each whole or not at all; raises `FileError`."""
-    buffer = io.StringIO()
-    points.round(6).to_csv(buffer, index=False, lineterminator="\n")
-    headings = _headings()
-    lines = [
-        f"{demo_title(tour)}. minisim {__version__}.",
-        "",
-        f"| {' | '.join(headings)} |",
-        f"|{'|'.join('---' if k == 1 else '---:' for k in range(len(headings)))}|",
-        *(f"| {' | '.join(row)} |" for row in _cells(points)),
-        "",
-    ]
-    for name, text in (("demo.csv", buffer.getvalue()), ("demo.md", "\n".join(lines))):
-        with replacing(folder / name) as part:
-            part.write_text(text, encoding="utf-8")
+    write_table(points, folder / "demo.csv")
+    table = markdown_table(_headings(), _cells(points), words=(1,))
+    write_text(folder / "demo.md", f"{demo_title(tour)}. minisim {__version__}.\n\n{table}\n")
 
 
 def _headings() -> list[str]:

@@ -1,19 +1,19 @@
 """Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
 
-All take the demand as keywords of `minisim.arrivals.Demand` (density, split, turns, model) and
-the profile by name.
+All take the same keywords, `Options`.
 """
 
 from __future__ import annotations
 
 import difflib
-import math
+import inspect
 import re
-from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
-from minisim.errors import InputError, instance, integer, numbers, show
+from minisim.errors import InputError, choice, instance, integer, numbers, show
 from minisim.junction.geometry import Intersection, Way
 from scenarios.published import PUBLISHED_ARMS, published_ways
 from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_named
@@ -22,21 +22,67 @@ Side = Literal["left", "right"]
 
 #: Distance of the entries from the centre in the authors' networks, by number of arms [m]: their
 #: approach lanes are 495.84, 492.8 and 491.6 m long. The first two follow from the default kerb
-#: radius, but netconvert rounds to centimetres; 3 mm shift who passes the edge of a zone when.
+#: radius, but netconvert rounds to centimetres; 3 mm shift which vehicle passes the edge of a zone
+#: when.
 PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
-def three_way(density: float = 350.0, **options: Any) -> Scenario:
+class Options(TypedDict, total=False):
+    """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
+
+    The profile may be a name. Shares of lanes (`split`) and of manoeuvres (`turns`) may be numbers
+    or a text such as "4:3:2:1".
+    """
+
+    name: str
+    side: Side
+    lane_width: float
+    junction_radius: float
+    arm_length: float
+    ways: tuple[Way, ...] | None
+    split: str | Sequence[float] | None
+    turns: str | Sequence[float] | None
+    model: str
+    min_headway: float
+    profile: str | Profile
+    horizon: float
+    warmup: float
+    recorded: Arrivals | None
+
+
+#: What the keywords are for.
+_PARTS = (Intersection, Demand, Scenario)
+
+_Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
+
+
+def _told(make: _Maker) -> _Maker:
+    """Show the keywords of `Options`, with their defaults, to help and completion."""
+    defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
+    own = inspect.signature(make).parameters.values()
+    kept = [parameter for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
+    options = [
+        inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=defaults[key])
+        for key in Options.__annotations__
+    ]
+    make.__signature__ = inspect.Signature([*kept, *options])  # type: ignore[attr-defined]
+    return make
+
+
+@_told
+def three_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's Y junction: arms at 0°, 120° and 240°."""
     return _regular("three-way", 3, density, options)
 
 
-def four_way(density: float = 350.0, **options: Any) -> Scenario:
+@_told
+def four_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's 4-arm junction: a north, b east, c south, d west."""
     return _regular("four-way", 4, density, options)
 
 
-def five_way(density: float = 350.0, **options: Any) -> Scenario:
+@_told
+def five_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's 5-arm junction, with the junction radius of the authors' network."""
     return _regular("five-way", 5, density, {"junction_radius": PUBLISHED_RADII[5], **options})
 
@@ -45,58 +91,37 @@ def five_way(density: float = 350.0, **options: Any) -> Scenario:
 MAKERS: dict[int, Callable[..., Scenario]] = {3: three_way, 4: four_way, 5: five_way}
 
 
-def regular(n: int, density: float = 350.0, **options: Any) -> Scenario:
+@_told
+def regular(n: int, density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """A junction of n arms at equal angles (3 ≤ n ≤ 12)."""
     count = integer("number of arms", n, low=3, high=12)
     return _regular(f"{count}-way", count, density, options)
 
 
+@_told
 def from_bearings(
-    bearings: Sequence[float],
-    density: float = 350.0,
-    *,
-    name: str = "custom",
-    side: Side = "left",
-    lane_width: float = 3.2,
-    junction_radius: float = math.nan,
-    arm_length: float = 500.0,
-    ways: tuple[Way, ...] | None = None,
-    split: Sequence[float] | None = None,
-    turns: Sequence[float] | None = None,
-    model: str = "poisson",
-    min_headway: float = 1.5,
-    profile: str | Profile = "paper",
-    horizon: float = 3600.0,
-    recorded: Arrivals | None = None,
+    bearings: Sequence[float], density: float = 350.0, **options: Unpack[Options]
 ) -> Scenario:
     """A junction with arms at these bearings [degrees clockwise from north].
 
-    Every other scenario of this module is this one with given bearings, and takes the same
-    keywords.
+    Every other scenario of this module is this one with given bearings.
 
     Raises:
-        InputError: arms closer than 30°, an unknown profile, impossible demand, horizon ≤ 0.
+        InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
+            profile, impossible demand, horizon ≤ 0.
     """
+    given: dict[str, Any] = {"name": "custom", **options}
+    for key in given:
+        choice("keyword of a scenario", key, tuple(Options.__annotations__))
+    given["profile"] = profile_named(given.get("profile", "paper"))
+    geometry, demand, rest = (
+        {field.name: given[field.name] for field in fields(kind) if field.name in given}
+        for kind in _PARTS
+    )
     return Scenario(
-        name=name,
-        intersection=Intersection(
-            bearings=numbers("bearings", bearings),
-            side=side,
-            lane_width=lane_width,
-            junction_radius=junction_radius,
-            arm_length=arm_length,
-            ways=ways,
-        ),
-        demand=Demand(
-            density=density,
-            split=None if split is None else numbers("split", split),
-            turns=None if turns is None else numbers("turns", turns),
-            model=model,
-            min_headway=min_headway,
-        ),
-        profile=profile_named(profile),
-        horizon=horizon,
-        recorded=recorded,
+        intersection=Intersection(bearings=numbers("bearings", bearings), **geometry),
+        demand=Demand(density=density, **demand),
+        **rest,
     )
 
 
@@ -130,7 +155,7 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     )
 
 
-def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scenario:
+def _regular(name: str, n: int, density: float, options: Mapping[str, Any]) -> Scenario:
     bearings = [360.0 * i / n for i in range(n)]
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
@@ -139,7 +164,7 @@ def _regular(name: str, n: int, density: float, options: dict[str, Any]) -> Scen
     return from_bearings(bearings, density, **{"name": name, **options})
 
 
-def _is_published(n: int, options: dict[str, Any]) -> bool:
+def _is_published(n: int, options: Mapping[str, Any]) -> bool:
     """Whether this is a junction of the paper: its arms, side and measures."""
     radius = options.get("junction_radius")
     return (

@@ -27,7 +27,7 @@ from scenarios.published import (
     published_arrivals,
     published_ways,
 )
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario, parse_split
+from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,10 +111,10 @@ class Ran(NamedTuple):
 #: fixed-time signal's unbalanced runs was that of DIM: their driver switches its ACC on, the trips
 #: have a speed factor of 1.00 and the 0.16 s of waiting with which that vehicle starts.
 RAN: dict[tuple[str, str], Ran] = {
-    ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run-14"),
+    ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
     ("ats", "4:3:2:1"): Ran(controller="actuated"),
-    ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run-14"),
+    ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN),
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }
@@ -150,7 +150,7 @@ def scenario(
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     return MAKERS[cell.arms](
-        cell.density, split=_shares(ran.shares or split), profile=profile or _profile(cell, ran)
+        cell.density, split=ran.shares or split, profile=profile or _profile(cell, ran)
     )
 
 
@@ -176,7 +176,7 @@ def replay(
     ran = _ran(cell, as_labelled=False)
     made = MAKERS[cell.arms](
         cell.density,
-        split=_shares(ran.shares or split),
+        split=ran.shares or split,
         profile=profile or _profile(cell, ran),
         recorded=published_arrivals(*cell),
     )
@@ -212,10 +212,6 @@ def _ran(cell: Cell, as_labelled: bool) -> Ran:
 
 def _profile(cell: Cell, ran: Ran) -> Profile:
     return ran.profile or LABELS[cell.controller][1]
-
-
-def _shares(split: str) -> tuple[float, ...] | None:
-    return None if split == "balanced" else tuple(parse_split(split))
 
 
 @lru_cache

@@ -2,43 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
-from minisim.errors import InputError, choice, instance, number, show
+from minisim.errors import InputError, choice, number
 from minisim.junction.geometry import Intersection
+from minisim.parameters import declared, part, real, text
 from minisim.vehicle import CruiseVehicle, VehicleType
 
 KMH = 1.0 / 3.6
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class Profile:
-    """One consistent set of vehicle, speeds and step.
+    """One consistent set of vehicle, speeds and step."""
 
-    Attributes:
-        name: as on the command line.
-        vehicle: the type of all vehicles.
-        speed_limit: of the roads [m/s].
-        depart_speed: at insertion [m/s]; None is the highest safe speed up to the limit.
-        dt: step [s].
-    """
-
-    name: str
-    vehicle: VehicleType
-    speed_limit: float
-    depart_speed: float | None = None
-    dt: float = 0.1
+    name: str = text("as on the command line", label="profile name")
+    vehicle: VehicleType = part("the type of all vehicles", VehicleType)
+    speed_limit: float = real("of the roads", "m/s", above=0, high=100)
+    depart_speed: float | None = real(
+        "at insertion; None is the highest safe speed up to the limit", "m/s",
+        low=0, optional=True, default=None,
+    )  # fmt: skip
+    dt: float = real("step", "s", low=0.001, high=0.5, default=0.1)
 
     def __post_init__(self) -> None:
-        instance("profile name", self.name, str)
-        instance("vehicle", self.vehicle, VehicleType)
-        number("speed_limit [m/s]", self.speed_limit, above=0, high=100)
         if self.depart_speed is not None:
-            number("depart_speed [m/s]", self.depart_speed, low=0, high=self.speed_limit)
-        number("dt [s]", self.dt, low=0.001, high=0.5)
+            number("depart_speed [m/s]", self.depart_speed, high=self.speed_limit)
 
 
 #: The parameters that the paper's text prescribes: §III road 40 km/h, deceleration 2 m/s², car of
@@ -102,38 +91,32 @@ PUBLISHED_PROFILES = (AS_RUN, AS_RUN_SIGNALS)
 PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROFILES)}
 
 
-@dataclass(frozen=True, kw_only=True)
+@declared(kw_only=True)
 class Scenario:
-    """A junction, its demand and a profile: everything of a run but controller and seed.
+    """A junction, its demand and a profile: everything of a run but controller and seed."""
 
-    Attributes:
-        name: such as "four-way".
-        intersection: the geometry.
-        demand: what to draw arrivals from.
-        profile: vehicle, speeds and step.
-        horizon: simulated time [s]; arrivals come until then.
-        recorded: an arrival table to replay instead of drawing one.
-    """
-
-    name: str
-    intersection: Intersection
-    demand: Demand
-    profile: Profile = PAPER
-    horizon: float = 3600.0
-    recorded: Arrivals | None = None
+    name: str = text('such as "four-way"', label="scenario name")
+    intersection: Intersection = part("the geometry", Intersection)
+    demand: Demand = part("what to draw arrivals from", Demand)
+    profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
+    horizon: float = real(
+        "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
+    )
+    warmup: float = real(
+        "trips demanded before it do not count in any mean or number of trips", "s",
+        low=0, default=0.0,
+    )  # fmt: skip
+    recorded: Arrivals | None = part(
+        "an arrival table to replay instead of drawing one", Arrivals, optional=True, default=None
+    )
 
     def __post_init__(self) -> None:
-        instance("scenario name", self.name, str)
-        instance("intersection", self.intersection, Intersection)
-        instance("demand", self.demand, Demand)
-        instance("profile", self.profile, Profile)
-        number("horizon [s]", self.horizon, above=0, high=1e7)
+        number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
         self.demand.rates(n)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
         if self.recorded is not None:
-            instance("recorded", self.recorded, Arrivals)
             self.recorded.check(n)
 
     @property
@@ -185,11 +168,3 @@ def profile_named(name: str | Profile) -> Profile:
     if isinstance(name, Profile):
         return name
     return PROFILES[choice("profile", name, PROFILES)]
-
-
-def parse_split(text: str) -> Sequence[float]:
-    """Read `4:3:2:1`; raises `InputError`."""
-    try:
-        return tuple(float(share) for share in text.split(":"))
-    except (ValueError, AttributeError, TypeError):
-        raise InputError(f"a split is written like 4:3:2:1, got {show(text)}") from None

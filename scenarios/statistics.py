@@ -1,4 +1,4 @@
-"""Means over seeds, how sure they are, and whether a run was in equilibrium; distributions."""
+"""Means over seeds with their intervals, growing queues, and how far distributions differ."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, number, numbers
 
-#: A queue grows when it has grown by more than so many standard deviations of chance: what a normal
-#: variable exceeds in 1 % of cases.
+#: Standard deviations of chance beyond which a queue is said to grow: a normal variable exceeds
+#: them in 1 % of cases.
 GROWTH_SCORE = 2.326
 
-
-#: Travel times on a free road in the shortest horizon that tells of growth: the roads are full
+#: The shortest horizon that can show growth, in travel times on a free road: the roads are full
 #: when the second of four quarters begins.
 FILLING = 4.0
 
@@ -53,13 +52,15 @@ def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval
 def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
     """Where one more independent value would lie, t·s·√(1 + 1/n) about the mean of n.
 
-    Whether one published run agrees with ours is asked of this interval, not of that of the mean.
-    For normally distributed values it holds the next one with probability `confidence` (Hahn &
-    Meeker 1991, Statistical Intervals, §4.7).
+    One published run is compared with this interval, not with that of the mean. For normally
+    distributed values it holds the next one with probability `confidence` (Hahn & Meeker 1991,
+    Statistical Intervals, §4.7).
 
     Raises:
         InputError: as `mean_interval`.
     """
+    from scipy.special import stdtrit  # a tenth of a second, which `minisim run` need not wait for
+
     data = numbers("values", values)
     number("confidence", confidence, above=0, below=1)
     count = len(data)
@@ -69,59 +70,26 @@ def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> In
     if count == 1:
         return Interval(mean, math.nan, 1)
     variance = math.fsum((value - mean) ** 2 for value in data) / (count - 1)
-    t = student_quantile((1.0 + confidence) / 2.0, count - 1)
+    t = float(stdtrit(count - 1, (1.0 + confidence) / 2.0))
     return Interval(mean, t * math.sqrt(variance * (1.0 + 1.0 / count)), count)
 
 
 def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
     """Confidence interval of the mean of a Poisson variable of which one value is known.
 
-    Exact: the means for which so few or so many events are just likely enough (Garwood 1936). Of
-    0 events the mean is below −ln((1−confidence)/2), 3.7.
+    Exact: the means at which so few or so many events are just likely enough (Garwood 1936). After
+    0 events the mean is below −ln((1−confidence)/2), which is 3.7 for 0.95.
 
     Raises:
         InputError: no count, or a confidence outside (0, 1).
     """
+    from scipy.special import gammainccinv, gammaincinv
+
     integer("count", count, low=0)
     number("confidence", confidence, above=0, below=1)
     tail = (1.0 - confidence) / 2.0
-    high = _poisson_mean(count, tail)
-    return (_poisson_mean(count - 1, 1.0 - tail) if count else 0.0), high
-
-
-def _poisson_mean(count: int, probability: float) -> float:
-    """The mean for which a Poisson variable is at most `count` with this probability."""
-    low, high = 0.0, count + 10.0 * math.sqrt(count + 1.0) + 20.0
-    for _ in range(60):
-        middle = (low + high) / 2.0
-        logs = (k * math.log(middle) - middle - math.lgamma(k + 1.0) for k in range(count + 1))
-        if math.fsum(map(math.exp, logs)) > probability:
-            low = middle
-        else:
-            high = middle
-    return (low + high) / 2.0
-
-
-def queue_growth(
-    demand_time: npt.NDArray[np.float64], leave: npt.NDArray[np.float64], end: float
-) -> float:
-    """How many more vehicles were there in the last quarter of a run than in the second.
-
-    *There* is from demand to arrival, so that queues before the road count too; the numbers are
-    means over the quarter, each trip adding the part of it that it was there. No trajectories are
-    needed, and the swing of a signal's cycle averages out.
-
-    Args:
-        demand_time, leave: of the trips [s], shape (k,); `leave` is infinite where not reached.
-        end: of the run [s].
-    """
-
-    def present(quarter: int) -> float:
-        start, stop = end * quarter / 4.0, end * (quarter + 1) / 4.0
-        there = np.minimum(leave, stop) - np.maximum(demand_time, start)
-        return float(np.clip(there, 0.0, None).sum()) / (stop - start)
-
-    return present(3) - present(1)
+    low = float(gammaincinv(count, tail)) if count else 0.0
+    return low, float(gammainccinv(count + 1, tail))
 
 
 def growing(growth: float, trips: int) -> bool:
@@ -142,40 +110,11 @@ def growing(growth: float, trips: int) -> bool:
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 
 
-def student_quantile(probability: float, freedom: int) -> float:
-    """The `probability` quantile (0.5 … 1) of Student's t with `freedom` degrees of freedom.
-
-    Bisection in the angle θ = arctan(t/√freedom), in which the distribution is a finite sum
-    (Abramowitz & Stegun 1964, 26.7.3 and 26.7.4).
-    """
-    number("probability", probability, low=0.5, below=1)
-    integer("degrees of freedom", freedom, low=1)
-    low, high = 0.0, math.pi / 2.0
-    for _ in range(80):
-        middle = (low + high) / 2.0
-        if _between(middle, freedom) < 2.0 * probability - 1.0:
-            low = middle
-        else:
-            high = middle
-    return math.sqrt(freedom) * math.tan((low + high) / 2.0)
-
-
-def _between(angle: float, freedom: int) -> float:
-    """P(|T| ≤ √freedom · tan angle)."""
-    sine, cosine = math.sin(angle), math.cos(angle)
-    odd = freedom % 2
-    term = total = (cosine if odd else 1.0) if freedom > 1 else 0.0
-    for k in range(2 + odd, freedom - 1, 2):
-        term *= cosine * cosine * (k - 1) / k
-        total += term
-    return 2.0 / math.pi * (angle + sine * total) if odd else sine * total
-
-
 def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
     """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
 
     The two-sample statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for
-    samples that do not overlap.
+    samples that do not overlap. scipy has it too, in a module that takes a second to import.
 
     Raises:
         InputError: a sample is empty or holds something that is not finite.

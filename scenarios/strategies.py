@@ -24,7 +24,7 @@ from minisim.control import Controller
 from minisim.errors import MissingExtraError
 from minisim.junction.geometry import MIN_ANGLE, Intersection, Movement
 from minisim.vehicle import VehicleType
-from scenarios.controllers import controller_named
+from scenarios.controllers import SAFE, controller_named
 from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario
 
 try:
@@ -151,13 +151,6 @@ def emptying(draw: st.DrawFn) -> Scenario:
     )
 
 
-#: Controllers by name that never collide and serve any number of arms.
-SAFE = (
-    "dim", "dim-harmonious", "dim-lanes", "dim-lanes-waiting", "fixed-time", "adaptive",
-    "actuated", "longest-queue", "all-way-stop", "v2ic", "reservation",
-)  # fmt: skip
-
-
 def controllers() -> st.SearchStrategy[Controller]:
-    """Every safe controller, as its command-line name makes it for the profile `paper`."""
+    """Every controller that never collides, and its variants, for the profile `paper`."""
     return st.sampled_from(SAFE).map(controller_named)

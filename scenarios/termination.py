@@ -1,4 +1,4 @@
-"""SIGTERM as an exception, so that whoever is told to end cleans up first."""
+"""SIGTERM as an exception, so that a process that is told to end cleans up first."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import NoReturn
 
 
 class Terminated(SystemExit):
-    """SIGTERM came; its code is what a shell reports of a process that it ended."""
+    """SIGTERM came; the exit code is what a shell reports after that signal."""
 
     def __init__(self) -> None:
         super().__init__(128 + signal.SIGTERM)
 
 
 def raise_terminated(_number: int, _frame: FrameType | None) -> NoReturn:
-    """A handler of SIGTERM. Once more raises once more: in a callback from C the first is lost."""
+    """A handler of SIGTERM. It raises every time: an exception in a callback from C is lost."""
     raise Terminated
 
 
@@ -26,7 +26,7 @@ def raise_terminated(_number: int, _frame: FrameType | None) -> NoReturn:
 def terminable() -> Iterator[None]:
     """Raise `Terminated` on SIGTERM in the block.
 
-    It does nothing outside the main thread, nor where the signal is handled or ignored already.
+    Outside the main thread, or where the signal is already handled or ignored, it does nothing.
     """
     before = signal.getsignal(signal.SIGTERM)
     if threading.current_thread() is not threading.main_thread() or before != signal.SIG_DFL:

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from hypothesis import settings
 
-from dim import NoisyPerception
-from dim.senses.tally import Tallied
+from dim import Dim, NoisyPerception
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Command,
@@ -33,8 +32,9 @@ from minisim.junction.geometry import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
+from scenarios.recipe import Recipe
 from scenarios.scenario import AS_RUN
-from scenarios.sweep.experiment import Experiment
+from scenarios.sweep.rows import identity_of
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -160,8 +160,8 @@ def drive(
 
 #: Label -> waiting at low demand [s] and capacity on four arms [veh/h/lane].
 CURVES = {
-    "dim": (0.6, 380.0), "dim-harmonious": (0.4, 520.0),
-    "dim-rotating": (0.6, 380.0), "dim-waiting": (0.6, 380.0),
+    "dim": (0.6, 380.0), "dim:gate=harmonious": (0.4, 520.0),
+    "dim:priorities=rotating": (0.6, 380.0), "dim:priorities=waiting": (0.6, 380.0),
     "fixed-time": (8.0, 400.0), "adaptive": (5.0, 450.0), "v2ic": (0.1, 480.0),
     "all-way-stop": (1.5, 550.0),
     "reservation": (0.3, 600.0), "longest-queue": (4.0, 460.0),
@@ -173,7 +173,7 @@ def capacity_of(label: str, arms: int) -> float:
     return CURVES[label][1] * 4.0 / arms
 
 
-def synthetic_row(experiment: Experiment) -> dict[str, Any]:
+def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
@@ -204,23 +204,23 @@ def synthetic_row(experiment: Experiment) -> dict[str, Any]:
     groups = ("human", "automated") if share else ()
     return {
         **{
-            f"{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+            f"kinds_{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
             for k, group in enumerate(groups)
             for key, value in times.items()
         },
-        **experiment.identity(), "trips": trips, "unfinished": 9, "collisions": 0, **times,
+        **identity_of(experiment), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
         "arrivals": "same", "cpu_s": 0.1, "version": "test", "error": None,
     }  # fmt: skip
 
 
-def tally(experiment: Experiment, trips: int) -> dict[str, float]:
+def tally(experiment: Recipe, trips: int) -> dict[str, float]:
     """Counts of `dim.senses.tally`, in proportion to the intent errors; none where none errs."""
     controller = experiment.controller
-    if not isinstance(controller, Tallied):
+    if not isinstance(controller, Dim) or controller.perception.period is None:
         return {}
-    perception = controller.dim.perception
+    perception = controller.perception
     assert isinstance(perception, NoisyPerception)
     errors = max(perception.intent_error, *perception.unsignalled)
     return {
@@ -229,9 +229,17 @@ def tally(experiment: Experiment, trips: int) -> dict[str, float]:
     }  # fmt: skip
 
 
-def synthetic_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+def synthetic_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
     """A store that holds everything."""
     return [synthetic_row(experiment) for experiment in experiments]
+
+
+def free_flow(seconds: float) -> dict[str, float | None]:
+    """Columns of a run of an hour with this travel time on a free road."""
+    return {
+        "horizon_s": 3600.0, "warmup_s": 0.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
+        "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
+    }  # fmt: skip
 
 
 def share(part: float) -> settings:

@@ -13,8 +13,8 @@ tests that reach the changed function, fast ones first, up to the first that fai
 
 from __future__ import annotations
 
+import itertools
 import json
-import math
 import os
 import random
 import signal
@@ -33,6 +33,9 @@ from mutmut.runners.harness import PytestRunner
 from mutmut.state import state
 from mutmut.stats import status_by_exit_code
 from mutmut.utils.file_utils import change_cwd
+from scipy.stats import binomtest
+
+from minisim.files import markdown_table
 
 #: A mutant is tried with so many seconds of tests, as they take with the original.
 BUDGET = float(os.environ.get("MUTANTS_BUDGET", "12"))
@@ -90,8 +93,8 @@ class Collected(PytestRunner):
         tests = _affordable(tests)
         if mutant_name is None:
             return super().run_tests(mutant_name=None, tests=tests)
-        found = {item.nodeid: item for item in self.session.items}
-        items = [found[test] for test in tests]
+        by_name = {item.nodeid: item for item in self.session.items}
+        items = [by_name[test] for test in tests]
         signal.signal(signal.SIGPROF, lambda *_: os._exit(HANGS))
         with change_cwd("mutants"):
             for item, following in zip(items, [*items[1:], None], strict=True):
@@ -136,41 +139,20 @@ def sample(size: int) -> None:
 @cli.command()
 def table() -> None:
     """Print how many mutants there are, were tried and survived, by module."""
-    print("| module | mutants | tried | killed | survived | score | 95 % interval |")
-    print("|---|---|---|---|---|---|---|")
-    everything: list[int | None] = []
-    for module, codes in _verdicts().items():
-        if codes:
-            print(_row(f"`{module}`", list(codes.values())))
-            everything += codes.values()
-    print(_row("all", everything))
+    headings = ("module", "mutants", "tried", "killed", "survived", "score", "95 % interval")
+    verdicts = {f"`{name}`": list(codes.values()) for name, codes in _verdicts().items() if codes}
+    verdicts["all"] = [code for codes in verdicts.values() for code in codes]
+    print(markdown_table(headings, itertools.starmap(_row, verdicts.items())))
 
 
-def _row(name: str, codes: list[int | None]) -> str:
+def _row(name: str, codes: list[int | None]) -> tuple[str, ...]:
     verdicts = Counter(status_by_exit_code[code] for code in codes if code is not None)
     tried, survived = verdicts.total(), verdicts["survived"] + verdicts["no tests"]
     killed = tried - survived
     score = f"{100.0 * killed / tried:.1f} %" if tried else "–"
-    low, high = _interval(killed, tried)
-    return (
-        f"| {name} | {len(codes)} | {tried} | {killed} | {survived} | {score} | "
-        f"{100.0 * low:.0f}–{100.0 * high:.0f} % |"
-    )
-
-
-def _interval(killed: int, tried: int) -> tuple[float, float]:
-    """What share would be killed if all were tried: Wilson's score interval at 95 %.
-
-    Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
-    Assoc. 22 (1927).
-    """
-    if not tried:
-        return 0.0, 1.0
-    z = 1.96
-    share, weight = killed / tried, z * z / tried
-    centre = (share + weight / 2.0) / (1.0 + weight)
-    half = z / (1.0 + weight) * math.sqrt((share * (1.0 - share) + weight / 4.0) / tried)
-    return centre - half, centre + half
+    low, high = binomtest(killed, tried).proportion_ci(method="wilson") if tried else (0.0, 1.0)
+    counts = map(str, (len(codes), tried, killed, survived))
+    return name, *counts, score, f"{100.0 * low:.0f}–{100.0 * high:.0f} %"
 
 
 if __name__ == "__main__":

@@ -7,12 +7,16 @@ has one successor; all constants are its defaults.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from baselines.signals.heads import full_order, lane_order
-from baselines.signals.phases import PhaseSession, Verdict, check_greens, following
+from baselines.signals.phases import (
+    PhaseSession,
+    Verdict,
+    check_greens,
+    following,
+)
 from minisim.control import Site, View
-from minisim.errors import instance, number
+from minisim.parameters import declared, real, spelled
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -20,7 +24,7 @@ PLACE = 7.5
 ROUNDING = 1e-6
 
 
-@dataclass(frozen=True)
+@declared
 class Actuated:
     """A signal that prolongs a green while vehicles follow each other closely enough.
 
@@ -30,38 +34,34 @@ class Actuated:
     phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
     beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
 
-    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
-    its way.
-
-    Attributes:
-        max_gap: between two vehicles [s]; a longer one ends the green.
-        detector_gap: from the loop to the line at the speed limit [s]; the loop is nearer where
-            those between it and the line could not all leave within `min_green`.
-        passing_time: of a waiting vehicle over the line [s].
-        min_green: [s]; the authors' network (`minDur`).
-        max_green: [s]; the authors' network (`maxDur`).
-        amber: [s]; the authors' network.
-        order: the lanes in the order of their greens; None is a, b, c…
-        name: short name.
+    The time of a phase runs from the green that is really shown: a head waits until no vehicle
+    crosses its way.
     """
 
-    max_gap: float = 3.0
-    detector_gap: float = 2.0
-    passing_time: float = 1.9
-    min_green: float = 3.0
-    max_green: float = 50.0
-    amber: float = 2.0
-    order: tuple[int, ...] | None = None
-    name: str = "actuated"
+    max_gap: float = real(
+        "gap between two vehicles that ends the green", "s", low=0, high=3600, default=3.0
+    )
+    detector_gap: float = real(
+        "time from the loop to the line at the speed limit; the loop is nearer where the vehicles "
+        "between could not all leave within `min_green`", "s",
+        above=0, high=3600, default=2.0,
+    )  # fmt: skip
+    passing_time: float = real(
+        "time of a waiting vehicle over the line", "s", low=0.1, high=60, default=1.9
+    )
+    # The authors' network: `minDur`, `maxDur` and its amber.
+    min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
+    max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
+    amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
+    order: tuple[int, ...] | None = lane_order()
 
     def __post_init__(self) -> None:
-        number("max_gap [s]", self.max_gap, low=0, high=3600)
-        number("detector_gap [s]", self.detector_gap, above=0, high=3600)
-        number("passing_time [s]", self.passing_time, low=0.1, high=60)
         check_greens(self.min_green, self.max_green)
-        number("amber [s]", self.amber, low=0, high=60)
-        object.__setattr__(self, "order", lane_order(self.order))
-        instance("name", self.name, str)
+
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `actuated:max_gap=2`."""
+        return spelled("actuated", self)
 
     def detector(self, site: Site) -> float:
         """How far the loops are before the junction entry [m]."""
@@ -83,7 +83,7 @@ class Actuated:
 
 
 class GapRule:
-    """When the last vehicle left a lane's loop, and whether that was too long ago.
+    """When the last vehicle left each lane's loop, and whether that was too long ago.
 
     Attributes:
         detector: how far the loops are before the junction entry [m].
@@ -99,7 +99,7 @@ class GapRule:
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Note who has left a loop since the last view; each mark is passed within one step."""
+        """Note vehicles that left a loop since the last view; each passes a mark within a step."""
         free = self.detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
@@ -108,7 +108,7 @@ class GapRule:
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal, gap = self._signal, self._gap(view, lane)
         if elapsed >= signal.max_green or gap >= signal.max_gap:
             return Verdict(following(self.order, lane), 0.0)
@@ -117,7 +117,7 @@ class GapRule:
         return Verdict(lane, min(end, signal.max_green) - elapsed)
 
     def _gap(self, view: View, lane: int) -> float:
-        """Time since the lane's loop has been free [s]."""
+        """For how long the lane's loop has been free [s]."""
         if any(
             v.lane == lane and v.distance <= self.detector and v.id not in self._passed
             for v in view.vehicles

@@ -6,58 +6,59 @@ documentation cites Oertel & Wagner, TRB 2011).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from baselines.signals.heads import full_order, lane_order
-from baselines.signals.phases import PhaseSession, Verdict, check_greens, following, on_detector
+from baselines.signals.phases import (
+    PhaseSession,
+    Verdict,
+    check_greens,
+    following,
+    on_detector,
+)
 from minisim.control import Observed, Site, View
-from minisim.errors import instance, number
+from minisim.parameters import declared, real, spelled, switch
 
-#: An idle signal looks again after so long [s]; fixed in SUMO's code.
+#: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
 
 
-@dataclass(frozen=True)
+@declared
 class Adaptive:
     """A signal that prolongs a green for vehicles that have lost time before the junction.
 
     One phase an approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
-    it takes to the stop line at the speed limit, if that is before `max_green`. While nobody is on
-    the other lanes, a green goes on too.
+    it takes to the stop line at the speed limit, if that is before `max_green`. While the other
+    lanes are empty, a green goes on too.
 
-    The time of a phase runs from the green that is really shown: a head waits until nobody crosses
-    its way. Time lost is that against the speed limit, whatever a driver would like.
-
-    Attributes:
-        detector_range: [m]; SUMO's default.
-        min_time_loss: [s]; SUMO's default.
-        min_green: [s]; the authors' network (`minDur`).
-        max_green: [s]; the authors' network (`maxDur`).
-        extend_max_green: while nobody is on the other lanes, a green may last longer than
-            `max_green` (SUMO's `extendMaxDur`, off there as here).
-        amber: [s]; the authors' network.
-        order: the lanes in the order of their greens; None is a, b, c…
-        name: short name.
+    The time of a phase runs from the green that is really shown: a head waits until no vehicle
+    crosses its way. Time lost is that against the speed limit, whatever a driver would like.
+    Defaults are SUMO's, greens and amber those of the authors' network.
     """
 
-    detector_range: float = 100.0
-    min_time_loss: float = 1.0
-    min_green: float = 3.0
-    max_green: float = 50.0
-    extend_max_green: bool = False
-    amber: float = 2.0
-    order: tuple[int, ...] | None = None
-    name: str = "adaptive"
+    detector_range: float = real(
+        "length of the detectors before the junction", "m", low=1, high=1000, default=100.0
+    )
+    min_time_loss: float = real(
+        "time lost from which on a vehicle prolongs the green", "s",
+        low=0, high=3600, default=1.0,
+    )  # fmt: skip
+    # The authors' network: `minDur`, `maxDur` and its amber.
+    min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
+    max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
+    extend_max_green: bool = switch(
+        "whether a green may last longer than `max_green` while the other lanes are empty (SUMO's "
+        "`extendMaxDur`)", default=False,
+    )  # fmt: skip
+    amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
+    order: tuple[int, ...] | None = lane_order()
 
     def __post_init__(self) -> None:
-        number("detector_range [m]", self.detector_range, low=1, high=1000)
-        number("min_time_loss [s]", self.min_time_loss, low=0, high=3600)
         check_greens(self.min_green, self.max_green)
-        instance("extend_max_green", self.extend_max_green, bool)
-        number("amber [s]", self.amber, low=0, high=60)
-        object.__setattr__(self, "order", lane_order(self.order))
-        instance("name", self.name, str)
+
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `adaptive:max_green=30`."""
+        return spelled("adaptive", self)
 
     def start(self, site: Site) -> PhaseSession:
         """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
@@ -87,13 +88,13 @@ class DelayRule:
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
-        """Note when and where somebody comes onto a detector."""
+        """Note when and where a vehicle comes onto a detector."""
         for v in view.vehicles:
             if v.id not in self._entered and 0.0 < v.distance <= self._signal.detector_range:
                 self._entered[v.id] = view.time, v.distance
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Prolong the phase of `lane`, `elapsed` s old, or pass on to the next lane."""
+        """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal = self._signal
         present = on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
@@ -120,8 +121,8 @@ class DelayRule:
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector [s].
 
-    That is the time since then, less what the way since then takes at the limit; so nobody has to
-    look in between.
+    That is the time since then, less what the way since then takes at the limit. So no look is
+    needed in between.
 
     Args:
         entered: when it came [s].

@@ -3,58 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 from baselines.signals.heads import Heads, Phase, Program, full_order, lane_order, stopping_sight
 from baselines.signals.webster import SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, instance, number, numbers
+from minisim.parameters import checked, declared, real, spelled, switch
 
 
-@dataclass(frozen=True)
+def _greens(title: str, value: Any) -> tuple[float, ...] | float:
+    """Check `FixedTime.greens`."""
+    if isinstance(value, Real):
+        return _green(value)
+    return tuple(_green(green) for green in numbers(title, value))
+
+
+@declared
 class FixedTime:
-    """A signal that gives each approach its green in turn, again and again.
+    """A signal that gives each approach its green in turn, with Webster's green times.
 
-    The cycle is the sum of all greens, ambers and all-reds and starts with the first one's green.
-
-    Attributes:
-        greens: of each lane [s]; one number for all lanes; or None for Webster's, from the
-            expected demand of the site.
-        amber: [s]. With the defaults the ambers are Webster's lost times.
-        saturation_flow: of a lane [veh/h].
-        lost_time: a phase [s]; only Webster's formula uses it.
-        equal_greens: Webster's cycle with equal greens, as in the paper's unbalanced runs.
-        max_cycle: at a demand beyond Webster's formula (Y > 0.95) [s].
-        all_red: after every amber [s].
-        order: the lanes in the order of their greens; None is a, b, c…
-        name: short name.
+    The cycle is the sum of all greens, ambers and all-reds and starts with the first lane's green.
+    With the defaults the ambers are Webster's lost times.
     """
 
-    greens: tuple[float, ...] | float | None = None
-    amber: float = 2.0
-    saturation_flow: float = 1500.0
-    lost_time: float = 2.0
-    equal_greens: bool = False
-    max_cycle: float = 180.0
-    all_red: float = 0.0
-    order: tuple[int, ...] | None = None
-    name: str = "fixed-time"
+    greens: tuple[float, ...] | float | None = checked(
+        "green of each lane, or one number for all; none is Webster's, from the expected demand",
+        _greens, "numbers 0.5 … 3600", "s", optional=True, default=None,
+    )  # fmt: skip
+    amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
+    saturation_flow: float = real(
+        "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
+    )
+    lost_time: float = real(
+        "lost time of each phase, which only Webster's formula uses", "s",
+        low=0, high=60, default=2.0,
+    )  # fmt: skip
+    equal_greens: bool = switch(
+        "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
+        default=False,
+    )
+    max_cycle: float = real(
+        "longest cycle, for a demand beyond Webster's formula (Y > 0.95)", "s",
+        above=0, high=3600, default=180.0,
+    )  # fmt: skip
+    all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
+    order: tuple[int, ...] | None = lane_order()
 
-    def __post_init__(self) -> None:
-        if isinstance(self.greens, Real):
-            object.__setattr__(self, "greens", _green(self.greens))
-        elif self.greens is not None:
-            greens = tuple(_green(green) for green in numbers("greens [s]", self.greens))
-            object.__setattr__(self, "greens", greens)
-        number("amber [s]", self.amber, low=0, high=60)
-        number("saturation_flow [veh/h]", self.saturation_flow, low=1, high=1e5)
-        number("lost_time [s]", self.lost_time, low=0, high=60)
-        instance("equal_greens", self.equal_greens, bool)
-        number("max_cycle [s]", self.max_cycle, above=0, high=3600)
-        number("all_red [s]", self.all_red, low=0, high=60)
-        object.__setattr__(self, "order", lane_order(self.order))
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `fixed-time:equal_greens=true`."""
+        return spelled("fixed-time", self)
 
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.

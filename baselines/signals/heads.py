@@ -1,18 +1,18 @@
-"""What signal controllers share: phases, programmes and signal heads that cannot let collide.
+"""What signal controllers share: phases, programmes, and signal heads that prevent collisions.
 
-A head turns green only when nobody who crosses the junction conflicts with its lane, so safety
-does not hang on the length of an amber. At the end of a green, those who can no longer stop
-comfortably keep their right of way; everybody else stops.
+A head turns green only when no vehicle on the junction conflicts with its lane, so safety does not
+depend on the length of an amber. At the end of a green, vehicles that can no longer stop
+comfortably keep their right of way; all others stop.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from itertools import accumulate, count
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +28,12 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, integer, items, number, numbers
+from minisim.errors import InputError, instance, integer, items, numbers
+from minisim.parameters import checked, declared, real
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
-#: Room for the last steps before a vehicle is seen [m].
+#: Room for the last steps before a vehicle comes into view [m].
 SIGHT_MARGIN = 5.0
 
 
@@ -48,30 +49,24 @@ class Colour(Enum):
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 
 
-@dataclass(frozen=True)
+def _lanes(title: str, value: Any) -> tuple[int, ...]:
+    """Check `Phase.lanes`."""
+    lanes = numbers(title, value)
+    if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
+        raise InputError(f"{title} must be indices of lanes, got {value!r}")
+    return tuple(int(lane) for lane in lanes)
+
+
+@declared
 class Phase:
-    """Lanes that are green together, for how long, and what follows.
+    """Lanes that are green together, for how long, and what follows."""
 
-    Attributes:
-        lanes: indices of the lanes.
-        green: [s].
-        amber: [s].
-        all_red: after the amber [s].
-    """
-
-    lanes: tuple[int, ...]
-    green: float
-    amber: float = 2.0
-    all_red: float = 0.0
-
-    def __post_init__(self) -> None:
-        lanes = numbers("lanes of a phase", self.lanes)
-        if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
-            raise InputError(f"lanes of a phase must be indices of lanes, got {self.lanes!r}")
-        object.__setattr__(self, "lanes", tuple(int(lane) for lane in lanes))
-        number("green [s]", self.green, low=0.5, high=3600)
-        number("amber [s]", self.amber, low=0, high=60)
-        number("all_red [s]", self.all_red, low=0, high=60)
+    lanes: tuple[int, ...] = checked(
+        "indices of the lanes", _lanes, "indices", label="lanes of a phase"
+    )
+    green: float = real("green", "s", low=0.5, high=3600)
+    amber: float = real("amber after the green", "s", low=0, high=60, default=2.0)
+    all_red: float = real("all-red after the amber", "s", low=0, high=60, default=0.0)
 
     @property
     def duration(self) -> float:
@@ -79,22 +74,24 @@ class Phase:
         return self.green + self.amber + self.all_red
 
 
-@dataclass(frozen=True)
+def _phases(title: str, value: Any) -> tuple[Phase, ...]:
+    """Check `Program.phases`."""
+    instance(title, value, (tuple, list))
+    for phase in value:
+        instance("phase", phase, Phase)
+    if not value:
+        raise InputError("a signal program needs at least one phase")
+    return tuple(value)
+
+
+@declared
 class Program:
     """Phases in a fixed order and time, over and over; the first turns green at time 0.
 
     A program remembers nothing: what it shows follows from the time alone.
     """
 
-    phases: tuple[Phase, ...]
-
-    def __post_init__(self) -> None:
-        instance("phases", self.phases, (tuple, list))
-        object.__setattr__(self, "phases", tuple(self.phases))
-        for phase in self.phases:
-            instance("phase", phase, Phase)
-        if not self.phases:
-            raise InputError("a signal program needs at least one phase")
+    phases: tuple[Phase, ...] = checked("the phases", _phases, "phases")
 
     @cached_property
     def cycle(self) -> float:
@@ -132,7 +129,7 @@ class Heads:
     """The signal heads of a run, and the vehicles that they have let go.
 
     Attributes:
-        colours: what each lane's head shows now. A head that is wanted green while somebody
+        colours: what each lane's head shows now. A head that should be green while a vehicle
             still crosses its lane's way stays red (or amber) until that vehicle is clear.
     """
 
@@ -147,7 +144,7 @@ class Heads:
         self.colours = [Colour.RED] * n
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
-        """Turn the heads to `wanted` as far as that is safe now, and say how.
+        """Turn the heads to `wanted` as far as that is safe now; the commands for it.
 
         Lanes are closed before others are opened, in one answer.
         """
@@ -170,7 +167,7 @@ class Heads:
         return [Close(lane), *(Go(v.id) for v in going)]
 
     def _may_open(self, lane: int, view: View) -> bool:
-        """Nobody crosses the lane's way, and no head is green for somebody who might."""
+        """Whether no vehicle crosses the lane's way, and no head is green for one that might."""
         if any(
             colour is Colour.GREEN and self._exclusive[lane][other]
             for other, colour in enumerate(self.colours)
@@ -183,11 +180,16 @@ class Heads:
         )
 
 
-def lane_order(order: object) -> tuple[int, ...] | None:
-    """Return a signal's `order` of lanes, None being a, b, c…; raises `InputError`."""
-    if order is None:
-        return None
-    return tuple(integer("lane in order", lane, low=0) for lane in items("order", order, "lanes"))
+def lane_order() -> Any:
+    """The field of a signal that says in which order its lanes get their greens."""
+
+    def check(title: str, value: Any) -> tuple[int, ...]:
+        return tuple(integer("lane in order", one, low=0) for one in items(title, value, "lanes"))
+
+    return checked(
+        "lanes in the order of their greens; none is a, b, c…", check, "lanes",
+        optional=True, default=None,
+    )  # fmt: skip
 
 
 def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
@@ -202,8 +204,8 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
 def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
     """The vehicles of one lane, before the junction, to be let go when it is closed.
 
-    Those that comfortable braking no longer stops, and everybody before them, for a follower
-    cannot go before its leader does.
+    These are the ones that comfortable braking no longer stops, and all before them, for a
+    follower cannot go before its leader does.
 
     Args:
         lane: the lane's vehicles, front to back.
@@ -215,7 +217,7 @@ def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
 
 
 def stopping_sight(site: Site) -> float:
-    """How far a view must reach so that everybody beyond it can still stop [m]."""
+    """How far a view must reach so that every vehicle beyond it can still stop [m]."""
     fastest = site.speed_limit * (FASTEST_DRIVER if site.vehicle.speed_deviation else 1.0)
     needed = stopping_distance(fastest, site.vehicle.deceleration)
     return needed + COMMIT_MARGIN + SIGHT_MARGIN

@@ -1,48 +1,46 @@
 """The longest-queue-first signal: max-pressure on one junction.
 
 Max-pressure (Varaiya, Transp. Res. C 36 (2013): 177–195) gives green to the phase with the largest
-sum, over its movements, of what waits before the junction less what stands behind it. On one
-junction whose exits flow freely nothing stands behind it: the longest queue goes first.
+sum, over its movements, of what waits before the junction less what stands behind it. On a single
+junction whose exits flow freely nothing stands behind it, so the longest queue goes first.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from baselines.signals.phases import PhaseSession, Verdict, on_detector
 from minisim.control import Site, View
-from minisim.errors import instance, number
+from minisim.parameters import declared, real, spelled
 
 
-@dataclass(frozen=True)
+@declared
 class LongestQueue:
-    """A signal that looks every few seconds which approach has the most vehicles.
+    """A signal that turns to the approach with the most vehicles, every few seconds.
 
     One phase an approach: while one lane carries all turns, every two approaches of a junction
-    have movements that conflict, so that no two can be green together. Among equal queues the one
-    goes first whose last green is the longest ago, then in the order a, b, c…; an empty junction
-    keeps its green. A lane may wait for long while others always have more.
-
-    Attributes:
-        interval: of green between two looks [s], counted from the green that is really shown.
-            5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
-            several lanes. A change costs some 3 s, so that single lanes need the upper end.
-        detector_range: a queue is who is on the last so many metres [m]; as for `Adaptive`.
-        amber: [s]; as for `Adaptive`, and in the code of Genders & Razavi.
-        name: short name.
+    have movements that conflict, so no two can be green together. Among equal queues the one whose
+    last green is the longest ago goes first, then in the order a, b, c…; an empty junction keeps
+    its green. A lane may wait for long while others always have more.
     """
 
-    interval: float = 10.0
-    detector_range: float = 100.0
-    amber: float = 2.0
-    name: str = "longest-queue"
+    # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
+    # several lanes. A change costs some 3 s, so that single lanes need the upper end.
+    interval: float = real(
+        "green between two looks, counted from the green that is really shown", "s",
+        low=0.5, high=3600, default=10.0,
+    )  # fmt: skip
+    detector_range: float = real(
+        "length of approach on which a queue is counted, as for `Adaptive`", "m",
+        low=1, high=1000, default=100.0,
+    )  # fmt: skip
+    # As for `Adaptive`, and in the code of Genders & Razavi.
+    amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
 
-    def __post_init__(self) -> None:
-        number("interval [s]", self.interval, low=0.5, high=3600)
-        number("detector_range [m]", self.detector_range, low=1, high=1000)
-        number("amber [s]", self.amber, low=0, high=60)
-        instance("name", self.name, str)
+    @property
+    def name(self) -> str:
+        """Its spelling, such as `longest-queue:interval=5`."""
+        return spelled("longest-queue", self)
 
     def start(self, site: Site) -> PhaseSession:
         """Begin a run."""
@@ -56,7 +54,7 @@ class LongestQueue:
 
 
 class QueueRule:
-    """Whose queue is the longest."""
+    """Which queue is the longest."""
 
     def __init__(self, signal: LongestQueue, site: Site) -> None:
         self._signal = signal

@@ -1,7 +1,7 @@
-"""What signals share whose phases last as long as their rule says: one phase an approach.
+"""What signals have in common whose phases last as long as a rule says: one phase an approach.
 
-Between two phases the old lane shows amber, and the new one turns green when nobody who crosses
-its way is left (`Heads`). The time of a phase runs from the green that is really shown, so that a
+Between two phases the old lane shows amber, and the new one turns green when no vehicle crosses its
+way any more (`Heads`). The time of a phase runs from the green that is really shown, so a
 shortest and a longest green mean what drivers see.
 """
 
@@ -13,13 +13,11 @@ from typing import NamedTuple, Protocol
 
 from baselines.signals.heads import Colour, Heads, stopping_sight
 from minisim.control import Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError, number
+from minisim.errors import InputError
 
 
 def check_greens(shortest: float, longest: float) -> None:
-    """Raise `InputError` for a shortest and a longest green [s] that no phase can keep."""
-    number("min_green [s]", shortest, low=0.5, high=3600)
-    number("max_green [s]", longest, low=0.5, high=3600)
+    """Raise `InputError` for a longest green below the shortest [s]."""
     if longest < shortest:
         raise InputError(f"max_green must be at least min_green, {shortest:g} s, got {longest:g} s")
 
@@ -28,8 +26,8 @@ class Verdict(NamedTuple):
     """What a rule says of the present phase.
 
     Attributes:
-        lane: whose turn it is; another one than now ends the phase.
-        after: look again after so many seconds; it does not matter when the phase ends.
+        lane: whose turn it is; another lane than now ends the phase.
+        after: time until the next look [s]; it does not matter when the phase ends.
     """
 
     lane: int
@@ -43,21 +41,21 @@ class Rule(Protocol):
         """Take note of a view; called at every wake-up."""
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
-        """Say how it goes on with the phase of `lane`, green for `elapsed` seconds."""
+        """Say how the phase of `lane` goes on, which has been green for `elapsed` seconds."""
 
 
 class PhaseSession:
-    """Shows green to one lane at a time, as a rule tells.
+    """Shows green to one lane at a time, as a rule says.
 
-    It is called when its rule asked for it, when somebody clears the junction, and when somebody
-    passes where the rule must see him.
+    It is called when its rule asked for it, when a vehicle clears the junction, and when one passes
+    a place where the rule must see it.
 
     Args:
         site: of the run.
         rule: when a phase ends, and which is next.
         detector_range: how far before the junction the rule sees [m].
         marks: how far before the junction the rule must see every front bumper pass [m].
-        min_green: the rule is asked that long after a phase has begun [s].
+        min_green: time from the begin of a phase until the rule is asked [s].
         amber: [s].
         first: the lane that is green first.
     """
@@ -89,7 +87,7 @@ class PhaseSession:
         self._due = math.inf
 
     def decide(self, view: View) -> Iterable[Command]:
-        """End the phase or the amber if it is time, and turn the heads.
+        """End the phase or the amber when it is time, and turn the heads.
 
         Timers ring on whole steps: what is less than half a step away is due.
         """
@@ -122,7 +120,7 @@ class PhaseSession:
 
 
 def following(order: tuple[int, ...], lane: int) -> int:
-    """The lane after this one, where phases come in a fixed order over and over."""
+    """The lane after this one in a fixed order."""
     return order[(order.index(lane) + 1) % len(order)]
 
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from minisim.errors import InputError, instance, number, numbers
 
-#: Above this flow ratio the optimum cycle is of no use (it is infinite at 1): cap it.
+#: Above this flow ratio the optimum cycle is useless (it is infinite at 1) and is capped.
 MAX_FLOW_RATIO = 0.95
-#: Green of a lane that hardly anybody uses [s]: whoever stands at the line gets across it, and
-#: Webster's own greens at the paper's demands, 2.03 s at the least, stay as they are.
+#: Green of a lane with hardly any traffic [s]: a vehicle at the line gets across it, and Webster's
+#: own greens at the paper's demands, 2.03 s at the least, stay as they are.
 MIN_GREEN = 2.0
 
 
@@ -138,7 +138,7 @@ def webster_delay(
         return math.inf
     uniform = cycle * (1.0 - share) ** 2 / (2.0 * (1.0 - share * x))
     q = rate / 3600.0
-    if q == 0.0:  # the limit: nobody waits for anybody
+    if q == 0.0:  # the limit: no vehicle waits for another
         return uniform
     random = x * x / (2.0 * q * (1.0 - x))
     scale = math.cbrt(cycle) / math.cbrt(q) ** 2
@@ -154,7 +154,7 @@ def _rates(rates: Iterable[float]) -> tuple[float, ...]:
 
 
 def _raise_within(greens: Sequence[float], low: float) -> list[float]:
-    """Raise greens to `low`, the others giving way in proportion; the sum stays the same."""
+    """Raise greens to `low` and shorten the others in proportion; the sum stays the same."""
     raised: set[int] = set()
     result = list(greens)
     while below := {i for i, green in enumerate(result) if green < low} - raised:

@@ -1,35 +1,35 @@
-"""Human drivers: who drives, what they signal, and which gaps they accept.
+"""Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
 The numbers are those of the Highway Capacity Manual (HCM, 7th edition), chapter 20, for two-way
-stop control, base values of a two-lane major street: drivers who stopped at a stop sign of the
-minor street, that is streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
+stop control, base values of a two-lane major street. They are for drivers that stopped at a stop
+sign of the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
 right-hand traffic. An unsignalised junction of equal roads is another case, the all-way stop (HCM
-chapter 21): there everybody stops, and nobody accepts a gap in a stream that does not. So drivers
-here do both: among themselves they go in the order of stopping, and from vehicles that need not
-stop they accept gaps.
+chapter 21): there all drivers stop, and none accepts a gap in a stream that does not stop. So
+drivers here do both. Among themselves they go in the order of stopping, and they accept gaps
+between vehicles that need not stop.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import IntEnum
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from minisim.control import CLEARANCE, Observed, Site
-from minisim.errors import InputError, choice, integer, number, numbers
+from minisim.errors import InputError, integer, number, numbers
 from minisim.junction.geometry import Bools, Intersection
+from minisim.parameters import Check, checked, declared, real, word
 from minisim.streams import stream
 
 #: Less than this off straight ahead is no turn, and needs no indicator [°].
 STRAIGHT = 30.0
 
 #: What others believe of a human's way. "motion": only what its place and heading show. "signals":
-#: also an indicator that blinks. "silence": also that who shows none goes straight on, which is
-#: false for the turns that no indicator announces.
+#: also an indicator that blinks. "silence": also that a vehicle without one goes straight on, which
+#: is false for the turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
 #: Bounds of a uniform draw whose normal quantile is taken.
@@ -47,74 +47,83 @@ class Turn(IntEnum):
 def turns(intersection: Intersection) -> tuple[Turn, ...]:
     """The kind of every movement, in the order of `Intersection.movements`."""
     near = 1.0 if intersection.side == "left" else -1.0
-    found = []
+    kinds = []
     for path in intersection.paths:
         (ax, ay), (bx, by) = path.heading_in.tolist(), path.heading_out.tolist()
         left = math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
         straight = abs(left) < STRAIGHT
-        found.append(Turn.THROUGH if straight else Turn.NEAR if left * near > 0 else Turn.FAR)
-    return tuple(found)
+        kinds.append(Turn.THROUGH if straight else Turn.NEAR if left * near > 0 else Turn.FAR)
+    return tuple(kinds)
 
 
-@dataclass(frozen=True, kw_only=True)
+def _several(count: int, each: str, high: float) -> Check:
+    """A check of so many numbers 0 … `high`; `each` says what one of them is."""
+
+    def check(title: str, value: Any) -> tuple[float, ...]:
+        values = numbers(title, value)
+        if len(values) != count:
+            raise InputError(f"{title} must be {count} numbers, got {values}")
+        for one in values:
+            number(each, one, low=0, high=high)
+        return values
+
+    return check
+
+
+_GAPS = _several(3, "critical gap [s]", 60.0)
+_TIMES = _several(3, "follow-up time [s]", 60.0)
+_TURNS = _several(2, "share of unsignalled turns", 1.0)
+
+
+@declared(kw_only=True)
 class Humans:
     """How people drive. Triples are for the near turn, straight on, and the far turn.
 
-    Attributes:
-        critical_gaps: the shortest time until a vehicle that need not stop arrives, for which a
-            driver goes first [s] (HCM exhibit 20-17).
-        follow_up: the shortest time between two drivers of one lane [s] (HCM exhibit 20-18).
-        deviation: standard deviation of a driver's critical gap over its mean, log-normal over
-            drivers as in the usual maximum-likelihood estimate (Tian et al. 1999, Transp. Res. A
-            33:187). 0 makes all drivers alike, as the HCM takes it; a published value for these
-            junctions was not found.
-        reaction: from standing at the line to moving, where nobody is in the way [s]. The HCM's
-            all-way stop has a departure headway of 3.9 s then, of which 2.0 s are for moving up
-            (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign (AASHTO).
-        unsignalled: the share of near and far turns that no indicator announces: 29 % of right
-            and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid. Anal. Prev.
-            74:1).
-        trust: what drivers believe of each other, see `TRUSTS`. Until they know where another
-            goes, they keep out of all ways that it may take.
-
-    Raises:
-        InputError: a number out of range.
+    Sources: critical gaps HCM exhibit 20-17, follow-up times exhibit 20-18.
     """
 
-    critical_gaps: tuple[float, float, float] = (6.2, 6.5, 7.1)
-    follow_up: tuple[float, float, float] = (3.3, 4.0, 3.5)
-    deviation: float = 0.0
-    reaction: float = 1.9
-    unsignalled: tuple[float, float] = (0.29, 0.25)
-    trust: str = "signals"
-
-    def __post_init__(self) -> None:
-        _several(self, "critical_gaps", "critical gap [s]", 3, 60.0)
-        _several(self, "follow_up", "follow-up time [s]", 3, 60.0)
-        _several(self, "unsignalled", "share of unsignalled turns", 2, 1.0)
-        number("deviation of critical gaps", self.deviation, low=0, high=1)
-        # A vehicle that was given the right of way moves off within a few steps; a driver must
-        # look for longer than that, or would not see it coming.
-        number("reaction [s]", self.reaction, low=0.5, high=60)
-        choice("trust", self.trust, TRUSTS)
-
-
-def _several(humans: Humans, field: str, name: str, count: int, high: float) -> None:
-    """Check a field of so many numbers 0 … `high`, and keep it as a tuple."""
-    values = numbers(field, getattr(humans, field))
-    if len(values) != count:
-        raise InputError(f"{field} must be {count} numbers, got {values}")
-    for value in values:
-        number(name, value, low=0, high=high)
-    object.__setattr__(humans, field, values)
+    critical_gaps: tuple[float, float, float] = checked(
+        "shortest time until a vehicle that need not stop arrives for which a driver goes first",
+        _GAPS, "three numbers 0 … 60", "s", default=(6.2, 6.5, 7.1),
+    )  # fmt: skip
+    follow_up: tuple[float, float, float] = checked(
+        "shortest time between two drivers of one lane",
+        _TIMES, "three numbers 0 … 60", "s", default=(3.3, 4.0, 3.5),
+    )  # fmt: skip
+    # Log-normal over drivers, as in the usual maximum-likelihood estimate (Tian et al. 1999,
+    # Transp. Res. A 33:187). The HCM takes all drivers to be alike; a published value for these
+    # junctions was not found.
+    deviation: float = real(
+        "standard deviation of a driver's critical gap over its mean; 0 makes all alike",
+        low=0, high=1, default=0.0, label="deviation of critical gaps",
+    )  # fmt: skip
+    # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, of which
+    # 2.0 s are for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
+    # (AASHTO). A vehicle that was given the right of way moves off within a few steps; a driver
+    # must look for longer than that, or would not see it coming.
+    reaction: float = real(
+        "time from standing at the line to moving, where nothing is in the way", "s",
+        low=0.5, high=60, default=1.9,
+    )  # fmt: skip
+    # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
+    # Anal. Prev. 74:1).
+    unsignalled: tuple[float, float] = checked(
+        "share of near and of far turns that no indicator announces",
+        _TURNS, "two numbers 0 … 1", default=(0.29, 0.25),
+    )  # fmt: skip
+    trust: str = word(
+        "what drivers believe of each other, see `TRUSTS`; until they know where another goes, "
+        "they keep out of all ways that it may take",
+        TRUSTS, default="signals",
+    )  # fmt: skip
 
 
 class Driver(NamedTuple):
     """One vehicle's driver.
 
     Attributes:
-        human: or it follows DIM.
-        careless: from 0 to 1: it leaves out the indicator of turns that more drivers than this do.
+        human: whether a human drives; otherwise the vehicle follows DIM.
+        careless: 0 … 1; it leaves out the indicator of a turn where a larger share of drivers does.
         gap: factor on the critical gaps.
     """
 
@@ -126,7 +135,7 @@ class Driver(NamedTuple):
 class Drivers:
     """The drivers of one run, drawn by vehicle id: the same whatever controller asks, and when.
 
-    Who is human at some share is so at every larger one.
+    A vehicle with a human driver at some share has one at every larger share.
     """
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
@@ -148,13 +157,13 @@ class Drivers:
         return Driver(human < self._share, careless, factor)
 
     def human(self, count: int) -> Bools:
-        """Which of the first `count` vehicles are human, shape (count,)."""
+        """Which of the first `count` vehicles have a human driver, shape (count,)."""
         integer("number of vehicles", count, low=0)
         return np.array([self[vehicle].human for vehicle in range(count)], dtype=bool)
 
 
 class Readings:
-    """What indicators and motion leave possible of a vehicle's way, for all who see it.
+    """What indicators and motion leave possible of a vehicle's way, for all that see it.
 
     Motion is position: once two ways of a lane are `CLEARANCE` apart, a vehicle's place tells on
     which of them it is.

@@ -24,7 +24,7 @@ driving intend (SAE J3134); otherwise each would let the other go first.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from dim.controller import Dim, DimSession
@@ -89,10 +89,13 @@ class MixedSession:
     """One run: a session of DIM for some vehicles, and the humans."""
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
-        drivers = Drivers(mixed.humans, mixed.share, site.seed)
-        cautious = _Cautious(mixed.dim.perception, mixed)
+        drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
+        cautious, take = _Cautious(mixed.dim.perception, mixed), _caution(mixed, site)
         self._dim = DimSession(
-            replace(mixed.dim, perception=cautious), site, lambda id: not drivers[id].human
+            replace(mixed.dim, perception=cautious),
+            site,
+            lambda id: not drivers[id].human,
+            truth=lambda view: take(view, view),
         )
         self._humans = _Humans(mixed, site, drivers)
         plan = self._dim.plan
@@ -102,8 +105,17 @@ class MixedSession:
             sight=max(plan.sight, self._humans.sight),
         )
 
+    def kind(self, vehicle: int) -> str:
+        """ "human" or "automated"."""
+        return "human" if self._drivers[vehicle].human else "automated"
+
+    @property
+    def counts(self) -> Mapping[str, float]:
+        """What wrong perception did to the vehicles of DIM (`dim.senses.tally`)."""
+        return self._dim.counts
+
     def decide(self, view: View) -> Iterable[Command]:
-        """Let everybody decide, from the same view."""
+        """Let all vehicles decide, from the same view."""
         commands = [*self._dim.decide(view), *self._humans.decide(view)]
         wakes = [command.time for command in commands if isinstance(command, Wake)]
         others = [command for command in commands if not isinstance(command, Wake)]
@@ -123,37 +135,35 @@ class _Cautious:
     mixed: Mixed
 
     @property
-    def name(self) -> str:
-        """That of what they see at all."""
-        return self.perception.name
-
-    @property
     def period(self) -> float | None:
         """That of what they see at all; the humans ask for more views while they are there."""
         return self.perception.period
 
     def start(self, site: Site) -> See:
         """Begin a run."""
-        mixed = self.mixed
-        drivers = Drivers(mixed.humans, mixed.share, site.seed)
-        readings = Readings(mixed.humans, site, drivers)
-        see_all, per_lane = self.perception.start(site), site.intersection.n - 1
-        start = mixed.dim.zones.yellow_start + ROUNDING
-        latest: list[View] = []  # what was seen last, and what it was taken for
+        see_all, take = self.perception.start(site), _caution(self.mixed, site)
+        return lambda view, ego: take(view, see_all(view, ego))
 
-        def see(view: View, ego: Observed) -> View:
-            seen = see_all(view, ego)
-            if not latest or latest[0] is not seen:
-                ways = {
-                    v.id: readings.possible(v, mixed.trust)
-                    for v in view.vehicles
-                    if v.distance <= start and drivers[v.id].human
-                }
-                taken = tuple(_taken(seen, ways, drivers, start, per_lane))
-                latest[:] = [seen, View(seen.time, taken)]
-            return latest[1]
 
-        return see
+def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
+    """What a view, and what a vehicle has seen of it, are taken for."""
+    drivers = Drivers(mixed.humans, mixed.share, site.seed)
+    readings, per_lane = Readings(mixed.humans, site, drivers), site.intersection.n - 1
+    start = mixed.dim.zones.yellow_start + ROUNDING
+    latest: list[View] = []  # what was seen last, and what it was taken for
+
+    def take(view: View, seen: View) -> View:
+        if not latest or latest[0] is not seen:
+            ways = {
+                v.id: readings.possible(v, mixed.trust)
+                for v in view.vehicles
+                if v.distance <= start and drivers[v.id].human
+            }
+            taken = tuple(_taken(seen, ways, drivers, start, per_lane))
+            latest[:] = [seen, View(seen.time, taken)]
+        return latest[1]
+
+    return take
 
 
 def _taken(

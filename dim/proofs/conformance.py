@@ -1,45 +1,41 @@
-"""Runs held against the protocol: every view and every command must be a path of the model.
+"""Runs checked against the protocol: their views and commands must be a path of the model.
 
     simulate(scenario, Checked(Dim()))
 
-behaves as `Dim()` does, on any host, and raises where the host or the session does something that
-`dim.proofs.protocol` does not allow. What was proved of the model then holds for the run.
+behaves as `Dim()` does, on any host, but raises an error where the host or the session does
+something that `dim.proofs.protocol` does not allow. What was proved of the model then holds for
+the run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from dim.controller import Dim, DimSession
 from dim.perception import ROUNDING
 from dim.proofs.protocol import COMMITTED, LOOK, ROLLING, WAITING, Event, Protocol, State
 from minisim.control import Command, Go, Hold, Observed, Plan, Site, View
-from minisim.errors import InputError, MinisimError, instance
+from minisim.errors import InputError, MinisimError
+from minisim.parameters import declared, part
 
 
 class ConformanceError(MinisimError):
     """A run left the protocol."""
 
 
-@dataclass(frozen=True)
+@declared
 class Checked:
-    """A `Dim` whose runs are checked against the protocol as they go.
+    """A `Dim` whose runs are checked against the protocol as they go."""
 
-    Attributes:
-        dim: with fixed priorities: the lanes' own order.
-    """
-
-    dim: Dim
+    dim: Dim = part("the controller, with the lanes' own priorities", Dim)
 
     def __post_init__(self) -> None:
-        instance("dim", self.dim, Dim)
         if self.dim.priorities is not None:
             raise InputError("the protocol is checked with the lanes' own priorities only")
 
     @property
     def name(self) -> str:
-        """That of the `Dim`."""
+        """The name of the `Dim`."""
         return self.dim.name
 
     def start(self, site: Site) -> CheckedSession:
@@ -48,10 +44,12 @@ class Checked:
 
 
 class CheckedSession:
-    """A session of DIM, and where in the protocol it is.
+    """A session of DIM, and its state in the protocol.
 
     Attributes:
-        plan: as DIM's.
+        plan: DIM's.
+        protocol: the rules.
+        state: where the run is.
         steps: events followed so far.
     """
 
@@ -80,7 +78,7 @@ class CheckedSession:
         return commands
 
     def _follow(self, view: View) -> None:
-        """Take the model from the last view to this one: who moved on, who left, who came."""
+        """Take the model from the last view to this one: what moved on, what left, what came."""
         near = [v for v in view.vehicles if v.distance <= self._start]
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
         inside = {v.id: 1 << self.protocol.matrix.index(v.movement) for v in near if v.distance < 0}
@@ -119,7 +117,7 @@ class CheckedSession:
         """A front vehicle that has gone into the junction; returns its movement as a bit."""
         front = self.state.fronts[lane]
         if front is None:
-            raise ConformanceError(f"at {view.time:.1f} s somebody of lane {lane} went unseen")
+            raise ConformanceError(f"at {view.time:.1f} s a vehicle of lane {lane} went unseen")
         manoeuvre, phase, _ = front
         if phase == WAITING and self.protocol.commit == "paper":
             self._take(view, Event("roll", lane, manoeuvre))
@@ -141,7 +139,7 @@ class CheckedSession:
         )
 
     def _compare(self, view: View, commands: Iterable[Command]) -> None:
-        """Whether those go whom the model lets go."""
+        """Raise unless the vehicles that go are those that the model lets go."""
         for command in commands:
             if isinstance(command, Go):
                 self._going.add(command.vehicle)

@@ -1,8 +1,8 @@
 """Whether the protocol is safe and live: all its states, visited one by one.
 
-Safe: no two movements in conflict are inside at once. Live: whenever somebody is there, somebody
-can go on once all have looked; and as every move but slowing down takes a vehicle on, the junction
-empties when nobody new comes. Fair: nobody waits for ever while others come and cross.
+Safe: no two movements in conflict are inside at once. Live: whenever vehicles are there, one of
+them can go on once all have looked; and since every move but slowing down takes a vehicle on, the
+junction empties when no new ones come. Fair: no vehicle waits for ever while others come and cross.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import networkx as nx
 from dim.proofs.protocol import TURN, WAITING, Event, Protocol, State
 from minisim.errors import InputError, instance, integer
 
-#: Visit no more states than this: some gigabyte of memory.
+#: The most states that are visited: about a gigabyte of memory.
 MAX_STATES = 3_000_000
 
 Path = tuple[Event, ...]
@@ -24,7 +24,7 @@ Path = tuple[Event, ...]
 #: States, and what happens in each.
 Steps = tuple[tuple[State, Event], ...]
 
-#: Where each state was first reached from, and by what; nearest first.
+#: State -> the state that it was first reached from, and the event; nearest first.
 Reached = dict[State, tuple[State, Event] | None]
 
 #: Called with the number of states visited.
@@ -38,9 +38,9 @@ class Exploration:
     Attributes:
         protocol: what was searched.
         states, transitions: how many were visited.
-        complete: whether that were all; a search ends with the nearest unsafe states.
+        complete: whether these are all; a search ends with the nearest unsafe states.
         unsafe: the shortest paths to two conflicting movements inside, one for each such state.
-        stuck: the shortest path to a state in which nobody can go on, or None.
+        stuck: the shortest path to a state in which no vehicle can go on, or None.
     """
 
     protocol: Protocol
@@ -55,12 +55,12 @@ class Exploration:
 class Lasso:
     """How one vehicle waits for ever: what leads there, and what then repeats.
 
-    Everybody looks after each event. Nobody dawdles: whoever can go on does at some time.
+    All vehicles look after each event, and a vehicle that can go on does so at some time.
 
     Attributes:
         lane: of the vehicle that waits.
-        stem: what happens before.
-        cycle: what happens again and again.
+        stem: the events before.
+        cycle: the events that repeat.
     """
 
     lane: int
@@ -71,7 +71,7 @@ class Lasso:
 def explore(
     protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
 ) -> Exploration:
-    """Visit every reachable state, nearest first, or stop behind the nearest unsafe ones.
+    """Visit every reachable state, nearest first, or stop after the nearest unsafe ones.
 
     Raises:
         InputError: there are more than `max_states`.
@@ -105,7 +105,7 @@ def explore(
 
 
 def is_stuck(protocol: Protocol, state: State) -> bool:
-    """Whether somebody is there and, after all have looked, nobody can go on."""
+    """Whether vehicles are there and, after all have looked, none can go on."""
     if not state.inside and not any(state.fronts):
         return False
     return next(protocol.moves(protocol.look(state)), None) is None
@@ -114,9 +114,9 @@ def is_stuck(protocol: Protocol, state: State) -> bool:
 def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
     """Of each lane, the shortest way in which its front vehicle waits for ever; None: it cannot.
 
-    None is a proof over all states. It takes for granted that everybody looks between two events,
-    that whoever can go on does some day, and that a turn of the rotating priority lasts long
-    enough for a decision.
+    None is a proof over all states. It assumes that all vehicles look between two events, that a
+    vehicle that can go on does so some day, and that a turn of the rotating priority is long enough
+    for a decision.
     """
     instance("protocol", protocol, Protocol)
     reached = _reached(protocol)
@@ -137,8 +137,8 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
 
 
 def prompt(protocol: Protocol, state: State) -> Iterator[tuple[Event, State]]:
-    """What can happen next where everybody looks at once after each event, and nobody slows down
-    again: the fairest circumstances."""
+    """What can happen next if all vehicles look right after each event, and none slows down again:
+    the fairest circumstances."""
     for event, after in protocol.successors(state):
         if event.what not in ("look", "slow"):
             yield event, protocol.look(after)
@@ -150,7 +150,7 @@ def _waits(state: State, lane: int) -> bool:
 
 
 def _reached(protocol: Protocol) -> Reached:
-    """All states of `prompt`, nearest first, each with where it was first reached from."""
+    """All states of `prompt`, nearest first, each with the state that it was first reached from."""
     reached: Reached = {protocol.start: None}
     queue = deque([protocol.start])
     while queue:
@@ -203,9 +203,9 @@ def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Ste
 
 
 def is_fair(protocol: Protocol, steps: Steps) -> bool:
-    """Whether what is done in `steps`, for ever, is something, and leaves nobody out.
+    """Whether `steps`, repeated for ever, get somewhere and leave no other vehicle out.
 
-    Somebody enters; whoever could go on all the time does; whoever is inside all the time leaves
+    A vehicle enters; one that could go on all the time does; one that is inside all the time leaves
     (or others follow on the same movement); a turn that could end all the time ends.
 
     Args:
@@ -230,7 +230,7 @@ def is_fair(protocol: Protocol, steps: Steps) -> bool:
 
 
 def _steps(graph: nx.DiGraph[State], part: set[State]) -> Steps:
-    """All that is done without leaving `part`."""
+    """All steps that stay within `part`."""
     return tuple(
         (state, data["event"])
         for state in part

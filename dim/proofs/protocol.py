@@ -1,20 +1,19 @@
 """DIM as a transition system over discrete zones: all that its safety and liveness depend on.
 
-What a vehicle's motion can do to the protocol is little: it comes to the front of its lane, it
-starts to roll, it gets committed, it enters, it leaves. So a state holds, of each lane, the front
-vehicle before the junction (the only one of its lane that decides anything), and the set of
-movements that are inside. That set is enough, however many vehicles follow each other on one of
-them, and so the model is finite without a limit on traffic. Time is left out: whatever can happen
-next may happen, in any order, as early or late as it likes. Everything that a simulated run does
-is a path of this model (`dim.proofs.conformance` checks it), and much more.
+The protocol sees little of a vehicle's motion: it comes to the front of its lane, starts to roll,
+gets committed, enters, leaves. So a state holds the front vehicle of each lane before the junction
+(the only one of its lane that decides anything) and the set of movements that are inside. That set
+is enough, however many vehicles follow each other on one movement, so the model is finite without
+a limit on traffic. Time is left out: whatever can happen next may happen, in any order and after
+any delay. Every simulated run is a path of this model (`dim.proofs.conformance` checks it); most
+of its paths are no run.
 
-All vehicles look at once, as they do in `dim.controller`, but as late as they like.
+All vehicles look at the same moment, as they do in `dim.controller`, but after any delay.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Final, NamedTuple
 
@@ -22,17 +21,17 @@ from dim.agent import GATES
 from dim.decision import ORDERS, DecisionTable, decision_table
 from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS
-from minisim.errors import choice, instance
 from minisim.junction.geometry import Movement
+from minisim.parameters import declared, part, word
 
-#: Who comes first where cliques tie. "fixed": the lanes' own order. "rotating": the lane whose
-#: turn it is, then the others clockwise; a turn ends after a decision at the earliest. "waiting":
-#: the lane whose front vehicle came first, as if everybody remembered that for ever.
+#: Which lane comes first where cliques tie. "fixed": the lanes' own order. "rotating": the lane
+#: whose turn it is, then the others clockwise; a turn ends after a decision at the earliest.
+#: "waiting": the lane whose front vehicle came first, as if every vehicle remembered that for ever.
 PRIORITIES = ("fixed", "rotating", "waiting")
 
-#: Where the front vehicle of a lane is. It has waited since it came; or it has had the right of
-#: way since, and may be anywhere before the committing point (told apart by commit="paper" only,
-#: where it may roll on without it); or it is committed.
+#: Phases of a front vehicle. It has waited since it came; or it has had the right of way and may be
+#: anywhere before the committing point (a phase of its own with commit="paper" only, where it may
+#: roll on without the right of way); or it is committed.
 WAITING: Final = 0
 ROLLING: Final = 1
 COMMITTED: Final = 2
@@ -52,9 +51,10 @@ class State(NamedTuple):
     Attributes:
         fronts: of each lane, or None.
         inside: movements in the junction, bit k for the k-th.
-        turn: with priorities "rotating", whose turn it is; 0 otherwise.
+        turn: with priorities "rotating", the lane whose turn it is; 0 otherwise.
         decided: with priorities "rotating", whether a decision was made in this turn.
-        came: with priorities "waiting", the lanes that have a front vehicle as they came.
+        came: with priorities "waiting", the lanes that have a front vehicle, the one that came
+            first in front.
     """
 
     fronts: tuple[Front | None, ...]
@@ -66,7 +66,7 @@ class State(NamedTuple):
 
 class Event(NamedTuple):
     """What happens between two states: "arrive", "roll", "commit", "slow", "enter", "leave" of a
-    movement; "look" of everybody; "turn" of the rotating priority."""
+    movement; "look" of all vehicles; "turn" of the rotating priority."""
 
     what: str
     lane: int = -1
@@ -82,32 +82,24 @@ TURN: Final = Event("turn")
 Step = tuple[Event, State]
 
 
-@dataclass(frozen=True)
+@declared
 class Protocol:
     """The rules, and with them the states and what may happen in them.
 
-    Attributes:
-        matrix: harmony of the movements.
-        order, gate, commit: as in `dim.Dim`.
-        priorities: see `PRIORITIES`.
+    See `dim.Dim` for order, gate and commit, and `PRIORITIES`.
     """
 
-    matrix: HarmonyMatrix
-    order: str = "size"
-    gate: str = "clear"
-    commit: str = "stoppable"
-    priorities: str = "fixed"
-
-    def __post_init__(self) -> None:
-        instance("matrix", self.matrix, HarmonyMatrix)
-        choice("order", self.order, ORDERS)
-        choice("gate", self.gate, GATES)
-        choice("commit rule", self.commit, COMMITS)
-        choice("priorities", self.priorities, PRIORITIES)
+    matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
+    order: str = word("which clique is preferred", ORDERS, default="size")
+    gate: str = word("what may enter while others cross", GATES, default="clear")
+    commit: str = word(
+        "when a vehicle is committed", COMMITS, label="commit rule", default="stoppable"
+    )
+    priorities: str = word("which lane comes first at a tie", PRIORITIES, default="fixed")
 
     @property
     def start(self) -> State:
-        """Nobody is there."""
+        """No vehicle is there."""
         return State((None,) * self.matrix.n)
 
     def successors(self, state: State) -> Iterator[Step]:
@@ -121,8 +113,8 @@ class Protocol:
             yield TURN, state._replace(turn=(state.turn + 1) % self.matrix.n, decided=False)
 
     def arrivals(self, state: State) -> Iterator[Step]:
-        """Somebody comes to the front of a lane, at the start of the yellow zone or behind one who
-        has just entered the junction."""
+        """A vehicle comes to the front of a lane: at the start of the yellow zone, or behind one
+        that has just entered the junction."""
         for lane, front in enumerate(state.fronts):
             if front is None:
                 for manoeuvre in range(1, self.matrix.n):
@@ -132,7 +124,7 @@ class Protocol:
                     yield Event("arrive", lane, manoeuvre), after
 
     def moves(self, state: State) -> Iterator[Step]:
-        """What those who are there can do."""
+        """What the vehicles that are there can do."""
         paper = self.commit == "paper"
         for lane, front in enumerate(state.fronts):
             if front is None:
@@ -150,7 +142,7 @@ class Protocol:
                 yield Event("commit", lane, manoeuvre), self._put(state, lane, committed)
             elif phase == COMMITTED and goes:
                 yield Event("enter", lane, manoeuvre), self._enter(state, lane, manoeuvre)
-                if not paper:  # behind somebody slow it may come to be able to stop again
+                if not paper:  # behind a slow vehicle it may become able to stop again
                     waiting = Front(manoeuvre, WAITING, True)
                     yield Event("slow", lane, manoeuvre), self._put(state, lane, waiting)
         inside = state.inside
@@ -161,11 +153,11 @@ class Protocol:
             yield Event("leave", *movement), state._replace(inside=state.inside ^ bit)
 
     def look(self, state: State) -> State:
-        """Everybody decides (Algorithm 1, lines 4 to 12).
+        """All vehicles decide (Algorithm 1, lines 4 to 12).
 
-        Who is committed goes. While somebody crosses, the gate "clear" leaves the rest as it is,
-        and the gate "harmonious" keeps out who is in conflict with one of them. The best clique of
-        those who are left goes, and nobody else.
+        A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as it is,
+        and the gate "harmonious" keeps out those that conflict with a crossing one. Of those that
+        are left only the best clique goes.
         """
         n = self.matrix.n
         occupied = state.inside

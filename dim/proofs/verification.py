@@ -1,9 +1,9 @@
 """Every case that a junction can decide, checked one by one against brute force.
 
-The paper argues that each of the 255 cases of 4 arms has one solution, the same for everybody
-("Deadlock Analysis"). Here all of them are tried, for any matrix. What a decision should be is
-worked out without a graph library, from the subsets of the participants, so that it and
-`dim.decision` can only agree if both are right.
+The paper argues that each of the 255 cases of 4 arms has one solution, the same for every vehicle
+("Deadlock Analysis"). Here all of them are tried, for any matrix. The right decision is worked out
+without a graph library, from the subsets of the participants. It agrees with `dim.decision` only
+if both are right, or wrong in the same way.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from dim.harmony import HarmonyMatrix
 from dim.perception import Percept
 from minisim.errors import InputError
 
-#: Up to so many arms the participants are put into every order; beyond, into each one's own
-#: (itself first, then the others around the junction, either way round): 5 arms have 120 orders a
-#: case, 6 arms 720.
+#: Up to this number of arms the participants are put into every order; beyond, into the orders that
+#: each of them would use: itself first, then the others around the junction, either way round.
+#: 5 arms have 120 orders a case, 6 arms 720.
 ALL_ORDERS = 5
 
 #: A set of lanes, bit i for lane i.
@@ -33,10 +33,10 @@ Progress = Callable[[int, int], object]
 
 
 class Cliques(NamedTuple):
-    """All that a case leaves to choose from, found by trying every subset.
+    """The cliques of a case, from trying every subset.
 
     Attributes:
-        maximal: cliques that nobody can join.
+        maximal: cliques that no other participant can join.
         largest: those of them with the most lanes.
     """
 
@@ -51,8 +51,8 @@ class Claim:
     Attributes:
         name: in a word.
         statement: in a sentence.
-        cases: in how many it was tried.
-        failures: in how many it is false.
+        cases: number in which it was tried.
+        failures: number in which it is false.
         example: the first of these with the fewest participants, or None.
     """
 
@@ -70,7 +70,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What all cases of a matrix showed.
+    """The result of all cases of a matrix.
 
     Attributes:
         matrix, order, priorities: the rules, as in `dim.decide`.
@@ -78,8 +78,8 @@ class Analysis:
         claims: what was checked.
         sizes: cases by the number of vehicles that may go.
         ties: cases by the number of cliques of the largest size.
-        worst: the cases with the most cliques of the largest size, by that size: the first of
-            each, and how many there are.
+        worst: of the cases with the most cliques of the largest size, by that size: the first
+            one, and their number.
     """
 
     matrix: HarmonyMatrix
@@ -147,32 +147,32 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
         rest = subset & (subset - 1)
         lowest = (subset ^ rest).bit_length() - 1
         clique[subset] = clique[rest] and rest & ~friends[lowest] == 0
-    found = [
+    maximal = [
         subset
         for subset in range(1, 1 << k)
         if clique[subset]
         and not any(clique[subset | 1 << j] for j in range(k) if not subset >> j & 1)
     ]
-    most = max((subset.bit_count() for subset in found), default=0)
+    most = max((subset.bit_count() for subset in maximal), default=0)
 
     def lanes(subset: int) -> Lanes:
         return sum(1 << m.origin for j, m in enumerate(movements) if subset >> j & 1)
 
     return Cliques(
-        tuple(map(lanes, found)),
-        tuple(lanes(subset) for subset in found if subset.bit_count() == most),
+        tuple(map(lanes, maximal)),
+        tuple(lanes(subset) for subset in maximal if subset.bit_count() == most),
     )
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """What is left of `cliques` when the paper's words break the tie.
+    """The cliques that are left when the paper's words break the tie.
 
     "The clique with the highest priority lanes": those that hold the first lane, if any does; of
     these those that hold the second; and so on.
 
     Args:
         cliques: sets of lanes.
-        by_priority: the lanes, first one first.
+        by_priority: the lanes, the highest priority first.
     """
     left = tuple(cliques)
     for lane in by_priority:
@@ -192,19 +192,19 @@ def node_orders(movements: Movements, n: int) -> Iterator[Movements]:
 
 
 class Case:
-    """The checks of one case after the other, under one set of rules.
+    """The checks of any case, under one set of rules.
 
     Attributes:
         table: the decisions that are checked.
-        by_priority: the lanes, first one first.
+        by_priority: the lanes, the highest priority first.
     """
 
     #: Name -> statement; `check` answers in this order.
     CLAIMS: Mapping[str, str] = {
-        "exists": "somebody may go",
-        "harmony": "all who may go are in harmony, and take part",
+        "exists": "a vehicle may go",
+        "harmony": "all that may go are in harmony, and take part",
         "largest": "no larger set of participants is in harmony",
-        "maximal": "nobody else could go with them",
+        "maximal": "no other participant could go with them",
         "unique": "the tie-break leaves one clique, and it is the decision",
         "priority": "it holds the highest-priority lane of all cliques that tie",
         "unanimous": "every participant answers for itself as the decision says",
@@ -239,13 +239,13 @@ class Case:
         )
 
     def _agents_say(self, case: int, movements: Movements) -> Lanes:
-        """The lanes whose agents go, each asked alone, with nobody crossing."""
+        """The lanes whose agents go, each asked alone, with no vehicle crossing."""
         lanes = tuple(m.origin for m in movements)
         percept = Percept(participants=lanes, crossing=(), case=case, occupied=0)
         return sum(1 << lane for lane in lanes if self._agents[lane].decide(percept))
 
     def _same_in_any_order(self, movements: Movements, decision: Lanes) -> bool:
-        """Solve the case with the graph built in every order; once for each graph of lanes."""
+        """Whether the graph, built in every order, gives the decision; once for each graph."""
         matrix, table = self.table.matrix, self.table
         rows = [matrix.index(m) for m in movements]
         edges = tuple(int(matrix.values[i, j]) for i in rows for j in rows)
@@ -313,8 +313,8 @@ def most_cliques(k: int) -> int:
     """The most maximal cliques that any graph of k ≥ 1 nodes can have.
 
     Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as near to it as
-    groups of 2, 3 and 4 nodes come. The graph that reaches it has cliques of one size only, so
-    this bounds the cliques that tie as well.
+    groups of 2, 3 and 4 nodes come. The graph that reaches it has cliques of one size only, so the
+    number also bounds the cliques that tie.
     """
     if k < 2:
         return 1

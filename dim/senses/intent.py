@@ -1,8 +1,8 @@
 """How a vehicle's intent is shown, how others read it, and how sure they are.
 
-A driver may turn without a signal: then nobody can know better. A shown intent may be misread: that
-happens to each reader, or to all alike. Both are tables of probabilities, true manoeuvre × read
-manoeuvre, and what a reading is worth follows from them.
+A driver may turn without a signal, and then no other can know. A shown intent may be misread, by
+each reader on its own or by all alike. Both are tables of probabilities, true manoeuvre × read
+manoeuvre. What a reading is worth follows from them.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from minisim.streams import Draws
 #: other one alike, as classifiers of manoeuvres err.
 KINDS = ("missed", "symmetric")
 
-#: Probabilities of an error that are worth comparing: from none to that of drivers who do not
-#: signal; published classifiers of manoeuvres err with about 0.15, see
-#: `dim.senses.noise.CLASSIFIER`.
+#: Probabilities of an error that are worth comparing, from none to that of a missing turn signal.
+#: Published classifiers of manoeuvres err with about 0.15, see `dim.senses.noise.CLASSIFIER`.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
 
 #: Two ways whose bearings are this close to each other are equally straight [degrees].
@@ -125,7 +124,7 @@ def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str)
 
 
 def doubts(table: Table) -> tuple[float, ...]:
-    """For each reading, how likely it is wrong: Bayes' rule, all manoeuvres being as frequent."""
+    """For each reading, how likely it is wrong, by Bayes' rule for equally frequent manoeuvres."""
     columns = list(zip(*table, strict=True))
     return tuple(
         1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
@@ -134,7 +133,7 @@ def doubts(table: Table) -> tuple[float, ...]:
 
 
 def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:
-    """How sure a reader is, so that of all its readings with confidence c the share c is right.
+    """How sure a reader is: of all its readings with confidence c, the share c is right.
 
     That is what calibrated means (Guo, Pleiss, Sun, Weinberger, "On calibration of modern neural
     networks", ICML 2017, eq. 1). Confidences have the density a·c^(a−1) on (0, 1), a = (1−e)/e for

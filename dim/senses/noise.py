@@ -2,8 +2,8 @@
 
     simulate(scenario, Dim(perception=NoisyPerception(intent_error=0.15)))
 
-An ego always sees itself exactly, and who drives behind whom in a lane. Vehicles that it does not
-see are missing in its view; a view holds no vehicle that is not there, or was not.
+An ego always sees itself exactly, and the order of the vehicles in a lane. Vehicles that it does
+not see are missing in its view. A view holds no vehicle that is not there, or was not there.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from dim.perception import ROUNDING, UNKNOWN, See, see_all
 from dim.senses.intent import KINDS, Lane
 from dim.senses.sight import Bodies, Body
 from minisim.control import Observed, Site, View
-from minisim.errors import InputError, choice, instance, number, numbers
+from minisim.errors import InputError, numbers
+from minisim.parameters import checked, declared, real, switch, word
 from minisim.streams import Draws
 
 #: Error of published classifiers of manoeuvres, about 0.15: Phillips, Wheeler, Kochenderfer (IEEE
@@ -41,90 +42,69 @@ _ALL = -1
 _POSITION, _SPEED = 8, 9
 
 
-@dataclass(frozen=True)
+def _shares(title: str, value: Any) -> tuple[float, ...]:
+    """Check `NoisyPerception.unsignalled`."""
+    shares = numbers(title, value)
+    if len(shares) != 2 or not all(0.0 <= share <= 1.0 for share in shares):
+        raise InputError(
+            f"{title} must be the shares of near and far turns without a signal, two numbers "
+            f"from 0 to 1, got {shares}"
+        )
+    return shares
+
+
+@declared
 class NoisyPerception:
-    """How vehicles misperceive each other; by default they do not.
+    """How vehicles misperceive each other; by default they do not."""
 
-    Attributes:
-        intent_error: probability that a shown intent is misread, see `dim.senses.intent.RATES`.
-        kind: "missed", a turn's signal is not seen; "symmetric", any manoeuvre is taken for each
-            other one alike.
-        shared: all observers err alike (a dirty lamp, the sun), or each for itself.
-        persistent: an error lasts as long as the vehicles meet, or every frame errs anew.
-        unsignalled: shares of turns to the near and to the far side without a signal, for which
-            everybody takes them for straight on. `UNSIGNALLED` has published ones.
-        confidence: an intent read with less confidence is unknown: the vehicle may take any
-            manoeuvre (see `dim.senses.intent.confidence`). None takes every reading as it is.
-        sensor_range: how far a vehicle sees, from centre to centre [m]; None has no end.
-        occlusion: bodies block the line of sight. Of vehicles that have left the junction no view
-            tells, so they block nothing.
-        delay: age of what is seen of the others [s].
-        position_noise, speed_noise: standard deviations along the lane of what is seen of the
-            others [m], [m/s], drawn anew each frame.
-        frame: time between two looks [s]. What a sensor could see only between two of them is
-            lost: who becomes committed is seen so up to a frame later, 0.6 m at 20 km/h.
-
-    Raises:
-        InputError: a value that is not allowed.
-    """
-
-    intent_error: float = 0.0
-    kind: str = "missed"
-    shared: bool = True
-    persistent: bool = True
-    unsignalled: tuple[float, float] = (0.0, 0.0)
-    confidence: float | None = None
-    sensor_range: float | None = None
-    occlusion: bool = False
-    delay: float = 0.0
-    position_noise: float = 0.0
-    speed_noise: float = 0.0
-    frame: float = FRAME
-
-    def __post_init__(self) -> None:
-        number("intent_error", self.intent_error, low=0, high=1)
-        choice("kind of intent error", self.kind, KINDS)
-        shares = numbers("unsignalled", self.unsignalled)
-        if len(shares) != 2 or not all(0.0 <= share <= 1.0 for share in shares):
-            raise InputError(
-                "unsignalled must be the shares of near and far turns without a signal, two "
-                f"numbers from 0 to 1, got {shares}"
-            )
-        object.__setattr__(self, "unsignalled", shares)
-        if self.confidence is not None:
-            number("confidence", self.confidence, above=0, high=1)
-        if self.sensor_range is not None:
-            number("sensor_range [m]", self.sensor_range, low=1, high=1000)
-        for name in ("shared", "persistent", "occlusion"):
-            instance(name, getattr(self, name), bool)
-        number("delay [s]", self.delay, low=0, high=10)
-        number("position_noise [m]", self.position_noise, low=0, high=20)
-        number("speed_noise [m/s]", self.speed_noise, low=0, high=20)
-        number("frame [s]", self.frame, low=0.01, high=1)
+    intent_error: float = real(
+        "probability that a shown intent is misread, see `dim.senses.intent.RATES`",
+        low=0, high=1, default=0.0,
+    )  # fmt: skip
+    kind: str = word(
+        "how: a turn's signal is not seen, or any manoeuvre is taken for each other one alike",
+        KINDS, default="missed", label="kind of intent error",
+    )  # fmt: skip
+    shared: bool = switch(
+        "whether all observers err alike (a dirty lamp, the sun), or each for itself", default=True
+    )
+    persistent: bool = switch(
+        "whether an error lasts as long as the vehicles meet, or every frame errs anew",
+        default=True,
+    )
+    unsignalled: tuple[float, float] = checked(
+        "shares of turns to the near and to the far side without a signal, which all others take "
+        "for straight on; `UNSIGNALLED` has published ones",
+        _shares, "two numbers 0 … 1", default=(0.0, 0.0),
+    )  # fmt: skip
+    confidence: float | None = real(
+        "an intent read with less confidence is unknown: the vehicle may take any manoeuvre (see "
+        "`dim.senses.intent.confidence`); none takes every reading as it is",
+        above=0, high=1, optional=True, default=None,
+    )  # fmt: skip
+    sensor_range: float | None = real(
+        "how far a vehicle sees, from centre to centre; none has no end", "m",
+        low=1, high=1000, optional=True, default=None,
+    )  # fmt: skip
+    # No view tells of vehicles that have left the junction, so they block nothing.
+    occlusion: bool = switch("whether bodies block the line of sight", default=False)
+    delay: float = real("age of what is seen of the others", "s", low=0, high=10, default=0.0)
+    position_noise: float = real(
+        "standard deviation of the others' positions along the lane, drawn anew each frame", "m",
+        low=0, high=20, default=0.0,
+    )  # fmt: skip
+    speed_noise: float = real(
+        "standard deviation of the others' speeds, drawn anew each frame", "m/s",
+        low=0, high=20, default=0.0,
+    )  # fmt: skip
+    # What a sensor could see only between two looks is lost: a vehicle that becomes committed is
+    # seen so up to a frame later, 0.6 m at 20 km/h.
+    frame: float = real("time between two looks", "s", low=0.01, high=1, default=FRAME)
 
     @property
     def misreads(self) -> bool:
         """Whether intents are ever misread."""
         return self.intent_error > 0.0 or max(self.unsignalled) > 0.0
-
-    @property
-    def name(self) -> str:
-        """What errs, such as `missed-0.15-own`; "exact" where nothing does."""
-        if self.period is None:
-            return "exact"
-        parts = {
-            f"{self.kind}-{self.intent_error:g}": self.intent_error > 0.0,
-            "unsignalled": max(self.unsignalled) > 0.0,
-            "own": not self.shared,
-            "flicker": not self.persistent,
-            f"sure-{self.confidence}": self.confidence is not None,
-            f"range-{self.sensor_range}": self.sensor_range is not None,
-            "occlusion": self.occlusion,
-            f"late-{self.delay:g}": self.delay > 0.0,
-            f"position-{self.position_noise:g}": self.position_noise > 0.0,
-            f"speed-{self.speed_noise:g}": self.speed_noise > 0.0,
-        }
-        return "-".join(part for part, differs in parts.items() if differs)
 
     @property
     def period(self) -> float | None:
@@ -162,11 +142,11 @@ class _Senses:
         vehicles: Iterable[Observed] = with_ego(seen.vehicles, ego) if recipe.delay else seen[1]
         if recipe.occlusion or recipe.sensor_range is not None:
             vehicles = self._visible(seen, vehicles, ego)
-        who = ego.id
-        found = tuple(ego if v.id == who else self._sense(v, who, moment) for v in vehicles)
+        own = ego.id
+        sensed = tuple(ego if v.id == own else self._sense(v, own, moment) for v in vehicles)
         if recipe.delay or recipe.position_noise:
-            found = in_order(found, ego)
-        return View(view.time, found)
+            sensed = in_order(sensed, ego)
+        return View(view.time, sensed)
 
     def _late(self, view: View) -> View:
         """The newest view that is old enough; without one, an empty junction."""
@@ -223,7 +203,7 @@ class _Senses:
 
 
 def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """An older view's vehicles with the ego as it is now: new, it is the last of its lane."""
+    """An older view's vehicles with the ego as it is now; a new ego is the last of its lane."""
     if any(v.id == ego.id for v in vehicles):
         return vehicles
     behind = next((k for k, v in enumerate(vehicles) if v.lane > ego.lane), len(vehicles))
@@ -233,8 +213,8 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
     """Front to back again, where noise had vehicles of one lane overtake each other.
 
-    Who drives behind whom is seen right, so nobody is put before a vehicle that he follows. The
-    ego, which knows where it is, keeps its place.
+    The order in a lane is seen right, so no vehicle is put before one that it follows. The ego
+    knows where it is and keeps its place.
 
     Args:
         vehicles: by lane, each lane in its true order, and the ego among them.

@@ -1,6 +1,6 @@
 """What can be seen from where: bodies near the junction, and lines of sight between them.
 
-Plain floats, since every vehicle asks about every other ten times a second.
+It uses plain floats, for every vehicle asks about every other ten times a second.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Body(NamedTuple):
 
 
 class Bodies:
-    """Where observed vehicles are. How a body stands is seen, whatever is thought of its intent.
+    """Where observed vehicles are. Their bodies are seen right, whatever intent is read.
 
     Args:
         site: its geometry and vehicles.

@@ -1,67 +1,41 @@
-"""What wrong perception does to a run: counts for its summary.
+"""What wrong perception does to a run of DIM: counts for its summary.
 
-    simulate(scenario, Tallied(Dim(perception=…)), on_collision="record").summary()
-
-behaves as the `Dim` does, on any host, and adds to the summary:
+A session of DIM whose perception errs, among human drivers too, adds to the summary of its run:
 
 - `crossings`: vehicles that entered the junction.
 - `false_grants`: how often a vehicle held the right of way where the same rules on the true view
   had it wait, counted once each time it holds it.
 - `disagreement_s`: how long two vehicles that took part had chosen different cliques [s].
-- `deadlock_s`: how long vehicles took part, nobody was crossing and nobody had the right of way
+- `deadlock_s`: how long vehicles took part while none was crossing and none had the right of way
   [s].
 
-All of it is about what is true; no vehicle knows it. With exact perception the last three are 0.
+All of it compares with the truth, which no vehicle knows. Where every reading is right, the last
+three are 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
-from dim.agent import Agent
-from dim.controller import Dim, DimSession
+from dim.agent import Agent, Rules
 from dim.decision import DecisionTable
-from dim.perception import ROUNDING, Percept
-from minisim.control import Command, Go, Hold, Observed, Plan, Site, View
-from minisim.errors import instance
+from dim.perception import Percept, Reader
+from minisim.control import Command, Go, Hold, View
 
 
-@dataclass(frozen=True)
-class Tallied:
-    """A `Dim` whose runs count what goes wrong."""
+class Tally:
+    """The counts of one run.
 
-    dim: Dim
-
-    def __post_init__(self) -> None:
-        instance("dim", self.dim, Dim)
-
-    @property
-    def name(self) -> str:
-        """That of the `Dim`."""
-        return self.dim.name
-
-    def start(self, site: Site) -> TallySession:
-        """Begin a run; errors as `Dim.start`."""
-        return TallySession(self.dim, site)
-
-
-class TallySession:
-    """A session of DIM, and what was counted.
-
-    Attributes:
-        plan: as DIM's.
+    Args:
+        rules, reader: those of the vehicles.
+        start: how far before the junction the yellow zone begins [m].
     """
 
-    def __init__(self, dim: Dim, site: Site) -> None:
-        self._session = DimSession(dim, site)
-        self.plan: Plan = self._session.plan
-        self._start = dim.zones.yellow_start + ROUNDING
-        self._see, self._session.see = self._session.see, self._watch
-        self._sights: dict[int, View] = {}
+    def __init__(self, rules: Rules, reader: Reader, start: float) -> None:
+        self._rules, self._reader, self._start = rules, reader, start
         self._going: set[int] = set()
         self._blamed: set[int] = set()  # those whose right of way has been counted as false
-        self._before: set[int] = set()  # those who are about to cross
+        self._before: set[int] = set()  # those that are about to cross
         self._crossings = self._false_grants = 0
         self._disagreement = self._deadlock = 0.0
         self._since = 0.0
@@ -77,61 +51,69 @@ class TallySession:
             "deadlock_s": round(self._deadlock, 6),
         }
 
-    def decide(self, view: View) -> Iterable[Command]:
-        """DIM's commands."""
-        passed, self._since = view.time - self._since, view.time
+    def count(
+        self,
+        true: View,
+        sights: Mapping[int, View],
+        table: DecisionTable,
+        commands: Iterable[Command],
+    ) -> None:
+        """Count one look around.
+
+        Args:
+            true: what vehicles would see without an error.
+            sights: what each vehicle that follows DIM has seen, by its id.
+            table: in force.
+            commands: what the vehicles decided.
+        """
+        passed, self._since = true.time - self._since, true.time
         self._disagreement += passed * self._disagree
         self._deadlock += passed * self._stuck
-        self._sights.clear()
-        commands = list(self._session.decide(view))
-        near = [v for v in view.vehicles if v.distance <= self._start]
-        before = {v.id for v in near if v.distance >= 0.0}
-        self._crossings += len(self._before - before)  # also who has come and left between looks
+        before = {v.id for v in true.vehicles if 0.0 <= v.distance <= self._start}
+        self._crossings += len(self._before - before)  # also those that came and left in between
         self._before = before
-        truth = self._session.reader.read(view)
-        table, _ = self._session.table(view)
-        should = self._rightly(near, truth, table)
-        self._carry_out(commands, near)
+        truth = self._reader.read(true)
+        should = self._rightly(true, sights, truth, table)
+        self._carry_out(commands, sights)
         wrongly = {v for v in self._going if v not in should and v not in truth.crossing}
         self._false_grants += len(wrongly - self._blamed)
         self._blamed = (self._blamed & self._going) | wrongly
-        self._disagree = len(self._choices(truth, table)) > 1
+        self._disagree = len(self._choices(truth, sights, table)) > 1
         self._stuck = bool(truth.participants) and not truth.crossing and not self._going
-        return commands
 
-    def _watch(self, view: View, ego: Observed) -> View:
-        """Remember what each vehicle sees."""
-        sight = self._sights[ego.id] = self._see(view, ego)
-        return sight
-
-    def _rightly(self, near: list[Observed], truth: Percept, table: DecisionTable) -> set[int]:
-        """Who would go from the same state by the same rules on the true view."""
-        found = set()
-        for vehicle in near:
-            agent = Agent(vehicle.id, vehicle.lane, self._session.rules)
+    def _rightly(
+        self, true: View, sights: Mapping[int, View], truth: Percept, table: DecisionTable
+    ) -> set[int]:
+        """The vehicles that would go from the same state by the same rules on the true view."""
+        rightly = set()
+        for vehicle in true.vehicles:
+            if vehicle.id not in sights:
+                continue
+            agent = Agent(vehicle.id, vehicle.lane, self._rules)
             agent.right_of_way = vehicle.id in self._going
             if agent.decide(truth, table):
-                found.add(vehicle.id)
-        return found
+                rightly.add(vehicle.id)
+        return rightly
 
-    def _carry_out(self, commands: list[Command], near: list[Observed]) -> None:
+    def _carry_out(self, commands: Iterable[Command], near: Iterable[int]) -> None:
         for command in commands:
             if isinstance(command, Go):
                 self._going.add(command.vehicle)
             elif isinstance(command, Hold):
                 self._going.discard(command.vehicle)
-        self._going &= {v.id for v in near}
+        self._going.intersection_update(near)
 
-    def _choices(self, truth: Percept, table: DecisionTable) -> set[int]:
-        """The cliques that those who take part have chosen, as each sees the case."""
-        reader, rules = self._session.reader, self._session.rules
-        sights = [self._sights[v] for v in truth.participants]
-        if sights and all(sight is sights[0] for sight in sights):
+    def _choices(
+        self, truth: Percept, sights: Mapping[int, View], table: DecisionTable
+    ) -> set[int]:
+        """The cliques that those that take part have chosen, as each sees the case."""
+        seen = [sights[v] for v in truth.participants]
+        if seen and all(sight is seen[0] for sight in seen):
             return set()
-        found = set()
-        for vehicle, sight in zip(truth.participants, sights, strict=True):
-            percept = reader.read(sight)
-            frozen = bool(percept.crossing) and rules.gate == "clear"
+        choices = set()
+        for vehicle, sight in zip(truth.participants, seen, strict=True):
+            percept = self._reader.read(sight)
+            frozen = bool(percept.crossing) and self._rules.gate == "clear"
             if vehicle in percept.participants and not frozen:
-                found.add(table.surely(percept.case, percept.unknown, percept.occupied))
-        return found
+                choices.add(table.surely(percept.case, percept.unknown, percept.occupied))
+        return choices

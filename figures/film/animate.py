@@ -21,12 +21,12 @@ from PIL import Image
 
 from figures import style
 from figures.film.encode import animation_format, palette_of, write_gif, write_html, write_mp4
-from figures.film.frames import Film
+from figures.film.frames import Frames
 from figures.junction import drawing
 from minisim.errors import number
+from minisim.files import replacing
 from minisim.junction.geometry import Floats, Intersection
 from minisim.results.run import Run
-from minisim.results.trajectories import replacing
 
 #: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.
 WIDTH, HEIGHT, DPI = 7.2, 8.8, 100
@@ -100,7 +100,7 @@ class Picture:
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run
         self.title = f"{run.scenario.name} · {run.controller.name}"
-        self._film = Film(run, start)
+        self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection
         reach = view_reach(intersection, max((m.start for m in plan.markings), default=0.0))

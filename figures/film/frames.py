@@ -25,7 +25,7 @@ COLLISION_SHOWN = 3.0
 RING = 5.0
 
 
-class Film:
+class Frames:
     """The recorded trajectories as arrays, asked by time."""
 
     def __init__(self, run: Run, start: float) -> None:
@@ -57,7 +57,7 @@ class Film:
         self.bounds = np.append(first, len(ticks))
         gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
-        # Who was clear of the junction before the first frame was not served in this film.
+        # A vehicle that was clear before the first frame was not served in this film.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
         counts = np.diff(self.bounds)
         self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)
@@ -101,14 +101,14 @@ class Film:
         """What lies ahead, in the junction, of each vehicle with right of way."""
         plan, paths = self.run.plan, self.run.site.intersection.paths
         begin = self.entry - max(plan.hold_distance, 1.0)
-        found = []
+        rests = []
         near = self.s[rows] > self.entry - plan.sight
         for row in rows[(self.state[rows] == RELEASED) & near].tolist():
             path = paths[self.path[row]]
             start = max(begin, float(self.s[row]))
             if start < path.exit:
-                found.append(path.position(np.linspace(start, path.exit, 16)))
-        return found
+                rests.append(path.position(np.linspace(start, path.exit, 16)))
+        return rests
 
     def lamps(self, rows: Rows) -> list[Floats]:
         """Turn indicators of the vehicles that turn and have not left the junction."""
@@ -131,7 +131,7 @@ class Film:
         site = self.run.site
         angle = np.linspace(0.0, 2.0 * np.pi, 49)
         ring = RING * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        found: list[Floats] = []
+        rings: list[Floats] = []
         for collision in self.run.collisions:
             if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
                 continue
@@ -141,8 +141,8 @@ class Film:
                 )[0]
                 for movement, s in zip(collision.movements, collision.positions, strict=True)
             ]
-            found.append(ring + np.mean(centres, axis=0))
-        return found
+            rings.append(ring + np.mean(centres, axis=0))
+        return rings
 
 
 def _human(run: Run) -> npt.NDArray[np.bool_]:

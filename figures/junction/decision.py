@@ -20,7 +20,7 @@ APPROACH = 17.0
 
 
 def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
-    """Draw who may cross and why.
+    """Draw which vehicles may cross, and why.
 
     Args:
         explanation: of the decision (`dim.explain`).
@@ -39,9 +39,9 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
         x = axes.get_position().x0
         figure.text(x, 0.945, letter, fontsize=15, fontweight="bold", color=style.INK, va="center")
         figure.text(x + 0.028, 0.945, title, fontsize=12, color=style.INK, va="center")
-    who = ", ".join(map(str, explanation.right_of_way))
+    names = ", ".join(map(str, explanation.right_of_way))
     figure.text(
-        0.02, 0.08, f"Right of way: {who}", fontsize=12.5, fontweight="bold",
+        0.02, 0.08, f"Right of way: {names}", fontsize=12.5, fontweight="bold",
         color=style.RIGHT_OF_WAY, va="center",
     )  # fmt: skip
     figure.text(0.02, 0.035, explanation.reason, fontsize=10, color=style.INK, va="center")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
@@ -12,6 +15,8 @@ from dim import Dim, Explanation, HarmonyMatrix, explain
 from figures import style
 from figures.junction import drawing
 from figures.junction.decision import decision_figure
+from figures.junction.tables import harmony_table, webster_table
+from figures.studies.shared.section import Drawing, Item, Section
 from scenarios.library import MAKERS, four_way
 from scenarios.scenario import Scenario
 
@@ -151,3 +156,31 @@ def _draw_cliques(axes: Axes, told: Explanation) -> None:
                               linewidth=1.8, zorder=5))  # fmt: skip
         axes.text(x, y, str(movement), ha="center", va="center", fontsize=13, color=style.INK,
                   fontweight="bold", zorder=6)  # fmt: skip
+
+
+def _item(name: str, title: str, draw: Callable[[], Drawing], *, in_report: bool = True) -> Item:
+    return Item(name, title, lambda _: draw(), in_report=in_report)
+
+
+SECTION = Section(
+    "Junctions and rules",
+    (
+        _item("maps", "the three junctions from above", maps),
+        *(
+            _item(
+                f"decision-{arms}way", f"junction with zones and harmony graph, {arms} arms",
+                partial(decision, arms), in_report=arms == 4,
+            )
+            for arms in DECISIONS
+        ),
+        _item("worst-case", "the most tied cliques on four arms", worst_case),
+        _item("webster", "greens of the fixed-time signal", webster_table),
+        *(
+            _item(
+                f"harmony-{arms}way", f"harmony matrix, {arms} arms",
+                partial(harmony_table, arms), in_report=arms == 4,
+            )
+            for arms in DECISIONS
+        ),
+    ),
+)  # fmt: skip

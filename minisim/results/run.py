@@ -1,11 +1,12 @@
-"""`Run`, the result of a run, whoever hosted it."""
+"""`Run`, the result of a run on any host."""
 
 from __future__ import annotations
 
+import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -23,8 +24,10 @@ from minisim.engine.state import (
 from minisim.errors import (
     InputError,
 )
+from minisim.results.metrics import Metric
+from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
-from minisim.results.trips import Trips, summarise, trip_table
+from minisim.results.trips import Trips
 from minisim.version import __version__
 
 if TYPE_CHECKING:
@@ -51,6 +54,10 @@ class ScenarioLike(Protocol):
         """Simulated time [s]."""
 
     @property
+    def warmup(self) -> float:
+        """Trips demanded before it do not count in any mean or number of trips [s]."""
+
+    @property
     def depart_speed(self) -> float | None:
         """At insertion [m/s]; None is the highest safe one."""
 
@@ -61,6 +68,16 @@ class ScenarioLike(Protocol):
         """The arrival table."""
 
 
+@cache
+def environment() -> Mapping[str, str]:
+    """What a run of now is made with, for its provenance."""
+    return {
+        "minisim": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """The result of a run.
@@ -69,11 +86,13 @@ class Run:
         scenario, controller, seed: what was run.
         site, plan: what the controller knew and asked for.
         collisions: each pair of vehicles once.
-        columns: the trips as arrays.
+        columns: all trips as arrays.
         record: what was recorded of the trajectories.
         trace, rows: the recording, and each row's vehicle id and path.
         counts: what the controller's session counted.
+        kinds: of the vehicles, by id, where they are of several kinds.
         host: what moved the vehicles, for the provenance: `host` and what else to name.
+        environment: versions, for the provenance.
     """
 
     scenario: ScenarioLike
@@ -87,15 +106,44 @@ class Run:
     trace: Records
     rows: Records
     counts: Mapping[str, float] = field(default_factory=dict)
+    kinds: tuple[str, ...] = ()
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
+    environment: Mapping[str, str] = field(default_factory=environment)
 
     @cached_property
     def trips(self) -> pd.DataFrame:
-        """One row a trip in demand order, columns `minisim.results.trips.TRIP_COLUMNS`."""
-        return trip_table(self.columns)
+        """One row a trip in demand order, columns `minisim.results.summary.TRIP_COLUMNS`."""
+        return trip_table(self.columns, self.kinds)
 
-    def summary(self) -> dict[str, Any]:
-        """What was run and its means; see `minisim.results.trips.summarise`."""
+    @cached_property
+    def counted_rows(self) -> slice:
+        """Indices of the trips that count: demanded after the warm-up, up to the end."""
+        return self.columns.counted(self.scenario.warmup)
+
+    @cached_property
+    def counted(self) -> Trips:
+        """The trips that count; every mean and number of trips is of them."""
+        rows, start = self.counted_rows, float(self.scenario.warmup)
+        if start == 0.0 and rows == slice(0, len(self.columns.lane)):
+            return self.columns
+        return self.columns.taken(rows)._replace(start=start)
+
+    @cached_property
+    def safety(self) -> Mapping[str, float | int | None]:
+        """The closest calls (`minisim.results.safety.safety_summary`).
+
+        They are those in and near the junction, whatever else was recorded.
+        """
+        from minisim.results.safety import near_junction, safety_summary
+
+        frame = self.trajectories
+        near = frame if self.record == "junction" else near_junction(frame, self.site)
+        return safety_summary(near, self.site)
+
+    def summary(
+        self, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
+    ) -> dict[str, Any]:
+        """What was run and its numbers; see `minisim.results.summary.summarise`."""
         return {
             "controller": self.controller.name,
             "scenario": self.scenario.name,
@@ -103,24 +151,55 @@ class Run:
             "density": self.scenario.density,
             "seed": self.seed,
             "horizon_s": self.scenario.horizon,
+            "warmup_s": self.scenario.warmup,
             "host": self.host["host"],
-            **summarise(self.columns, self.site.intersection.n),
-            "collisions": len(self.collisions),
-            **self.counts,
+            **summarise(self, metrics, by),
         }
 
     @property
     def provenance(self) -> dict[str, str]:
         """Version, environment and parameters: all that is needed to run it again."""
         return {
-            "minisim": __version__,
-            "python": platform.python_version(),
-            "numpy": np.__version__,
+            **self.environment,
             "scenario": repr(self.scenario),
             "controller": repr(self.controller),
             "seed": str(self.seed),
             **self.host,
         }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run to one file; see `minisim.results.saved`.
+
+        Raises:
+            MissingExtraError: pyarrow is not installed.
+            InputError: a site that is not made of our classes.
+            FileError: the file cannot be written; nothing is left behind.
+        """
+        from minisim.results.saved import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Run:
+        """Read a run that `save` has written.
+
+        Raises:
+            MissingExtraError: pyarrow is not installed.
+            FileError: no such file, no saved run, a damaged one, or one of a newer version.
+        """
+        from minisim.results.saved import load
+
+        return load(path)
+
+    def __repr__(self) -> str:
+        from minisim.results.show import as_text
+
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        from minisim.results.show import as_html
+
+        return as_html(self)
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:

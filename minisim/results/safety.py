@@ -10,7 +10,7 @@ site. They look at bodies on their paths:
   PET = time the second enters − time the first has left; 0 or less means both were inside.
 * crossing — two vehicles with right of way on conflicting movements, at constant speed: where
   the second would enter the conflict area before the first has left it, TTC = d/v of the second.
-  A vehicle without right of way is about to stop, so it is on nobody's course.
+  A vehicle without right of way is about to stop, so it crosses no other's course.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import shapely
 from minisim.control import Site
 from minisim.errors import instance
 from minisim.junction.geometry import Bools, Floats, Intersection, Path
+from minisim.results.metrics import PETS
 from minisim.results.trajectories import (
     ACCELERATION,
     RIGHT_OF_WAY,
@@ -77,8 +78,8 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
 
     Returns:
         `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
-        `max_braking_mps2`, the number of encroachments `pets`, and how many of them were shorter
-        than 1, 1.5 and 2 s (`pets_below_1_s`, `pets_below_1_5_s`, `pets_below_2_s`).
+        `max_braking_mps2`, the number of encroachments `pets`, and how many of them were short
+        (`minisim.results.metrics.PETS`).
 
     Raises:
         InputError: a column is missing, or a movement that the site does not have.
@@ -94,10 +95,19 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
         "max_drac_mps2": _largest(follow["drac_mps2"]),
         "max_braking_mps2": _largest(np.maximum(braking, 0.0)),
         "pets": len(pets),
-        "pets_below_1_s": int((pets < 1.0).sum()),
-        "pets_below_1_5_s": int((pets < 1.5).sum()),
-        "pets_below_2_s": int((pets < 2.0).sum()),
+        **{name: int((pets < limit).sum()) for name, limit in PETS.items()},
     }
+
+
+def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """The part of a recording of everything that `record="junction"` keeps."""
+    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
+
+    paths = site.intersection.paths
+    last = np.array([path.exit + RECORD_PAST for path in paths])
+    s = frame[S].to_numpy()
+    near = (s >= paths[0].entry - RECORD_BEFORE) & (s <= last[movement_index(frame, site)])
+    return frame[near]
 
 
 def following(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
@@ -274,17 +284,17 @@ def _encroachments(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
     by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
     times, firsts, seconds, pets = [], [], [], []
     for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
-        who = np.concatenate([by_movement[p], by_movement[q]])
+        passing = np.concatenate([by_movement[p], by_movement[q]])
         other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
-        start, end = enter[who, other], leave[who, other]
+        start, end = enter[passing, other], leave[passing, other]
         order = np.argsort(start, kind="stable")
         order = order[np.isfinite(start[order])]
         first, second = order[:-1], order[1:]
         changes = other[first] != other[second]
         first, second = first[changes], second[changes]
         times.append(start[second])
-        firsts.append(vehicle[who[first]])
-        seconds.append(vehicle[who[second]])
+        firsts.append(vehicle[passing[first]])
+        seconds.append(vehicle[passing[second]])
         pets.append(start[second] - end[first])
     time = _join(times, np.float64)
     order = np.argsort(time, kind="stable")
@@ -349,11 +359,11 @@ def _crossings(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
     }
 
 
-def _times(rows: Rows, who: Ints, place: Floats) -> Floats:
+def _times(rows: Rows, row: Ints, place: Floats) -> Floats:
     """Time until the fronts pass `place` at their present speeds [s]; 0 where they have."""
-    distance = place - rows.s[who]
+    distance = place - rows.s[row]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(distance <= 0.0, 0.0, distance / rows.v[who])
+        return np.where(distance <= 0.0, 0.0, distance / rows.v[row])
 
 
 def _join(parts: list[npt.NDArray[Any]], dtype: type = np.int64) -> npt.NDArray[Any]:

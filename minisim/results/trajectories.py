@@ -1,26 +1,19 @@
-"""Trajectories and trips on disk: column names, and writers that never leave half a file.
-
-A writer writes beside its target and then renames, so a reader sees the old file or the whole
-new one, whatever happens in between.
-"""
+"""Trajectories and trips on disk: column names, and writers that never leave half a file."""
 
 from __future__ import annotations
 
-import importlib.util
 import os
-import uuid
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.control import Site
-from minisim.errors import FileError, InputError, MissingExtraError, choice, instance
+from minisim.errors import InputError, instance
+from minisim.files import replacing, write_table
 from minisim.junction.geometry import ARM_NAMES, Floats, Movement
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.summary import TRIP_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,35 +45,11 @@ TRAJECTORY_COLUMNS: Final = (
     "right_of_way",
 )
 
-#: Decimals in CSV: micrometres and microseconds, and 0.3 instead of 0.30000000000000004.
-CSV_DECIMALS: Final = 6
-
 _FCD_HEAD: Final = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
     '<fcd-export xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" '
     'xsi:noNamespaceSchemaLocation="http://sumo.dlr.de/xsd/fcd_file.xsd">\n'
 )
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside `path` to write to, and put it in place at the end.
-
-    When the block raises, `path` stays as it was and the temporary file goes.
-
-    Raises:
-        FileError: the folder cannot be written, or `path` is no ordinary file.
-    """
-    target = _target(path)
-    temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
-    try:
-        try:
-            yield temporary
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
@@ -152,19 +121,6 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
     return np.asarray(lane * (n - 1) + manoeuvre - 1, dtype=np.int64)
 
 
-def _target(path: str | os.PathLike[str]) -> Path:
-    """The file that `path` names, through symbolic links; raises `FileError`."""
-    instance("output file", path, (str, os.PathLike))
-    try:
-        target = Path(path).resolve()
-        ordinary = target.is_file() or not target.exists()
-    except (OSError, ValueError, RuntimeError) as error:  # a loop of links, a NUL in the name
-        raise FileError(f"cannot write {os.fspath(path)!r}: {error}") from error
-    if not ordinary:
-        raise FileError(f"cannot write {path}: it is not an ordinary file")
-    return target
-
-
 def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
     import pandas as pd
 
@@ -172,24 +128,6 @@ def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
     missing = [column for column in columns if column not in frame.columns]
     if missing:
         raise InputError(f"the frame has no column {', '.join(missing)}")
-
-
-def write_table(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write a table as CSV or Parquet, by the suffix of `path`; raises as `write_trajectories`."""
-    instance("output file", path, (str, os.PathLike))
-    writers: dict[str, Callable[[Path], None]] = {
-        ".csv": lambda file: frame.round(CSV_DECIMALS).to_csv(
-            file, index=False, lineterminator="\n"
-        ),
-        ".parquet": lambda file: frame.to_parquet(file, index=False, engine="pyarrow"),
-    }
-    suffix = choice(f"suffix of {os.fspath(path)}:", Path(path).suffix.lower(), writers)
-    if suffix == ".parquet" and importlib.util.find_spec("pyarrow") is None:
-        raise MissingExtraError(
-            "Parquet needs pyarrow: pip install 'minisim[parquet]' (or write .csv)"
-        )
-    with replacing(path) as temporary:
-        writers[suffix](temporary)
 
 
 def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64]) -> Iterator[str]:

@@ -29,6 +29,7 @@ from minisim.errors import (
     choice,
     instance,
 )
+from minisim.files import replacing
 from minisim.hosting import (
     AFTERMATH,
     REACTIONS,
@@ -39,9 +40,9 @@ from minisim.hosting import (
     checked_window,
     collision_error,
     counts_of,
+    kinds_of,
 )
 from minisim.results.run import Run, ScenarioLike
-from minisim.results.trajectories import replacing
 from minisim.sumo.files import (
     CONFIGURATION,
     FCD,
@@ -187,6 +188,7 @@ def _run(request: _Request) -> Run:
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
         counts=counts_of(beginning.session),
+        kinds=kinds_of(beginning.session, len(beginning.arrivals)),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 

@@ -1,11 +1,13 @@
 """The `minisim` command: the composition root, which may import everything, and does so late.
 
-Every command imports what it needs when it runs, so that `minisim --help` is quick.
+Each module beside this one adds the command of its name to the app. A command imports what it
+needs when it runs, so that `minisim --help` is quick.
 """
 
 from __future__ import annotations
 
 import importlib
+import pkgutil
 import shlex
 import sys
 from collections.abc import Sequence
@@ -19,11 +21,14 @@ from scenarios.termination import Terminated, terminable
 
 __all__ = ["COMMANDS", "app", "main"]
 
-#: In the order of the help; the module of that name beside this one adds the command to the app.
-COMMANDS = (
-    "demo", "run", "sweep", "figures", "reproduce", "crossval", "harmony", "decide", "animate",
-    "verify", "protocol",
-)  # fmt: skip
+#: The help lists these first, then the others by name.
+_FIRST = ("demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "crossval")
+
+#: The names of the modules beside this one, in the order of the help.
+COMMANDS = tuple(sorted(
+    (module.name for module in pkgutil.iter_modules(__path__) if not module.ispkg),
+    key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name),
+))  # fmt: skip
 
 for _command in COMMANDS:
     importlib.import_module(f"scenarios.cli.{_command}")
@@ -36,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input is one line on stderr and 2, a collision that stops a run or a stdout that cannot be
-    written is 1, Ctrl-C is 130, SIGTERM is 143. Nothing on purpose is a traceback.
+    written is 1, Ctrl-C is 130, SIGTERM is 143. No expected failure is a traceback.
     """
     prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -45,9 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
     except CollisionError as error:
-        return _fail(_told(error), 1)
+        return _fail(_message(error), 1)
     except MinisimError as error:
-        return _fail(_told(error))
+        return _fail(_message(error))
     except _USAGE_ERROR as error:
         message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
         help_of = [name for name in given[:1] if name in COMMANDS]
@@ -58,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Terminated as end:
         return _fail("terminated", int(end.code or 0))
     except BrokenPipeError:
-        # The reader of our output has gone (as `head` does): no more to say, and no complaint.
+        # The reader of our output has gone, as `head` does: there is no more to say.
         drop_output()
         return 1
     except OSError as error:
@@ -71,8 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _told(error: MinisimError) -> str:
-    """What it says, with what was added on its way."""
+def _message(error: MinisimError) -> str:
+    """Its message, with the notes that were added on its way."""
     return "; ".join([str(error), *getattr(error, "__notes__", ())])
 
 

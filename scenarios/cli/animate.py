@@ -58,9 +58,9 @@ def animate(
     """Write an animation: who waits, who has the right of way, who crosses."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
-    from scenarios.cli.shared.files import check_apart, check_file
+    from minisim.files import check_apart, check_file
     from scenarios.controllers import controller_named
-    from scenarios.mixing import with_humans
+    from scenarios.recipe import Recipe
     from scenarios.scenario import profile_named
 
     check_apart({"--arrivals": arrivals, "--out": out})
@@ -69,14 +69,14 @@ def animate(
     number("--start [s]", start, low=0, high=9e6)
     number("--seconds", seconds, above=0, high=3600)
     frame_times(start, seconds, fps, profile_named(profile).dt)
-    what = build_scenario(
-        scenario, bearings, arrivals, density, split, turns,
+    junction = build_scenario(
+        scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=start + seconds,
     )  # fmt: skip
-    result = simulate(
-        what, with_humans(controller_named(controller, profile), humans), seed,
-        record="all", record_window=(start, start + seconds), on_collision="record",
-    )  # fmt: skip
+    recipe = Recipe(
+        junction, controller_named(controller, profile), seed, humans, on_collision="record"
+    )
+    result = recipe.run(simulate, record="all", record_window=(start, start + seconds))
     with bar("drawing") as progress:
         write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=progress)
     typer.echo(f"wrote {out}")

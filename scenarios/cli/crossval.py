@@ -46,7 +46,7 @@ class Wanted(NamedTuple):
     "beside them and used again by the same version; remove it to run them anew.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim crossval --quick\n\n"
-    "minisim crossval four-way five-way -c dim -c dim-harmonious -d 250 --seeds 5\n\n"
+    "minisim crossval four-way five-way -c dim -c dim:gate=harmonious -d 250 --seeds 5\n\n"
     "minisim crossval --replay four-way -d 150 -d 350 --split balanced\n\n"
     "minisim crossval --replay -c fixed-time -c v2ic --split 4:1:4:1\n\n"
     "[bold]Exit codes[/bold]\n\n"
@@ -127,8 +127,8 @@ def crossval(
     ] = False,
 ) -> None:  # fmt: skip
     """Compare minisim, SUMO and the paper on common arrivals, trip by trip."""
+    from minisim.files import make_folder
     from minisim.sumo.host import sumo_home
-    from scenarios.cli.shared.files import make_folder
 
     wanted = Wanted(
         scenarios or [], controller or [], density or [], split or [], profile, seeds, horizon,
@@ -170,13 +170,10 @@ def _cases(wanted: Wanted) -> list[Case]:
 
 def _check(cases: list[Case]) -> None:
     """Raise `InputError` for a cell that cannot run, before any does."""
-    from scenarios.sweep.experiment import Experiment
     from scenarios.sweep.file import check_can_run
 
     with bar("checking"):
-        check_can_run(
-            Experiment(case.scenario, case.decider(), label=case.controller) for case in cases
-        )
+        check_can_run(case.recipe() for case in cases)
 
 
 def _seeds(wanted: Wanted) -> range:

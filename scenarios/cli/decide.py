@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,9 +14,8 @@ from scenarios.cli.shared.options import (
     ProfileName,
     ScenarioName,
     Side,
-    build_scenario,
 )
-from scenarios.cli.shared.terminal import show, show_json
+from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, names
 
 
 @app.command(
@@ -39,46 +37,28 @@ def decide(
     bearings: Bearings = None,
     side: Side = "left",
     profile: ProfileName = "paper",
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Draw junction and harmony graph (.png, .pdf or .svg)."
-        ),
-    ] = None,
+    plot: Plot = None,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
-    from dim import Dim, HarmonyMatrix, explain
-    from scenarios.cli.shared.files import check_file
+    from dim import Dim, explain
 
-    if plot is not None:
-        from figures.style import figure_format
-
-        figure_format(plot)
-        check_file(plot)
-    what = build_scenario(scenario, bearings, profile=profile, side=side)
-    site = what.site()
-    matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+    what, matrix = junction(scenario, bearings, side, profile)
     explanation = explain(movements, matrix, order)
     if plot is not None:
         from figures.junction.decision import decision_figure
         from figures.style import save
 
+        site = what.site()
         save(decision_figure(explanation, site, Dim().start(site).plan), plot)
-    if as_json:
-        show_json({
-            "scenario": what.name,
-            "order": order,
-            "participants": list(map(str, explanation.participants)),
-            "edges": [[str(a), str(b)] for a, b in explanation.edges],
-            "cliques": [list(map(str, clique)) for clique in explanation.cliques],
-            "tied": [list(map(str, clique)) for clique in explanation.tied],
-            "right_of_way": list(map(str, explanation.right_of_way)),
-            "reason": explanation.reason,
-        })  # fmt: skip
-        return
-    from scenarios.cli.shared.report import decision_text
-
-    show(decision_text(explanation))
-    if plot is not None:
-        typer.echo(f"wrote {plot}")
+    facts = {
+        "scenario": what.name,
+        "order": order,
+        "participants": names(explanation.participants),
+        "edges": list(map(names, explanation.edges)),
+        "cliques": list(map(names, explanation.cliques)),
+        "tied": list(map(names, explanation.tied)),
+        "right_of_way": names(explanation.right_of_way),
+        "reason": explanation.reason,
+    }
+    answer(as_json, facts, decision_text(explanation), wrote=plot)

@@ -38,7 +38,7 @@ def demo(
     ] = False,
 ) -> None:
     """The tour: DIM beside a fixed-time signal, in under a minute."""
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.demo import Tour, demo_table, demo_title, run_tour, write_tables
 
     runs = (2 if quick else 5) if seeds is None else integer("--seeds", seeds, low=2, high=1000)
@@ -49,8 +49,8 @@ def demo(
         film = tour.film()  # first, for it compiles the kernel once for all processes
     with bar("simulating") as progress:
         points = run_tour(tour, processes, progress)
+    from figures.demo import performance_figure
     from figures.film.animate import write_animation
-    from figures.performance import performance_figure
     from figures.style import save
 
     write_tables(points, tour, folder)

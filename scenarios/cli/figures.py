@@ -48,10 +48,10 @@ def figures(
 ) -> None:  # fmt: skip
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
-    from scenarios.cli.shared.files import make_folder
+    from minisim.files import make_folder
     from scenarios.cli.shared.report import gallery_table
-    from scenarios.studies.archive import MissingRunsError
-    from scenarios.studies.reproduction import Plan, find_in
+    from scenarios.studies.shared.archive import Archive, MissingRunsError, find_in
+    from scenarios.studies.shared.effort import Effort
     from scenarios.sweep.store import Store
 
     if as_list:
@@ -59,7 +59,7 @@ def figures(
         return
     items = [item_named(name) for name in dict.fromkeys(names or GALLERY)]
     left = 0
-    plan = Plan.of(quick=quick, seeds=seeds)
+    effort = Effort.of(quick=quick, seeds=seeds)
     wanting = [item.name for item in items if item.needs]
     if store is None and names and wanting:
         raise InputError(
@@ -72,7 +72,7 @@ def figures(
     source = None if store is None else Store(store, create=False)
     try:
         folder = make_folder(out)
-        archive = plan.archive(find_in(source) if source else lambda asked: [None] * len(asked))
+        archive = Archive(find_in(source), effort)
         missing = []
         with bar("drawing") as progress:
             for done, item in enumerate(items, start=1):

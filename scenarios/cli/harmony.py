@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
+from rich.text import Text
 
+from minisim.control import CLEARANCE
 from minisim.errors import InputError
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import (
@@ -14,9 +16,8 @@ from scenarios.cli.shared.options import (
     ProfileName,
     ScenarioName,
     Side,
-    build_scenario,
 )
-from scenarios.cli.shared.terminal import show, show_json
+from scenarios.cli.shared.proof import answer, harmony_table, junction
 
 
 @app.command(
@@ -29,37 +30,24 @@ def harmony(
     side: Side = "left",
     profile: ProfileName = "paper",
     clearance: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M", help="Room between the ways of two bodies in metres; 0.5 by default."
-        ),
-    ] = None,
+        float, typer.Option(metavar="M", help="Room between the ways of two bodies in metres.")
+    ] = CLEARANCE,
     csv: Annotated[bool, typer.Option("--csv", help="Print the matrix as CSV.")] = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Print which movements can be driven at once: the harmony matrix."""
-    from dim import HarmonyMatrix
-    from minisim.control import CLEARANCE
-
     if csv and as_json:
         raise InputError("--csv and --json exclude each other; give one")
-    what = build_scenario(scenario, bearings, profile=profile, side=side)
-    room = CLEARANCE if clearance is None else clearance
-    matrix = HarmonyMatrix.from_geometry(what.intersection, what.profile.vehicle, room)
+    what, matrix = junction(scenario, bearings, side, profile, clearance)
     if csv:
         typer.echo(matrix.to_text(), nl=False)
-    elif as_json:
-        show_json({
-            "scenario": what.name,
-            "side": side,
-            "clearance_m": room,
-            "movements": list(matrix.labels),
-            "harmony": matrix.values.astype(int).tolist(),
-        })  # fmt: skip
-    else:
-        from rich.text import Text
-
-        from scenarios.cli.shared.report import harmony_table
-
-        title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
-        show(title, harmony_table(matrix))
+        return
+    facts = {
+        "scenario": what.name,
+        "side": side,
+        "clearance_m": clearance,
+        "movements": list(matrix.labels),
+        "harmony": matrix.values.astype(int).tolist(),
+    }
+    title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
+    answer(as_json, facts, title, harmony_table(matrix))

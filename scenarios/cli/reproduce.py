@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,9 +11,10 @@ import typer
 from minisim.errors import integer
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar
+from scenarios.studies import NAMES, study_named
 
 if TYPE_CHECKING:
-    from scenarios.studies.reproduction import Made
+    from scenarios.studies.shared.reproduction import Made
 
 
 @app.command(
@@ -52,8 +52,8 @@ def reproduce(
         list[str] | None,
         typer.Option(
             metavar="STUDY", show_default=False,
-            help="Only this one, and only what it needs is drawn: text, as-run, fair, gate, "
-            "fairness, humans, perception, confidence or capacity; may be repeated.",
+            help="Only this one, and only what is drawn from it; may be repeated. One of "
+            f"{', '.join(NAMES)}.",
         ),
     ] = None,
     quick: Annotated[
@@ -62,13 +62,15 @@ def reproduce(
     ] = False,
 ) -> None:  # fmt: skip
     """Run the paper's experiments and ours, draw every figure, and write a report."""
-    from figures.report import write_report
-    from scenarios.cli.shared.files import make_folder
-    from scenarios.studies.reproduction import Plan, find_in
-    from scenarios.studies.reproduction import reproduce as run_all
+    from figures.reproduction_report import write_report
+    from minisim.files import make_folder
+    from scenarios.studies.shared.archive import Archive, find_in
+    from scenarios.studies.shared.effort import Effort
+    from scenarios.studies.shared.reproduction import reproduce as make
     from scenarios.sweep.store import Store
 
-    plan = Plan.of(quick=quick, seeds=seeds, parts=only)
+    effort = Effort.of(quick=quick, seeds=seeds)
+    names = [study_named(name).name for name in only or NAMES]
     processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     if store is not None and store.exists():
         Store(store, create=False).close()  # refused before a folder is made
@@ -76,14 +78,14 @@ def reproduce(
     pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
         made = []
-        for part in plan.parts:
-            with bar(f"simulating {part}") as progress:
-                made += run_all(replace(plan, parts=(part,)), rows, processes, progress)
+        for name in names:
+            with bar(f"simulating {name}") as progress:
+                made.append(make(name, effort, rows, processes, progress))
             typer.echo(_done(made[-1]), err=True)
         with bar("drawing") as progress:
             files = write_report(
-                plan.archive(find_in(rows)), made, processes, folder, pictures, progress,
-                parts=plan.parts,
+                Archive(find_in(rows), effort), made, processes, folder, pictures, progress,
+                parts=names,
             )  # fmt: skip
     typer.echo(f"wrote {files} figures and tables to {pictures}")
     typer.echo(f"wrote {folder / 'report.md'}")

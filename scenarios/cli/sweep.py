@@ -13,6 +13,7 @@ import typer
 from minisim.errors import InputError, choice, integer, number
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar, show
+from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.termination import Terminated
 
 if TYPE_CHECKING:
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from scenarios.sweep.experiment import Experiment
+    from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
 #: Key of a file -> its value where it is left out, as `scenarios.sweep.file` has it.
 DEFAULTS = {
     "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
     "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
-    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "on_collision": "stop",
+    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
 }  # fmt: skip
 #: A junction of one's own, as a file has it, and how the help shows brackets.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
@@ -36,6 +37,8 @@ LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
 #: The study that is the paper's grid as its text prescribes it.
 PAPER = {"paper": "text"}
+#: Studies that are lists of experiments.
+STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
 
 
 @app.command(
@@ -44,7 +47,8 @@ PAPER = {"paper": "text"}
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
     "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
-    f"on_collision; what it leaves out is {LEFT_OUT}. A junction of one's own is written\n\n"
+    "warmup, on_collision, metrics (minisim metrics lists them); what it leaves out is "
+    f"{LEFT_OUT}. Your own junction is written\n\n"
     f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
@@ -65,8 +69,7 @@ def sweep(
             metavar="FILE.toml|paper|STUDY", show_default=False,
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            "study of minisim reproduce: as-run, fair, gate, fairness, humans, perception or "
-            "confidence.",
+            f"study of minisim reproduce: {', '.join(STUDIES)}.",
         ),
     ],
     out: Annotated[
@@ -106,10 +109,9 @@ def sweep(
 ) -> None:  # fmt: skip
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.arrivals import MAX_TIME
-    from minisim.results.trajectories import write_table
-    from scenarios.cli.shared.files import check_apart, check_table
+    from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
-    from scenarios.studies.cells import cells
+    from scenarios.sweep.cells import cells
     from scenarios.sweep.store import Store
 
     if seeds is not None:
@@ -136,14 +138,13 @@ def sweep(
         raise typer.Exit(1)
 
 
-def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Experiment]:
+def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
     """A study's, or those of a file; a word that is neither is taken for a study's name."""
-    from scenarios.studies.study import STUDIES
     from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = (*PAPER, *STUDIES)
     if what in studies or not (Path(what).suffix or Path(what).exists()):
-        study = STUDIES[PAPER.get(name := choice("study", what, studies), name)]
+        study = study_named(PAPER.get(name := choice("study", what, studies), name))
         runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
         found = [experiment for _, experiment in runs]
     else:
@@ -162,11 +163,12 @@ def _executor(scheduler: str | None) -> Iterator[Executor | None]:
 
 
 def _run(
-    experiments: list[Experiment], executor: Executor | None, jobs: int, store: Store, out: Path
+    experiments: list[Recipe], executor: Executor | None, jobs: int, store: Store, out: Path
 ) -> pd.DataFrame:
     """The rows in the order of the experiments, with a bar that tells of failures."""
     import pandas as pd
 
+    from scenarios.sweep.keys import key_of
     from scenarios.sweep.runner import finished
 
     rows: dict[int, dict[str, object]] = {}
@@ -179,7 +181,7 @@ def _run(
                 progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
                 progress(len(rows), len(experiments))
     except (KeyboardInterrupt, Terminated):
-        kept = len(store.valid(experiment.key for experiment in experiments))
+        kept = len(store.valid(map(key_of, experiments)))
         typer.echo(
             f"minisim: {kept} of {len(experiments)} runs are in {out}; the same command goes on "
             "from there",

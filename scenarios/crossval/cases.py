@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
-from minisim.control import Controller
-from minisim.errors import InputError, choice, instance
+from minisim.errors import InputError, choice
+from minisim.parameters import declared, part, text
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
 from scenarios.library import MAKERS, scenario_named
@@ -22,7 +22,8 @@ from scenarios.paper import (
     reference_rows,
     replay,
 )
-from scenarios.scenario import AS_RUN, Profile, Scenario, parse_split
+from scenarios.recipe import Recipe
+from scenarios.scenario import AS_RUN, Profile, Scenario
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
 PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
@@ -42,32 +43,35 @@ TRAVEL_350: Final = 3.0
 HOUR: Final = 3600.0
 
 
-@dataclass(frozen=True)
+@declared
 class Case:
     """One cell.
-
-    Attributes:
-        scenario: junction, demand and profile.
-        controller: its command-line name.
-        published: the published run that is replayed; None where arrivals are drawn.
 
     Raises:
         InputError: an unknown controller, or the published one is not to be had.
     """
 
-    scenario: Scenario
-    controller: str
-    published: Cell | None = None
+    scenario: Scenario = part("junction, demand and profile", Scenario)
+    controller: str = text("its command-line name")
+    published: Cell | None = part(
+        "the published run that is replayed; None where arrivals are drawn", Cell,
+        optional=True, default=None,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        instance("scenario", self.scenario, Scenario)
-        self.decider()
+        self.recipe()
 
-    def decider(self) -> Controller:
-        """Who decides: in a replay with the published vehicle, what did so in the published run."""
+    def recipe(self, seed: int = 0) -> Recipe:
+        """The run of one seed: a replay with the published vehicle has the published controller.
+
+        Vehicles of the published runs do touch; all others must not.
+        """
         if self.published is not None and self.same_law:
-            return controller_of(*self.published)
-        return controller_named(self.controller, self.scenario.profile)
+            controller = controller_of(*self.published)
+        else:
+            controller = controller_named(self.controller, self.scenario.profile)
+        reaction = "record" if self.same_law else "stop"
+        return Recipe(self.scenario, controller, seed, label=self.controller, on_collision=reaction)
 
     @property
     def split(self) -> str:
@@ -135,9 +139,7 @@ def drawn_cases(
     """
     return [
         Case(
-            scenario_named(
-                name, density=density, split=_shares(split), profile=profile, horizon=horizon
-            ),
+            scenario_named(name, density=density, split=split, profile=profile, horizon=horizon),
             controller,
         )
         for name in names
@@ -190,7 +192,3 @@ def replayed_cases(
             f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only, with dim"
         )
     return cases
-
-
-def _shares(split: str) -> Sequence[float] | None:
-    return None if split == "balanced" else parse_split(split)

@@ -15,8 +15,9 @@ import numpy as np
 
 from minisim.errors import InputError
 from minisim.junction.geometry import ARM_NAMES, Bools, Floats, Movement
+from minisim.results.metrics import MEANS, METRICS
 from minisim.results.trajectories import TIME, VEHICLE, S
-from minisim.results.trips import METRICS, Trips
+from minisim.results.trips import Trips
 from scenarios.statistics import Interval, ks_distance, mean_interval
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Row(NamedTuple):
 
     Attributes:
         lane: "all" or a letter.
-        metric: one of `minisim.results.trips.METRICS`.
+        metric: one of `minisim.results.metrics.MEANS`.
         trips: that ended, in minisim and in SUMO, over all seeds.
         minisim, sumo: the mean over seeds of each run's mean [s].
         difference: of the two means of a seed, mean over seeds [s].
@@ -124,7 +125,7 @@ def compare(pairs: Sequence[Pair], arms: int) -> list[Row]:
     if not pairs:
         raise InputError("a comparison needs at least one run that both hosts finished")
     lanes: list[int | None] = [None, *range(arms)]
-    return [_row(pairs, lane, metric) for lane in lanes for metric in METRICS]
+    return [_row(pairs, lane, metric) for lane in lanes for metric in MEANS]
 
 
 def agreement(pairs: Sequence[Pair]) -> float:
@@ -176,7 +177,7 @@ def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
 def times(trips: Trips, metric: str, lane: int | None = None) -> Floats:
     """A metric of the trips that ended [s], of one lane or of all."""
     chosen = trips.arrived if lane is None else trips.arrived & (trips.lane == lane)
-    return np.round(trips.metric(metric)[chosen], DECIMALS)
+    return np.round(METRICS[metric].values(trips, len(chosen))[chosen], DECIMALS)
 
 
 def _row(pairs: Sequence[Pair], lane: int | None, metric: str) -> Row:
@@ -203,7 +204,7 @@ def _interval(values: Iterator[float]) -> Interval:
 
 def _close(pair: Pair, metrics: Sequence[str]) -> Bools:
     """Whether a trip is the same; what one that has not ended has gathered so far counts."""
-    differences = [np.abs(pair.sumo.metric(m) - pair.minisim.metric(m)) for m in metrics]
+    differences = [np.abs(METRICS[m].of(pair.sumo) - METRICS[m].of(pair.minisim)) for m in metrics]
     return np.asarray(np.max(differences, axis=0) <= CLOSE + 10.0**-DECIMALS)
 
 

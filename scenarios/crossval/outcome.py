@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from minisim.errors import FileError
-from minisim.results.trajectories import replacing
+from minisim.files import replacing
 from minisim.results.trips import Trips
 from scenarios.crossval.cases import Case
-from scenarios.sweep.experiment import Experiment, key_of, results_version
+from scenarios.sweep.keys import description_of, digest_of, results_version
 
 #: Folder of the kept runs, inside that of the report.
 KEPT = "sumo"
@@ -36,8 +36,7 @@ class Outcome(NamedTuple):
 
 def kept_file(folder: Path, case: Case, seed: int, version: str) -> Path:
     """Where SUMO's run of a case is kept; another scenario, controller or version, another file."""
-    experiment = Experiment(case.scenario, case.decider(), seed, on_collision="record")
-    key = key_of("\n".join([experiment.description, results_version(), version]))
+    key = digest_of("\n".join([description_of(case.recipe(seed)), results_version(), version]))
     return folder / KEPT / f"{key[:24]}.npz"
 
 
@@ -46,7 +45,7 @@ def read_outcome(file: Path) -> Outcome | None:
     try:
         with np.load(file, allow_pickle=False) as data:
             columns = {name: data[name] for name in Trips._fields}
-            columns["end"] = float(columns["end"])
+            columns |= {name: float(columns[name]) for name in ("end", "start")}
             return Outcome(Trips(**columns), int(data["collisions"]), str(data["sumo"]))
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         return None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from minisim.results.trajectories import replacing
+from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
 from scenarios.crossval.comparison import APART, CLOSE, Divergence, Row
@@ -41,11 +40,8 @@ def write_report(
     Raises:
         FileError: a file cannot be written.
     """
-    buffer = io.StringIO()
-    table(results).round(6).to_csv(buffer, index=False, lineterminator="\n")
-    for name, text in ((CSV, buffer.getvalue()), (REPORT, markdown(results, command, figures))):
-        with replacing(folder / name) as part:
-            part.write_text(text, encoding="utf-8")
+    write_table(table(results), folder / CSV)
+    write_text(folder / REPORT, markdown(results, command, figures))
 
 
 def table(results: Sequence[Result]) -> pd.DataFrame:
@@ -77,21 +73,26 @@ def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]
         "",
         "## Verdict",
         "",
-        *_verdicts(results),
+        _verdicts(results),
     ]
     for metric, heading in HEADINGS.items():
-        lines += ["", f"## {heading} [s]", "", *_means(results, metric)]
+        lines += ["", f"## {heading} [s]", "", _means(results, metric)]
     replays = [result for result in results if result.meets_paper("minisim") is not None]
     if replays:
-        lines += ["", "## Against the paper [s]", "", *_replays(replays)]
+        lines += ["", "## Against the paper [s]", "", _replays(replays)]
     lines += ["", "## Where the hosts part", "", *_partings(results)]
-    failures = list(_failures(results))
+    failures = [
+        (result.case.name, failure.host, str(failure.seed), failure.error)
+        for result in results
+        for failure in result.failures
+    ]
     if failures:
-        lines += ["", "## Runs that failed", "", *failures]
+        failed = markdown_table(("cell", "host", "seed", "error"), failures, words=(0, 1, 3))
+        lines += ["", "## Runs that failed", "", failed]
     lines += ["", "## Figures", ""]
     for name, caption in figures.items():
         lines += [f"![{caption}]({name})", "", f"{caption}.", ""]
-    lines += ["## By lane [s]", "", *_lanes(results), ""]
+    lines += ["## By lane [s]", "", _lanes(results), ""]
     return "\n".join(lines)
 
 
@@ -179,8 +180,8 @@ def _tolerances() -> list[str]:
     ]
 
 
-def _verdicts(results: Sequence[Result]) -> list[str]:
-    return _table(
+def _verdicts(results: Sequence[Result]) -> str:
+    return markdown_table(
         ("cell", "seeds", "trips", "same trips", "collisions minisim / SUMO", "hosts agree",
          "minisim meets the paper", "SUMO meets the paper"),
         (
@@ -196,11 +197,12 @@ def _verdicts(results: Sequence[Result]) -> list[str]:
             )
             for result in results
         ),
+        words=(0, 5, 6, 7),
     )  # fmt: skip
 
 
-def _means(results: Sequence[Result], metric: str) -> list[str]:
-    return _table(
+def _means(results: Sequence[Result], metric: str) -> str:
+    return markdown_table(
         ("cell", "minisim", "SUMO", "difference", "KS", "published"),
         (
             (result.case.name, *_cells(result.case, result.row(metric)))
@@ -210,9 +212,9 @@ def _means(results: Sequence[Result], metric: str) -> list[str]:
     )
 
 
-def _replays(results: Sequence[Result]) -> list[str]:
+def _replays(results: Sequence[Result]) -> str:
     """The table of `docs/fidelity.md`."""
-    return _table(
+    return markdown_table(
         ("controller", "arms", "split", "veh/h/lane",
          "waiting, minisim", "SUMO", "published", "travel, minisim", "SUMO", "published",
          "same", "met"),
@@ -235,11 +237,12 @@ def _replays(results: Sequence[Result]) -> list[str]:
             )
             for result in results
         ),
+        words=(0, 2, 11),
     )  # fmt: skip
 
 
-def _lanes(results: Sequence[Result]) -> list[str]:
-    return _table(
+def _lanes(results: Sequence[Result]) -> str:
+    return markdown_table(
         ("cell", "lane", "metric", "trips", "minisim", "SUMO", "difference", "KS", "published"),
         (
             (
@@ -253,6 +256,7 @@ def _lanes(results: Sequence[Result]) -> list[str]:
             for row in result.rows
             if row.lane != "all" and row.metric in HEADINGS
         ),
+        words=(0, 1, 2),
     )
 
 
@@ -276,11 +280,12 @@ def _partings(results: Sequence[Result]) -> list[str]:
         f"{CLOSE:g} s; and the first vehicle, from half a minute before it came on the road on, "
         f"that is more than {APART:g} m from where the other host has it.",
         "",
-        *_table(
+        markdown_table(
             ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",
              "travel minisim / SUMO", "first apart", "where minisim / SUMO [m]",
              "speed minisim / SUMO [m/s]"),
             ((result.case.name, *_parting(found, result.film)) for result, found in apart),
+            words=(0, 2, 5),
         ),
     ]  # fmt: skip
 
@@ -300,26 +305,6 @@ def _parting(found: Divergence, film: Film | None) -> tuple[str, ...]:
         f"{parting.positions[0]:.2f} / {parting.positions[1]:.2f}",
         f"{parting.speeds[0]:.2f} / {parting.speeds[1]:.2f}",
     )
-
-
-def _failures(results: Sequence[Result]) -> Iterator[str]:
-    rows = [
-        (result.case.name, failure.host, str(failure.seed), failure.error)
-        for result in results
-        for failure in result.failures
-    ]
-    if rows:
-        yield from _table(("cell", "host", "seed", "error"), rows)
-
-
-def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A Markdown table; whatever the cells hold, they stay in their column."""
-    lines = [[" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows]
-    return [
-        f"| {' | '.join(headings)} |",
-        f"|{'---|' * len(headings)}",
-        *(f"| {' | '.join(line)} |" for line in lines),
-    ]
 
 
 def _interval(interval: Interval) -> str:

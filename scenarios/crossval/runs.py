@@ -7,12 +7,10 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from minisim.arrivals import Arrivals
-from minisim.control import Site
 from minisim.errors import MinisimError
 from minisim.results.trajectories import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
 from scenarios.crossval.cases import Case
@@ -26,13 +24,13 @@ from scenarios.crossval.comparison import (
 )
 from scenarios.crossval.outcome import Outcome, kept_file, read_outcome, write_outcome
 from scenarios.crossval.results import Failure, Film, Result
-from scenarios.scenario import Scenario
+from scenarios.recipe import Host
 from scenarios.sweep.pool import given, pooled, processes
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from minisim.results.run import Run
+    from minisim.results.run import Run, ScenarioLike
 
 HOSTS: Final = ("minisim", "sumo")
 
@@ -103,34 +101,14 @@ def film(
     ]
 
 
-@dataclass(frozen=True)
 class _Excerpt:
     """The first seconds of a scenario, with its own arrivals and demand (a `ScenarioLike`)."""
 
-    scenario: Scenario
-    horizon: float
+    def __init__(self, scenario: ScenarioLike, horizon: float) -> None:
+        self._scenario, self.horizon, self.warmup = scenario, horizon, 0.0
 
-    @property
-    def name(self) -> str:
-        return self.scenario.name
-
-    @property
-    def profile_name(self) -> str:
-        return self.scenario.profile_name
-
-    @property
-    def density(self) -> float:
-        return self.scenario.density
-
-    @property
-    def depart_speed(self) -> float | None:
-        return self.scenario.depart_speed
-
-    def site(self, seed: int = 0) -> Site:
-        return self.scenario.site(seed)
-
-    def arrivals(self, seed: int) -> Arrivals:
-        return self.scenario.arrivals(seed)
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._scenario, name)
 
 
 def _run(task: tuple[Case, str, int, Path | None]) -> Outcome:
@@ -147,36 +125,33 @@ def _run(task: tuple[Case, str, int, Path | None]) -> Outcome:
 
 def _outcome(case: Case, host: str, seed: int) -> Outcome:
     try:
-        run = _simulate(case, case.scenario, host, seed)
+        run = case.recipe(seed).run(_host(host))
     except MinisimError as error:
         return Outcome(error=str(error))
-    return Outcome(run.columns, len(run.collisions), run.host.get("sumo", ""))
+    return Outcome(run.counted, len(run.collisions), run.host.get("sumo", ""))
 
 
 def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:
     case, host, divergence = task
     end = min(divergence.end + AFTER, case.scenario.horizon)
     window = (max(0.0, divergence.depart - BEFORE), end)
-    run = _simulate(
-        case, _Excerpt(case.scenario, end), host, divergence.seed,
-        record="all", record_window=window,
-    )  # fmt: skip
+    simulate = _host(host)
+
+    def excerpt(scenario: ScenarioLike, *rest: Any, **options: Any) -> Run:
+        return simulate(_Excerpt(scenario, end), *rest, **options)
+
+    run = case.recipe(divergence.seed).run(excerpt, record="all", record_window=window)
     return run.trajectories[[TIME, VEHICLE, LANE, MANOEUVRE, S, SPEED]]
 
 
-def _simulate(
-    case: Case, scenario: Scenario | _Excerpt, host: str, seed: int, **options: Any
-) -> Run:
-    """Run in a host; vehicles of the published runs do touch, anybody else's must not."""
-    options["on_collision"] = "record" if case.same_law else "stop"
-    controller = case.decider()
-    if host == "minisim":
+def _host(name: str) -> Host:
+    if name == "minisim":
         from minisim.simulation import simulate
 
-        return simulate(scenario, controller, seed, **options)
+        return simulate
     from minisim.sumo import simulate as simulate_in_sumo
 
-    return simulate_in_sumo(scenario, controller, seed, **options)
+    return simulate_in_sumo
 
 
 def _gather(

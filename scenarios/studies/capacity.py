@@ -10,74 +10,102 @@ its 2 %.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from minisim.errors import InputError, integer, number
+from minisim.errors import InputError
+from scenarios.controllers import RIVALS
 from scenarios.statistics import Interval, mean_interval
-from scenarios.studies.results import Find
-from scenarios.studies.study import RIVALS, Case
-from scenarios.sweep.experiment import Experiment
+from scenarios.studies.shared.effort import Effort
+from scenarios.studies.shared.points import ControllerPoint, Point, fair_grid
+from scenarios.studies.shared.study import Find, Results, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
 TOLERANCE = 0.02
 
-#: What is asked: every rival on three to six arms under the profile `fair`.
-CASES: tuple[Case, ...] = tuple(
-    Case("fair", name, name, arms, "balanced", 0.0) for arms in (3, 4, 5, 6) for name in RIVALS
+#: Arms of the junctions.
+ARMS = (3, 4, 5, 6)
+
+
+@dataclass(frozen=True)
+class CapacityStudy(Study):
+    """Bisects the demand of every point, which is replaced, for each seed of a search."""
+
+    points: tuple[ControllerPoint, ...]
+
+    def collect(self, effort: Effort, find: Find) -> Results:
+        """All points at once: each round asks `find` one list.
+
+        A point with a run that is missing or failed is not asked for again.
+        """
+        search = effort.search
+        brackets = {
+            (point, seed): (0, search.steps)
+            for point in self.points
+            for seed in range(1, search.seeds + 1)
+        }
+        asked: list[tuple[Point, Mapping[str, Any] | None]] = []
+        for _ in range(search.rounds):
+            probes = {
+                (point, seed): point._replace(density=sum(bracket) // 2 * search.step)
+                for (point, seed), bracket in brackets.items()
+            }
+            rows = find([probe.recipe(seed, search.horizon) for (_, seed), probe in probes.items()])
+            asked += zip(probes.values(), rows, strict=True)
+            for (key, (low, high)), row in zip([*brackets.items()], rows, strict=True):
+                middle = (low + high) // 2
+                if row is not None and not row["error"]:
+                    brackets[key] = (low, middle) if grows(row) else (middle, high)
+            lost = {
+                point
+                for (point, _), row in zip(probes, rows, strict=True)
+                if row is None or row["error"]
+            }
+            brackets = {key: each for key, each in brackets.items() if key[0] not in lost}
+        return Results.of(self, effort, asked)
+
+    def most_runs(self, effort: Effort) -> int:
+        """How many runs `collect` asks for, at most."""
+        return len(self.points) * effort.search.seeds * effort.search.rounds
+
+    def extent(self, effort: Effort) -> str:
+        """Which seeds and horizon an effort gives it, in words."""
+        return f"the seeds 1 … {effort.search.seeds} over {effort.search.horizon:g} s"
+
+
+STUDY = CapacityStudy(
+    "capacity",
+    "Which demand is served without a growing queue?",
+    fair_grid(RIVALS, ARMS, (0.0,)),
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Search:
-    """How capacity is looked for: `seeds` · log₂(`steps`) runs a case.
-
-    Attributes:
-        step: demands are multiples of it [veh/h/lane].
-        steps: the highest demand is `steps`·`step`; a power of two.
-        seeds: each with a bisection of its own, the seeds 1 … `seeds`.
-        horizon: of each run [s].
-    """
-
-    step: float = 10.0
-    steps: int = 128
-    seeds: int = 4
-    horizon: float = 3600.0
-
-    def __post_init__(self) -> None:
-        number("step [veh/h]", self.step, above=0)
-        integer("seeds", self.seeds, low=1)
-        number("horizon [s]", self.horizon, above=0)
-        if integer("steps", self.steps, low=2).bit_count() != 1:
-            raise InputError(f"steps must be a power of two, got {self.steps}")
-
-    @classmethod
-    def quick(cls) -> Search:
-        """A smoke test: rough, and of runs too short to mean anything."""
-        return cls(step=200.0, steps=4, seeds=2, horizon=150.0)
-
-
 class Capacity(NamedTuple):
-    """The capacity of a case.
+    """The capacity of a point.
 
     Attributes:
-        case: whose; its density means nothing.
+        series: the controller.
+        arms: of the junction.
         brackets: of each seed, the highest demand served and the lowest that was not
             [veh/h/lane]; 0 where none was served, infinite where all were.
     """
 
-    case: Case
+    series: str
+    arms: int
     brackets: tuple[tuple[float, float], ...]
 
     @property
     def below(self) -> float | None:
-        """What it is below, where the search found no demand that a seed's run serves."""
+        """What it is below, where the search met no demand that a seed's run serves."""
         return max(high for _, high in self.brackets) if self._open(0.0) else None
 
     @property
     def above(self) -> float | None:
-        """What it is above, where the search found no demand that a seed's run does not serve."""
+        """What it is above, where the search met no demand that a seed's run does not serve."""
         return min(low for low, _ in self.brackets) if self._open(math.inf) else None
 
     @property
@@ -89,6 +117,8 @@ class Capacity(NamedTuple):
         Raises:
             InputError: `below` or `above` is all that is known.
         """
+        if self.below is not None or self.above is not None:
+            raise InputError(f"the capacity of {self.series} on {self.arms} arms has no bounds")
         middles = mean_interval(sum(bracket) / 2.0 for bracket in self.brackets)
         rounding = max(high - low for low, high in self.brackets) / 2.0
         return middles._replace(half_width=middles.half_width + rounding)
@@ -107,7 +137,7 @@ class Capacity(NamedTuple):
         return any(end in bracket for bracket in self.brackets)
 
 
-def grows(row: Mapping[str, Any], tolerance: float = TOLERANCE) -> bool:
+def grows(row: Mapping[Any, Any], tolerance: float = TOLERANCE) -> bool:
     """Whether a row of a sweep tells of a queue that grows.
 
     `queue_growth` is between two windows that begin half the horizon apart; half of the demanded
@@ -116,46 +146,22 @@ def grows(row: Mapping[str, Any], tolerance: float = TOLERANCE) -> bool:
     return float(row["queue_growth"]) > tolerance * float(row["trips"]) / 2.0
 
 
-def capacities(
-    cases: Sequence[Case], search: Search, find: Find
-) -> tuple[list[Capacity], list[Case]]:
-    """Bisect for the capacity of every case, all at once: each round asks `find` one list.
-
-    Args:
-        cases: their density is replaced.
-        search: how.
-        find: gives the row of each experiment, by running it or from a store.
-
-    Returns:
-        The capacities, and the cases for which `find` had no row or a failed one.
-    """
-    seeds = range(1, search.seeds + 1)
-    brackets = {(case, seed): (0, search.steps) for case in cases for seed in seeds}
-    lost: set[Case] = set()
-    for _ in range(search.steps.bit_length() - 1):
-        asked = [key for key in brackets if key[0] not in lost]
-        rows = find([_probe(case, seed, brackets[case, seed], search) for case, seed in asked])
-        for key, row in zip(asked, rows, strict=True):
-            if row is None or row.get("error"):
-                lost.add(key[0])
-                continue
-            low, high = brackets[key]
-            middle = (low + high) // 2
-            brackets[key] = (low, middle) if grows(row) else (middle, high)
-    found = [
-        Capacity(case, tuple(_ends(brackets[case, seed], search) for seed in seeds))
-        for case in cases
-        if case not in lost
-    ]
-    return found, [case for case in cases if case in lost]
+def capacities(results: Results) -> list[Capacity]:
+    """The capacity of every point whose search ran to its end, from the rows of the study."""
+    search = results.effort.search
+    rows = results.good
+    known = []
+    for point in results.study.points:
+        probes = rows[(rows["series"] == point.series) & (rows["arms"] == point.arms)]
+        if len(probes) == search.seeds * search.rounds:
+            brackets = tuple(_bracket(each) for _, each in probes.groupby("seed"))
+            known.append(Capacity(point.series, point.arms, brackets))
+    return known
 
 
-def _ends(bracket: tuple[int, int], search: Search) -> tuple[float, float]:
-    """A bracket as demands [veh/h/lane]; the highest step is never tried."""
-    low, high = bracket
-    return low * search.step, math.inf if high == search.steps else high * search.step
-
-
-def _probe(case: Case, seed: int, bracket: tuple[int, int], search: Search) -> Experiment:
-    density = sum(bracket) // 2 * search.step
-    return case._replace(density=density).experiment(seed, search.horizon)
+def _bracket(rows: pd.DataFrame) -> tuple[float, float]:
+    """What the rows of one seed's bisection leave: a bisection never serves above what grew."""
+    demands = {True: [math.inf], False: [0.0]}
+    for row in rows.to_dict("records"):
+        demands[grows(row)].append(float(row["density"]))
+    return max(demands[False]), min(demands[True])

@@ -1,4 +1,4 @@
-"""How evenly a controller spreads waiting over the lanes."""
+"""How evenly a rule of priority spreads waiting over the lanes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,21 @@ from typing import TYPE_CHECKING
 
 from minisim.errors import InputError, numbers
 from minisim.junction.geometry import ARM_NAMES
+from scenarios.paper import DENSITIES
+from scenarios.studies.shared.points import fair_grid
+from scenarios.studies.shared.study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Rules of priority that need no communication.
+PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
+
+STUDY = Study(
+    "fairness",
+    "Which lanes wait under which rule of priority?",
+    fair_grid(PRIORITIES, (4,), DENSITIES),
+)
 
 #: Column of a sweep that holds a lane's mean waiting time, the complete form: what the vehicles
 #: still on the road have waited counts, or a starved lane would look served.
@@ -22,7 +34,7 @@ LANE_TRIPS = "lanes_{}_trips"
 def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
     """Gini's coefficient Σᵢⱼ wᵢwⱼ|xᵢ − xⱼ| / (2 Σwᵢ Σwᵢxᵢ) (Gini 1912, mean difference form).
 
-    0 where all are equal, 1 − 1/n where one of n has everything; 0 where nobody has anything.
+    0 where all are equal, or all are 0; 1 − 1/n where one of n has everything.
 
     Args:
         values: ≥ 0.
@@ -48,13 +60,11 @@ def lane_waits(rows: pd.DataFrame, arms: int) -> pd.DataFrame:
 
     The lanes' means are weighted by their trips. Rows of failed runs are left out.
     """
-    found = rows[rows["error"].isna()].copy()
+    good = rows[rows["error"].isna()]
     lanes = ARM_NAMES[:arms]
-    waits = found[[LANE_WAIT.format(lane) for lane in lanes]].astype(float).fillna(0.0)
-    trips = found[[LANE_TRIPS.format(lane) for lane in lanes]].astype(float)
-    found["worst_lane_s"] = waits.max(axis=1)
-    found["gini"] = [
-        gini(wait, trip)
-        for wait, trip in zip(waits.to_numpy().tolist(), trips.to_numpy().tolist(), strict=True)
-    ]
-    return found
+    waits = good[[LANE_WAIT.format(lane) for lane in lanes]].astype(float).fillna(0.0)
+    trips = good[[LANE_TRIPS.format(lane) for lane in lanes]].astype(float)
+    return good.assign(
+        worst_lane_s=waits.max(axis=1),
+        gini=[*map(gini, waits.to_numpy().tolist(), trips.to_numpy().tolist())],
+    )

@@ -11,12 +11,12 @@ from contextlib import contextmanager
 from typing import Any
 
 from minisim.errors import InputError, MissingExtraError, instance
-from scenarios.sweep.experiment import results_version
+from scenarios.sweep.keys import results_version
 
 #: Of a scheduler; the protocols are Dask's.
 ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,9})", re.ASCII)
 
-#: How long a scheduler, and then its first worker, is waited for [s].
+#: How long to wait for a scheduler, and then for its first worker [s].
 PATIENCE = 5.0
 
 
@@ -24,8 +24,8 @@ PATIENCE = 5.0
 def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     """An executor on the cluster of the scheduler at `address`, such as tcp://10.0.0.1:8786.
 
-    Dask itself runs again, on other workers, what a lost worker had; a run that has lost three of
-    them is given up. The workers need the same version of minisim.
+    Dask runs the tasks of a lost worker again on others, and gives up a run that has cost three
+    workers. The workers need the same version of minisim.
 
     Raises:
         MissingExtraError: without the extra `dask`.
@@ -38,8 +38,7 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         raise MissingExtraError(
             "--scheduler needs the package distributed: pip install 'minisim[dask]'"
         ) from None
-    # What it reports of lost connections is told by the sweep, in one line. Each of its loggers has
-    # a level of its own.
+    # The sweep itself reports a lost connection in one line. Each logger has a level of its own.
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -54,7 +53,7 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
 
 
 def _check_address(address: str) -> None:
-    """Dask would hang in clearing up what it began with an address that is none."""
+    """Refuse what is no address: Dask would hang while it cleans up."""
     instance("scheduler", address, str)
     form = ADDRESS.fullmatch(address)
     if form is None:

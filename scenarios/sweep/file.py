@@ -24,7 +24,7 @@ import os
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -39,14 +39,16 @@ from minisim.errors import (
     choice,
     instance,
     integer,
-    number,
     show,
 )
+from minisim.hosting import ON_COLLISION
+from minisim.results.metrics import named_metrics
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
-from scenarios.mixing import with_humans
-from scenarios.scenario import Scenario, parse_split, profile_named
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
+from scenarios.scenario import Profile, Scenario, profile_named
+from scenarios.sweep.keys import key_of
+from scenarios.sweep.rows import identity_of
 
 #: More is surely a typing error.
 MAX_EXPERIMENTS = 1_000_000
@@ -66,10 +68,16 @@ AXES: dict[str, Any] = {
     "seeds": 10,
 }
 #: What holds for a whole block.
-SINGLE: dict[str, Any] = {"horizon": 3600.0, "min_headway": 1.5, "on_collision": "stop"}
+SINGLE: dict[str, Any] = {
+    "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+    "metrics": (),
+}  # fmt: skip
 
 #: What recorded arrivals replace.
 DRAWN = ("density", "split", "turns", "model", "min_headway")
+
+#: Shares, written "4:3:2:1" or [4, 3, 2, 1]; of several, either way, every one is run.
+SHARES = ("split", "turns")
 
 #: A junction of one's own.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
@@ -80,7 +88,7 @@ JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_l
 
 def read_experiments(
     path: str | os.PathLike[str], *, seeds: int | None = None, horizon: float | None = None
-) -> list[Experiment]:
+) -> list[Recipe]:
     """The experiments of a file, each once; `seeds` and `horizon` replace what it says of them.
 
     Raises:
@@ -98,7 +106,7 @@ def read_experiments(
         _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
         if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
             raise InputError("experiments are written [[experiment]], with two brackets")
-    found: dict[str, Experiment] = {}
+    found: dict[str, Recipe] = {}
     for number_, block in enumerate(blocks, start=1):
         with _at(f"{place}: [[experiment]] {number_}" if len(blocks) > 1 else place):
             _check_keys("key", block, [*AXES, *SINGLE])
@@ -109,13 +117,13 @@ def read_experiments(
                 )
             merged = {**table, **block, **overrides}
             for experiment in _block(merged, Path(path).parent):
-                found.setdefault(experiment.key, experiment)
+                found.setdefault(key_of(experiment), experiment)
     with _at(place):
         _check_names(found.values())
     return list(found.values())
 
 
-def check_can_run(experiments: Iterable[Experiment]) -> None:
+def check_can_run(experiments: Iterable[Recipe]) -> None:
     """Start every controller at every site once, since most that cannot work says so there.
 
     Raises:
@@ -123,14 +131,14 @@ def check_can_run(experiments: Iterable[Experiment]) -> None:
     """
     tried: set[tuple[str, ...]] = set()
     for experiment in experiments:
-        what = experiment.identity()
+        what = identity_of(experiment)
         del what["seed"]
         cell = tuple(map(str, what.values()))
         if cell in tried:
             continue
         tried.add(cell)
         try:
-            experiment.controller.start(experiment.scenario.site(experiment.seed))
+            experiment.driven.start(experiment.scenario.site(experiment.seed))
         except MinisimError as error:
             raise InputError(
                 f"{experiment.name} cannot serve {what['scenario']} at {what['density']:g} "
@@ -149,7 +157,7 @@ def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise FileError(f"cannot read experiments from {os.fspath(path)}: {reason}") from error
 
 
-def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
+def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     """Every combination of a block."""
     if "arrivals" in block:
         clash = [key for key in DRAWN if key in block]
@@ -161,17 +169,19 @@ def _block(block: Mapping[str, Any], folder: Path) -> Iterator[Experiment]:
     if count > MAX_EXPERIMENTS:
         raise InputError(f"{count} experiments are more than {MAX_EXPERIMENTS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
+    choice("on_collision", single["on_collision"], ON_COLLISION)
+    metrics = named_metrics(single["metrics"])
     seeds, controllers, shares = (axes.pop(key) for key in ("seeds", "controller", "humans"))
     for values in product(*axes.values()):
         chosen = dict(zip(axes, values, strict=True))
         scenario = _scenario(chosen, single, folder)
         for given, share in product(controllers, shares):
             with _at("controller"):
-                controller, label = _controller(given, scenario.profile.name)
-            with _at("humans"):
-                controller = with_humans(controller, share)
+                controller, label = _controller(given, scenario.profile)
             for seed in seeds:
-                yield Experiment(scenario, controller, seed, label, single["on_collision"])
+                yield Recipe(
+                    scenario, controller, seed, share, label, single["on_collision"], metrics
+                )
 
 
 def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path) -> Scenario:
@@ -191,9 +201,10 @@ def _scenario(chosen: Mapping[str, Any], single: Mapping[str, Any], folder: Path
         model=_text("model", chosen["model"]),
         min_headway=single["min_headway"],
         density=chosen["density"],
-        split=_shares("split", chosen["split"], "balanced"),
-        turns=_shares("turns", chosen["turns"], "uniform"),
-        horizon=number("horizon [s]", single["horizon"], above=0),
+        split=chosen["split"],
+        turns=chosen["turns"],
+        horizon=single["horizon"],
+        warmup=single["warmup"],
     )
     return replace(
         made, name=label or made.name, recorded=_recorded(chosen["arrivals"], folder, made)
@@ -206,36 +217,12 @@ def _recorded(file: object, folder: Path, scenario: Scenario) -> Arrivals | None
     return read_arrivals(folder / _text("arrivals", file), scenario.intersection.n)
 
 
-def _controller(given: object, profile: str) -> tuple[Controller, str]:
+def _controller(given: object, profile: Profile) -> tuple[Controller, str]:
     """The controller that an entry describes, and its label."""
-    parameters = _table(given)
-    name, label = parameters.pop("name"), parameters.pop("label", "")
+    table = _table(given)
+    label = table.pop("label", "")
     instance("label", label, str)
-    recipe = controller_named(name, profile)
-    return _replaced(recipe, parameters, str(name)), label
-
-
-def _replaced(recipe: Any, parameters: Mapping[str, Any], name: str) -> Any:
-    """The recipe with other parameters; a table replaces some of a nested recipe's."""
-    if not parameters:
-        return recipe
-    known = [f.name for f in fields(recipe) if f.init] if is_dataclass(recipe) else []
-    _check_keys(f"parameter of {name}", parameters, known)
-    values = {}
-    for key, value in parameters.items():
-        now = getattr(recipe, key)
-        if isinstance(value, dict) and is_dataclass(now):
-            values[key] = _replaced(now, value, f"{name}.{key}")
-        else:
-            values[key] = _frozen(value)
-    try:
-        return replace(recipe, **values)
-    except TypeError as error:
-        raise InputError(f"{name} does not take {show(dict(parameters))}: {error}") from error
-
-
-def _frozen(value: Any) -> Any:
-    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+    return controller_named(table, profile), label
 
 
 def _table(given: object) -> dict[str, Any]:
@@ -250,10 +237,16 @@ def _table(given: object) -> dict[str, Any]:
 
 
 def _listed(key: str, value: object) -> list[Any]:
-    values = value if isinstance(value, list) else [value]
+    one = key in SHARES and isinstance(value, list) and not any(map(_is_many, value))
+    values = [value] if one or not isinstance(value, list) else value
     if not values:
         raise InputError(f"{key} is an empty list; leave it out, or list something")
     return values
+
+
+def _is_many(value: object) -> bool:
+    """Whether it is shares of its own, and no single one."""
+    return isinstance(value, (str, list))
 
 
 def _seeds(value: object) -> list[int]:
@@ -266,16 +259,9 @@ def _seeds(value: object) -> list[int]:
     return list(range(1, count + 1))
 
 
-def _shares(key: str, value: object, equal: str) -> Any:
-    """Shares are written "4:3:2:1"; equal ones have a name."""
-    with _at(key):
-        return None if value == equal else parse_split(_text(key, value, such_as="4:3:2:1"))
-
-
-def _text(key: str, value: object, such_as: str = "") -> str:
+def _text(key: str, value: object) -> str:
     if not isinstance(value, str):
-        example = f' such as "{such_as}"' if such_as else ""
-        raise InputError(f"{key} must be a text{example}, got {show(value)}")
+        raise InputError(f"{key} must be a text, got {show(value)}")
     return value
 
 
@@ -285,11 +271,11 @@ def _check_keys(what: str, table: Mapping[str, Any], known: Iterable[str]) -> No
         choice(what, key, allowed)
 
 
-def _check_names(experiments: Iterable[Experiment]) -> None:
+def _check_names(experiments: Iterable[Recipe]) -> None:
     """Rows of different experiments must be told apart by what they say of themselves."""
     seen: set[tuple[str, ...]] = set()
     for experiment in experiments:
-        what = experiment.identity()
+        what = identity_of(experiment)
         row = tuple(map(str, what.values()))
         if row in seen:
             raise InputError(

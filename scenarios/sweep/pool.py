@@ -1,4 +1,8 @@
-"""Many runs at once: over processes of our own or a caller's executor, whatever dies meanwhile."""
+"""Many runs at once, in processes of our own or in a caller's executor; processes may die.
+
+The pools of loky and pebble do not replace this one: with both, a busy worker outlives a killed
+parent, loky loses all runs to one dead worker, and pebble's pool is no `Executor`.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +29,10 @@ from typing import TypeVar
 from minisim.errors import integer
 from scenarios.termination import Terminated, raise_terminated
 
-#: Runs that a pool of ours has in hand, per worker: one that runs and one that is next.
+#: Runs that a pool of ours has in hand per worker: one that runs and the next one.
 IN_HAND = 2
 
-#: How often a worker that must end is told so, once a second, before it is ended by force.
+#: How often a worker is asked to end, once a second, before it is ended by force.
 PATIENCE = 10
 
 Task = TypeVar("Task")
@@ -45,14 +49,14 @@ def workers(jobs: int) -> Executor:
 
 
 def processes(jobs: int) -> Executor:
-    """An executor of `jobs` processes, also where that is one: `pooled` can end them at once."""
+    """An executor of `jobs` processes, even of one; `pooled` can end them at once."""
     return _Processes(integer("jobs", jobs, low=1, high=1024))
 
 
 def given(
     function: Callable[[Task], Answer], todo: Mapping[int, Task], executor: Executor
 ) -> Results[Answer]:
-    """Run in a caller's executor: everything is handed over at once."""
+    """Run in a caller's executor, which gets all tasks at once."""
     left = set(todo)
     reason: BaseException = BrokenExecutor("the executor takes no runs")
     running: dict[int, Future[Answer]] = {}
@@ -79,9 +83,8 @@ def pooled(
 ) -> Results[Answer]:
     """Run in pools of our own; close the generator to give up.
 
-    When a worker dies, its pool is lost with all runs in hand, and nobody can tell which of them
-    it was. They are then tried once more, one at a time, which tells; the others go on in a fresh
-    pool.
+    When a worker dies, its pool is lost with all runs in hand, and it is not known which of them
+    killed it. Each of them is tried again alone. The rest goes on in a fresh pool.
 
     Args:
         function: runs a task; both go to another process.
@@ -112,7 +115,7 @@ def pooled(
 
 @contextmanager
 def _until_given_up(pool: Executor) -> Iterator[Executor]:
-    """A pool for the block; an exception ends what it has in hand, where processes have it."""
+    """A pool for the block; an exception ends its processes at once, and what they run."""
     with pool:
         try:
             yield pool
@@ -131,7 +134,7 @@ def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -
 
 
 class _Processes(ProcessPoolExecutor):
-    """Spawned processes: forking beside the threads of a progress bar can hang.
+    """Spawned processes, since forking beside the threads of a progress bar can hang.
 
     They end when their parent has gone or lets go of them.
     """
@@ -146,14 +149,14 @@ class _Processes(ProcessPoolExecutor):
 
 
 def _begin_worker(leash: Connection) -> None:
-    # Ctrl-C reaches every process of the terminal; the answer of the parent is enough.
+    # Ctrl-C reaches every process of the terminal; it is the parent that answers it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
     signal.signal(signal.SIGTERM, raise_terminated)
 
 
 def _end_with(leash: Connection) -> None:
-    """End when the parent does not hold the other end any more: a killed one tells nothing."""
+    """End when the parent no longer holds the other end, as when it was killed."""
     try:
         leash.recv_bytes()
     except (EOFError, OSError):
@@ -166,7 +169,7 @@ def _end_with(leash: Connection) -> None:
 
 
 def _ending(function: Callable[[Task], Answer], task: Task) -> Answer:
-    """Run a task. A pool would take `Terminated` for its result, and the worker go on."""
+    """Run a task; `Terminated` ends the worker, where a pool would take it for the result."""
     try:
         return function(task)
     except Terminated as end:
@@ -182,12 +185,11 @@ def _results(
 ) -> Iterator[tuple[int, Answer | BaseException]]:
     """Results as they come, with at most `in_hand` runs handed over at a time.
 
-    Ends early when the executor breaks: with at least one `BrokenExecutor`, and one for each run
-    that it had. `running` is empty at first and always holds what is handed over.
+    It ends early when the executor breaks, after at least one `BrokenExecutor` and one for each
+    run in hand. `running` is empty at first and always holds what is handed over.
     """
     done: SimpleQueue[int] = SimpleQueue()
-    # Since what is done leaves `todo` of the caller.
-    waiting = iter(list(todo.items()))
+    waiting = iter(list(todo.items()))  # the caller takes from `todo` what is done
     broken = False
 
     def hand_over(count: int) -> Iterator[tuple[int, BaseException]]:
@@ -197,7 +199,7 @@ def _results(
             except BrokenExecutor as error:
                 yield k, error
                 return
-            # k=k keeps this k, not the loop's last; mypy cannot infer such a default.
+            # k=k keeps this k and not the loop's last; mypy cannot infer such a default.
             running[k].add_done_callback(lambda _, k=k: done.put(k))  # type: ignore[misc]
 
     for refused in hand_over(in_hand):
@@ -208,7 +210,7 @@ def _results(
         result = _result(running.pop(k))
         broken = broken or isinstance(result, BrokenExecutor)
         if not broken:
-            # Before the row is stored, so that no worker waits for the disk.
+            # Before the caller stores the result, so that no worker waits for the disk.
             for refused in hand_over(1):
                 broken = True
                 yield refused
@@ -216,7 +218,7 @@ def _results(
 
 
 def _result(future: Future[Answer]) -> Answer | BaseException:
-    """What a finished run left, whatever ended it."""
+    """What a finished run returned or raised."""
     if future.cancelled():
         return CancelledError("the executor gave the run up")
     return future.exception() or future.result()
@@ -224,7 +226,7 @@ def _result(future: Future[Answer]) -> Answer | BaseException:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Put Ctrl-C off, and keep it from processes that are started meanwhile."""
+    """Delay Ctrl-C, and keep it from processes that are started meanwhile."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

@@ -11,8 +11,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, instance, integer
-from scenarios.sweep.experiment import Experiment, Row, failed, run_experiment
+from minisim.results.metrics import Metric, asked_metrics
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import given, handed, pooled
+from scenarios.sweep.rows import Row, failed, outcome_of
 from scenarios.sweep.store import Store
 
 if TYPE_CHECKING:
@@ -25,12 +28,13 @@ Progress = Callable[[int, int], None]
 
 
 def sweep(
-    experiments: Iterable[Experiment],
+    experiments: Iterable[Recipe],
     executor: Executor | None = None,
     progress: Progress | None = None,
     *,
     jobs: int | None = None,
     store: Store | None = None,
+    metrics: Iterable[str | Metric] = (),
 ) -> pd.DataFrame:
     """Run all experiments and return one row each, in their order.
 
@@ -46,22 +50,27 @@ def sweep(
         progress: called with the runs done and their number, in this process.
         jobs: processes of the pool, one a core unless told; 1 runs in this process.
         store: rows go there as they come, and those that it holds are not computed again.
+        metrics: columns besides the usual: names of `minisim.results.metrics.METRICS`, or
+            `Metric`s of your own. With several processes, the function of an own one must be in
+            a module that they can import.
 
     Returns:
-        What was run (`Experiment.identity`), the keys of `Run.summary()`, nested ones joined by
-        "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth` and `growing`
-        (`scenarios.statistics`, which says when it means nothing), `arrivals` (alike for common
-        arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
+        What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
+        ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
+        (`scenarios.statistics.growing`, which says when it means nothing), `arrivals` (alike for
+        common arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did
+        not.
 
     Raises:
-        InputError: something other than an `Experiment` or a `Store`, or jobs beside an executor.
+        InputError: something other than a `Recipe` or a `Store`, or jobs beside an executor.
         FileError: the store cannot be written; what it has stays.
         ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died;
             what was done is in the store. Without a store, their rows have it as an error.
     """
     import pandas as pd
 
-    todo = list(experiments)
+    added = asked_metrics(metrics)
+    todo = [with_metrics(experiment, added) for experiment in experiments]
     rows: dict[int, Row] = {}
     with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
         for k, row in results:
@@ -71,8 +80,14 @@ def sweep(
     return pd.DataFrame([rows[k] for k in range(len(todo))])
 
 
+def with_metrics(recipe: Recipe, metrics: Iterable[str | Metric]) -> Recipe:
+    """The recipe with more metrics; raises `InputError` as it does."""
+    instance("experiment", recipe, Recipe)
+    return replace(recipe, metrics=(*recipe.metrics, *metrics))
+
+
 def finished(
-    experiments: Iterable[Experiment],
+    experiments: Iterable[Recipe],
     executor: Executor | None = None,
     *,
     jobs: int | None = None,
@@ -84,7 +99,7 @@ def finished(
     """
     todo = list(experiments)
     for experiment in todo:
-        instance("experiment", experiment, Experiment)
+        instance("experiment", experiment, Recipe)
     if jobs is None:
         jobs = os.cpu_count() or 1
     integer("jobs", jobs, low=1, high=1024)
@@ -92,18 +107,16 @@ def finished(
         instance("store (open it with `Store(path)`)", store, Store)
     missing = dict(enumerate(todo))
     if store is not None:
-        keys = [experiment.key for experiment in todo]
+        keys = [key_of(experiment) for experiment in todo]
         valid = store.valid(keys)
         for k, key in enumerate(keys):
             if key in valid:
                 del missing[k]
                 yield k, valid[key]
     if executor is None:
-        results = pooled(
-            run_experiment, missing, jobs, begin=partial(_warm, list(missing.values()))
-        )
+        results = pooled(outcome_of, missing, jobs, begin=partial(_warm, list(missing.values())))
     else:
-        results = given(run_experiment, missing, executor)
+        results = given(outcome_of, missing, executor)
     lost = 0
     with closing(results):
         for k, result in results:
@@ -122,17 +135,17 @@ def finished(
         )
 
 
-def _warm(experiments: Iterable[Experiment], pool: Executor) -> None:
+def _warm(experiments: Iterable[Recipe], pool: Executor) -> None:
     """Compile once for all processes: one of them compiles to disk before the others start.
 
-    Without it, every process of a fresh installation would compile for itself, at the same time.
+    Otherwise every process of a fresh installation would compile for itself, all at the same time.
     What is compiled depends on the vehicle. A run that fails here will tell why when its turn
     comes.
     """
     for experiment in {type(e.scenario.profile.vehicle): e for e in experiments}.values():
-        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt)
+        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt, warmup=0.0)
         try:
-            tried = handed(pool, run_experiment, replace(experiment, scenario=scenario))
+            tried = handed(pool, outcome_of, replace(experiment, scenario=scenario))
         except BrokenExecutor:
             return
         tried.exception()

@@ -1,11 +1,11 @@
 """Results on disk: one SQLite file, one row a run.
 
-Every run is a transaction of its own, written ahead (WAL) and forced to the disk, so whatever
-kills a sweep, what it had stored before is there. Several processes may write at once: each waits
-for the other's transaction, and what two of them computed is one row.
+Every run is a transaction of its own, written ahead (WAL) and forced to the disk. Whatever kills a
+sweep, the rows stored before are there. Several processes may write at once: each waits for the
+other's transaction, and a run that two of them computed is one row.
 
-A row belongs to an experiment by its key and is valid while the version of the results is. SQLite
-needs a local disk: network file systems do not lock files as it must.
+A key connects a row with its experiment; the row is valid while the version of the results is the
+same. SQLite needs a local disk, since network file systems do not lock files reliably.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from minisim.errors import FileError, instance, show
-from scenarios.sweep.experiment import Experiment, Outcome, Row, key_of, results_version
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import description_of, digest_of, results_version
+from scenarios.sweep.rows import Outcome, Row
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 APPLICATION = 0x44494D73
 SCHEMA = 1
 
-#: How long a transaction of another process is waited for [s], and on opening: who has a store for
-#: longer than some milliseconds is no sweep.
+#: How long to wait for a transaction of another process [s], and on opening: a sweep holds a store
+#: for some milliseconds only.
 PATIENCE = 30.0
 OPENING = 3.0
 
@@ -67,8 +68,8 @@ class Store:
         create: whether it may be made.
 
     Raises:
-        FileError: no such file, no store, one of another layout, or a damaged one; it stays as it
-            was.
+        FileError: no such file, not a store, one of another layout, or a damaged one. The file
+            stays as it was.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, create: bool = True) -> None:
@@ -88,20 +89,20 @@ class Store:
             self._database.close()
             raise
 
-    def put(self, experiment: Experiment, outcome: Outcome) -> None:
-        """Store an outcome, in place of what was known of the experiment.
+    def put(self, recipe: Recipe, outcome: Outcome) -> None:
+        """Store an outcome, in place of an earlier one of the same recipe.
 
         Raises:
-            FileError: the disk is full, another process does not let go, …; what was stored stays.
-            InputError: an experiment that cannot be described (`canonical`).
+            FileError: the disk is full, another process holds the store, …; stored rows stay.
+            InputError: a recipe that cannot be described (`canonical`).
         """
-        description = experiment.description
+        description = description_of(recipe)
         row = outcome.row
         with self._guarded("write"):
             self._database.execute(
                 "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?)",
                 (
-                    key_of(description),
+                    digest_of(description),
                     row["version"],
                     row["error"],
                     description,
@@ -111,14 +112,14 @@ class Store:
             )
 
     def valid(self, keys: Iterable[str]) -> dict[str, Row]:
-        """The rows of these keys that need not be computed: no failure, no older result."""
+        """The rows of these keys that need not be computed again: not failed, not outdated."""
         wanted = set(keys)
         with self._guarded("read"):
-            found = self._database.execute(
+            rows = self._database.execute(
                 "SELECT key, row FROM runs WHERE error IS NULL AND version = ?",
                 (results_version(),),
             )
-            return {key: self._row(row) for key, row in found if key in wanted}
+            return {key: self._row(row) for key, row in rows if key in wanted}
 
     def __len__(self) -> int:
         with self._guarded("read"):
@@ -126,7 +127,7 @@ class Store:
         return int(count)
 
     def frame(self) -> pd.DataFrame:
-        """All rows with the columns of `sweep`, ordered by what was run."""
+        """All rows with the columns of `sweep`, sorted by `ORDER`."""
         import pandas as pd
 
         with self._guarded("read"):
@@ -135,23 +136,18 @@ class Store:
         return frame.sort_values(list(ORDER), ignore_index=True) if rows else frame
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._database.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _prepare(self, fresh: bool) -> None:
         if fresh:
-            # In the roll-back journal, which makes the header part of the transaction.
+            # Before WAL is on: a roll-back journal makes the header part of the transaction.
             self._database.executescript(_CREATE)
         columns = tuple(name for _, name, *_ in self._database.execute("PRAGMA table_info(runs)"))
         if columns != COLUMNS:
@@ -184,9 +180,9 @@ class Store:
 
 
 def _is_fresh(path: Path) -> bool:
-    """Whether the store is still to be made; raises `FileError` for a file that is none.
+    """Whether the store is still to be made; raises `FileError` for a file that is not a store.
 
-    Asked of the bytes, not of SQLite, which would begin to repair what is not ours.
+    It reads the bytes itself, since SQLite would begin to repair a file that is not ours.
     """
     try:
         if not path.parent.is_dir():

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from scenarios import four_way
 from scenarios.controllers import controller_named
-from scenarios.sweep import Experiment, sweep
+from scenarios.recipe import Recipe
+from scenarios.sweep import sweep
 from scenarios.sweep.pool import workers
 from scenarios.sweep.store import Store
 
@@ -23,10 +24,8 @@ RUNS, HOURS = 40, 4
 def main() -> None:
     """Print both wall times and their ratio."""
     todo = [
-        Experiment(
-            four_way(350, profile="fair", horizon=HOURS * 3600.0), controller_named(name), seed
-        )
-        for name in ("dim-harmonious", "fixed-time")
+        Recipe(four_way(350, profile="fair", horizon=HOURS * 3600.0), controller_named(name), seed)
+        for name in ("dim:gate=harmonious", "fixed-time")
         for seed in range(RUNS // 2)
     ]
     print(f"{RUNS} runs of {HOURS} simulated hours; load before: {os.getloadavg()[0]:.1f}")
@@ -34,7 +33,7 @@ def main() -> None:
     print(f"one worker {one:.1f} s, two workers {two:.1f} s: {one / two:.2f} times")
 
 
-def _seconds(todo: list[Experiment], count: int) -> float:
+def _seconds(todo: list[Recipe], count: int) -> float:
     with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "s.db") as store:
         began = time.perf_counter()
         if count == 1:

@@ -1,14 +1,14 @@
-"""The controller in CONTRIBUTING.md is complete and keeps the contract."""
+"""The examples in CONTRIBUTING.md are complete: a controller that keeps the contract, a metric."""
 
 from __future__ import annotations
 
 import importlib.util
-import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -19,14 +19,16 @@ from minisim.errors import InputError
 from minisim.junction.geometry import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
-from scenarios.sweep import Experiment
+from scenarios.recipe import Recipe
+from scenarios.sweep.keys import description_of, key_of
 
 GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
 
 
-def example() -> str:
-    (block,) = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
-    return str(block)
+def example(chapter: str = "Add a controller") -> str:
+    """The first block of Python in a chapter."""
+    text = GUIDE.read_text(encoding="utf-8").split(f"## {chapter}\n")[1]
+    return text.split("```python\n")[1].split("```")[0]
 
 
 def loaded(text: str, folder: Path) -> ModuleType:
@@ -67,7 +69,7 @@ def test_it_checks_its_values(module: ModuleType) -> None:
 
 
 def key(controller: Controller) -> str:
-    return Experiment(four_way(), controller, 1).key
+    return key_of(Recipe(four_way(), controller, 1))
 
 
 def test_a_changed_rule_is_another_experiment(
@@ -78,7 +80,7 @@ def test_a_changed_rule_is_another_experiment(
     other = loaded(example().replace("nearest = min(", "nearest = max("), tmp_path)
     assert key(module.OneAtATime()) == before != key(other.OneAtATime())
     assert key(Dim()) == key(replace(Dim()))
-    assert "code" not in Experiment(four_way(), Dim(), 1).description, "RESULTS says it"
+    assert "code" not in description_of(Recipe(four_way(), Dim(), 1)), "RESULTS says it"
 
 
 def test_a_version_of_ones_own_tells_rules_apart(module: ModuleType) -> None:
@@ -89,7 +91,7 @@ def test_a_version_of_ones_own_tells_rules_apart(module: ModuleType) -> None:
         return made
 
     assert key(named(version=1)) == key(named(version=1)) != key(named(version=2))
-    with pytest.raises(InputError, match="give the class a text or an integer `version`"):
+    with pytest.raises(InputError, match="give it a text or an integer `version`"):
         key(named())
 
 
@@ -110,3 +112,12 @@ def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
     counts = rows[inside].groupby("time_s")["vehicle"].nunique()
     assert len(counts) > 100
     assert counts.max() == 1
+
+
+def test_its_metric_is_measured() -> None:
+    made: dict[str, Any] = {}
+    exec(example("Add a metric"), made)
+    run = minisim.simulate(four_way(300, horizon=120.0), Dim(), 1)
+    complete = run.summary(metrics=[made["delay"]])["complete"]
+    expected = float((run.columns.time_loss + run.columns.depart_delay).mean())
+    assert complete["delay_s"] == pytest.approx(expected)

@@ -19,9 +19,10 @@ from dim import Dim
 from minisim.errors import ExecutorError, InputError
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.sweep import Experiment, sweep
+from scenarios.recipe import Recipe
+from scenarios.sweep import sweep
 from scenarios.sweep.cluster import cluster
-from scenarios.sweep.experiment import MEASURED
+from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
 
@@ -42,7 +43,7 @@ def start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
 
 
 def worker(address: str) -> subprocess.Popen[bytes]:
-    """A worker of one thread; without a nanny, so that who is killed stays dead."""
+    """A worker of one thread; without a nanny, so that a killed one stays dead."""
     return start(
         "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
         "--memory-limit", "0",
@@ -79,8 +80,8 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def experiments(count: int, horizon: float = 120.0) -> list[Experiment]:
-    return [Experiment(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
+def experiments(count: int, horizon: float = 120.0) -> list[Recipe]:
+    return [Recipe(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
 
 
 def repeatable(rows: pd.DataFrame) -> pd.DataFrame:

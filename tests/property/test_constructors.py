@@ -26,8 +26,8 @@ from minisim.junction.geometry import Intersection
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
-from scenarios.scenario import FAIR, Profile, Scenario, parse_split, profile_named
-from scenarios.sweep import Experiment
+from scenarios.recipe import Recipe
+from scenarios.scenario import FAIR, Profile, Scenario, profile_named
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)
 FOUR = Intersection(BEARINGS, arm_length=60.0)
@@ -92,7 +92,6 @@ CASES = {
         {"bearings": BEARINGS, "name": "x", **GEOMETRY, **TRAFFIC, **RUN},
     ),
     "profile_named": Case(profile_named, {"name": "fair"}),
-    "parse_split": Case(parse_split, {"text": "4:3:2:1"}),
     "HarmonyMatrix": Case(HarmonyMatrix, {"n": 3, "values": np.zeros((6, 6), dtype=int)}),
     "HarmonyMatrix.paper": Case(HarmonyMatrix.paper, {"n": 4}),
     "HarmonyMatrix.from_geometry": Case(
@@ -123,17 +122,17 @@ CASES = {
     "FixedTime": Case(
         FixedTime,
         {"greens": (5.0, 6.0), "amber": 2.0, "saturation_flow": 1500.0, "lost_time": 2.0,
-         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0, "name": "x"},
+         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0},
     ),
     "Adaptive": Case(
         Adaptive,
         {"detector_range": 100.0, "min_time_loss": 1.0, "min_green": 3.0, "max_green": 50.0,
-         "extend_max_green": True, "amber": 2.0, "name": "x"},
+         "extend_max_green": True, "amber": 2.0},
     ),
     "LongestQueue": Case(
-        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0, "name": "x"}
+        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0}
     ),
-    "AllWayStop": Case(AllWayStop, {"reaction": 1.0, "name": "x"}),
+    "AllWayStop": Case(AllWayStop, {"reaction": 1.0}),
     "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
     "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
     "webster": Case(
@@ -144,8 +143,8 @@ CASES = {
     "webster_delay": Case(
         webster_delay, {"rate": 100.0, "green": 10.0, "cycle": 60.0, "saturation_flow": 1500.0}
     ),
-    "controller_named": Case(controller_named, {"name": "dim", "profile": "fair"}),
-    "Experiment": Case(Experiment, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
+    "controller_named": Case(controller_named, {"spec": "dim", "profile": "fair"}),
+    "Recipe": Case(Recipe, {"scenario": SHORT, "controller": Unregulated(), "seed": 1}),
     "simulate": Case(
         simulate,
         {"scenario": SHORT, "controller": Unregulated(), "seed": 1, "record": None,

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from minisim.results.trips import METRICS
+from minisim.results.metrics import MEANS
 from scenarios.cli import main
 
 
@@ -29,7 +29,7 @@ def test_both_hosts_agree_in_a_short_run(
     printed = capsys.readouterr().out
     assert code == 0
     assert printed.startswith("2 of 2 cells: both hosts agree within the tolerances\n")
-    assert len(table) == 2 * 5 * len(METRICS), "two controllers, four lanes and all"
+    assert len(table) == 2 * 5 * len(MEANS), "two controllers, four lanes and all"
     assert table["error"].isna().all()
     assert (table["seeds"] == 2).all()
     travel = table[(table["metric"] == "travel_time_s") & (table["lane"] == "all")]

@@ -23,7 +23,6 @@ from hypothesis import given
 import minisim
 from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim, Mixed, NoisyPerception
-from dim.senses.tally import Tallied
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
@@ -227,8 +226,8 @@ def test_what_a_session_counts_is_in_the_summary() -> None:
     """The same misread vehicles in both hosts: readings belong to vehicles, not to calls."""
     scenario = small_scenario(4, density=350.0, demand_time=150.0)
     senses = NoisyPerception(0.5, "symmetric")
-    tallied = Tallied(Dim(perception=senses))
-    ours, theirs = (run(scenario, tallied, 1, on_collision="record")
+    dim = Dim(perception=senses)
+    ours, theirs = (run(scenario, dim, 1, on_collision="record")
                     for run in (minisim.simulate, simulate))  # fmt: skip
     assert theirs.counts == {key: theirs.summary()[key] for key in ours.counts}
     assert theirs.counts["crossings"] == pytest.approx(ours.counts["crossings"], abs=2)

@@ -89,7 +89,7 @@ def test_ties_of_the_papers_255_cases() -> None:
     assert analysis.tied == 130
     assert analysis.ties == {1: 125, 2: 88, 3: 36, 4: 6}
     worst = {size: count for size, (_, count) in analysis.worst.items()}
-    assert worst == {1: 4, 2: 2}  # nobody in harmony with anybody, and a ring
+    assert worst == {1: 4, 2: 2}  # no two in harmony, and a ring
 
 
 def test_the_papers_worst_case() -> None:

@@ -14,98 +14,87 @@ from minisim.junction.geometry import ARM_NAMES
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals as ArrivalTable
+    from minisim.results.metrics import Metric
     from scenarios.scenario import Scenario
+
+#: Groups of the options of `minisim run` in its help.
+FILES = "Files"
+SUMO = "SUMO"
 
 ScenarioName = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
-        help="The junction: three-way, four-way, five-way, N-way (such as 6-way), or custom "
-        "with --bearings.",
         show_default=False,
+        help="three-way, four-way, 6-way, … or custom.",
     ),
 ]
 ControllerName = Annotated[
     str,
     typer.Option(
-        "--controller", "-c", metavar="NAME",
-        help="Who decides: dim (the paper's rules; the authors' under the profile as_run), "
-        "dim-harmonious (enter beside crossing vehicles in harmony), dim-lanes, dim-inflow, "
-        "dim-rotating, dim-waiting, dim-lanes-rotating, dim-lanes-waiting, "
-        "dim-paper-commit, dim-monitored (a safety monitor in every vehicle), "
-        "dim-symmetric-0.15 (15 % of intents misread), dim-unsignalled "
-        "(turns without signal at published rates), dim-occlusion (bodies block the view), "
-        "dim-as-run, "
-        "dim-as-run-size, dim-as-run-exit-14, fixed-time, "
-        "fixed-time-equal, adaptive, actuated, all-way-stop, longest-queue, "
-        "v2ic (serving list and speed advice; the published run's under the profile as_run), "
-        "v2ic-as-run, v2ic-as-run-14, reservation (space-time, first come first served), "
-        "unregulated.",
+        "--controller",
+        "-c",
+        metavar="SPEC",
+        show_default=False,
+        help="Who decides: dim, dim:gate=harmonious, …",
     ),
-]  # fmt: skip
+]
 Humans = Annotated[
     float,
-    typer.Option(
-        metavar="SHARE",
-        help="Share of human drivers among the vehicles, 0 … 1: they stop, look, and accept gaps. "
-        "With the controllers of DIM.",
-    ),
-]
-IntentError = Annotated[
-    float,
-    typer.Option(
-        metavar="P",
-        help="Probability that vehicles of DIM misread another's intent, 0 … 1. Collisions are "
-        "then likely: see --on-collision.",
-    ),
-]
-ErrorKind = Annotated[
-    str | None,
-    typer.Option(
-        metavar="missed|symmetric",
-        help="What --intent-error does: miss the signal of a turn (default), or take any manoeuvre "
-        "for each other one alike. Everybody errs alike, for as long as they meet.",
-    ),
+    typer.Option(metavar="SHARE", show_default=False, help="Human drivers among DIM's, 0 … 1."),
 ]
 Density = Annotated[
     float | None,
     typer.Option(
-        "--density", "-d", metavar="VEH/H",
-        help="Mean inflow a lane in vehicles per hour; 350 by default.", show_default=False,
+        "--density",
+        "-d",
+        metavar="VEH/H",
+        show_default=False,
+        help="Mean inflow a lane; 350 unless told.",
     ),
-]  # fmt: skip
+]
 Split = Annotated[
-    str | None,
-    typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …; equal by default."),
+    str | None, typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …")
 ]
-Turns = Annotated[
-    str | None,
-    typer.Option(
-        metavar="1:2:1",
-        help="Shares of the manoeuvres 1, 2, 3, … (the j-th exit clockwise); equal by default.",
-    ),
-]
+Turns = Annotated[str | None, typer.Option(metavar="1:2:1", help="Shares of the exits, clockwise.")]
 ProfileName = Annotated[
     str,
     typer.Option(
-        "--profile", "-p", metavar="NAME",
-        help="Vehicle and speeds: paper (what its text prescribes), fair (one vehicle and "
-        "speed limit for every controller), as_run (what produced the published numbers) or "
-        "as_run_signals (the vehicle of its signals).",
+        "--profile",
+        "-p",
+        metavar="NAME",
+        show_default=False,
+        help="Vehicle and speeds: paper, fair, as_run.",
     ),
-]  # fmt: skip
+]
 Side = Annotated[
-    str, typer.Option(metavar="left|right", help="Side of the road that traffic keeps to.")
+    str,
+    typer.Option(
+        metavar="SIDE",
+        show_default=False,
+        help="Of the traffic: left or right.",
+    ),
 ]
 Bearings = Annotated[
     str | None,
+    typer.Option(metavar="0,90,…", help="Of custom's arms, from north."),
+]
+Seed = Annotated[
+    int,
     typer.Option(
-        metavar="0,80,190,260",
-        help="Bearings of the arms in degrees clockwise from north, at least 30 apart; "
-        "for the scenario custom.",
+        "--seed",
+        "-s",
+        metavar="N",
+        show_default=False,
+        help="Of the random arrivals; 0 unless told.",
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", "-s", help="Of the random arrivals.")]
+Horizon = Annotated[
+    float, typer.Option(metavar="S", show_default=False, help="Simulated time; 3600 unless told.")
+]
+Warmup = Annotated[
+    float, typer.Option(metavar="S", show_default=False, help="Earlier trips do not count.")
+]
 
 
 def _file_name(text: str) -> Path:
@@ -117,34 +106,33 @@ def _file_name(text: str) -> Path:
 Arrivals = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE", parser=_file_name,
-        help="CSV of recorded arrivals (demand_time_s, lane, manoeuvre) to replay instead of "
-        "drawing them.",
+        metavar="FILE",
+        parser=_file_name,
+        rich_help_panel=FILES,
+        help="Replay these: demand_time_s, lane, manoeuvre.",
     ),
-]  # fmt: skip
+]
 Host = Annotated[
     str,
     typer.Option(
-        metavar="minisim|sumo",
-        help="Who moves the vehicles: minisim, or SUMO under the same controller "
-        "(pip install 'minisim\\[sumo]').",
+        metavar="NAME",
+        show_default=False,
+        rich_help_panel=SUMO,
+        help="What moves vehicles: minisim or sumo.",
     ),
 ]
 SumoModel = Annotated[
     str | None,
     typer.Option(
-        metavar="IDM|Krauss|CC",
-        help="SUMO's car-following model; by default the vehicle's own.",
-        show_default=False,
+        metavar="NAME",
+        rich_help_panel=SUMO,
+        help="IDM, Krauss or CC, if not its own.",
     ),
-]  # fmt: skip
-Gui = Annotated[bool, typer.Option("--gui", help="Show the run in sumo-gui.")]
+]
+Gui = Annotated[bool, typer.Option("--gui", rich_help_panel=SUMO, help="Show the run in sumo-gui.")]
 KeepFiles = Annotated[
     Path | None,
-    typer.Option(
-        metavar="DIR",
-        help="Keep SUMO's network, routes, log and trips there, in a new or empty folder.",
-    ),
+    typer.Option(metavar="DIR", rich_help_panel=SUMO, help="Keep SUMO's files in a new folder."),
 ]
 Order = Annotated[
     str,
@@ -156,37 +144,41 @@ Order = Annotated[
 ]
 SumoFcd = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Write SUMO's own floating-car data (XML) of every step."),
+    typer.Option(metavar="FILE", rich_help_panel=SUMO, help="SUMO's own floating-car data (XML)."),
+]
+Metrics = Annotated[
+    str | None,
+    typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
+]
+By = Annotated[
+    str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
+def chosen_metrics(text: str | None) -> tuple[Metric, ...]:
+    """The metrics that an option names; raises `InputError` for an unknown one."""
+    from minisim.results.metrics import asked_metrics
+
+    return asked_metrics([] if text is None else [name.strip() for name in text.split(",")])
+
+
 def build_scenario(
-    name: str,
-    bearings: str | None,
-    arrivals: Path | None = None,
-    density: float | None = None,
-    split: str | None = None,
-    turns: str | None = None,
-    **options: Any,
+    name: str, bearings: str | None, arrivals: Path | None = None, **options: Any
 ) -> Scenario:
-    """The scenario that the options describe; raises `MinisimError` for what they may not be."""
+    """The scenario that the options describe; None stands for an option that was not given.
+
+    Raises:
+        MinisimError: an option that is not allowed.
+    """
     from minisim.arrivals import read_arrivals
     from scenarios.library import scenario_named
 
-    drawn = {"--density": density, "--split": split, "--turns": turns}
-    if arrivals is not None:
-        clash = [option for option, value in drawn.items() if value is not None]
-        if clash:
-            raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
-    made = scenario_named(
-        name,
-        None if bearings is None else _numbers("--bearings", bearings, ",", "0,80,190,260"),
-        density=350.0 if density is None else density,
-        split=None if split is None else _numbers("--split", split, ":", "4:3:2:1"),
-        turns=None if turns is None else _numbers("--turns", turns, ":", "1:2:1"),
-        **options,
-    )
+    given = {key: value for key, value in options.items() if value is not None}
+    clash = [f"--{key}" for key in ("density", "split", "turns") if key in given]
+    if arrivals is not None and clash:
+        raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
+    made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made
     recorded = read_arrivals(arrivals, made.intersection.n)
@@ -211,16 +203,17 @@ def _check_arms(path: Path, recorded: ArrivalTable, n: int) -> None:
         )
 
 
-def _numbers(option: str, text: str, separator: str, example: str) -> tuple[float, ...]:
+def _bearings(text: str) -> tuple[float, ...]:
     values = []
-    for part in text.split(separator):
+    for part in text.split(","):
         try:
             value = float(part)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
             raise InputError(
-                f"{option} is written like {example}, got {text!r}: {part!r} is no finite number"
+                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is no finite "
+                "number"
             )
         values.append(value)
     return tuple(values)

@@ -1,23 +1,76 @@
-"""What was proved, as text for a terminal."""
+"""What the commands about DIM's rules share: junction, option --plot, and answers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from minisim.control import CLEARANCE
+from minisim.files import check_file
 from minisim.junction.geometry import ARM_NAMES
+from scenarios.cli.shared.options import build_scenario
+from scenarios.cli.shared.terminal import show, show_json
 
 if TYPE_CHECKING:
+    from dim import Explanation, HarmonyMatrix
     from dim.proofs.modelcheck import Exploration, Lasso
     from dim.proofs.verification import Analysis
+    from scenarios.scenario import Scenario
+
+
+def _check_figure(path: Path | None) -> Path | None:
+    if path is not None:
+        from figures.style import figure_format
+
+        figure_format(path)
+        check_file(path)
+    return path
+
+
+Plot = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", callback=_check_figure, help="Draw the result (.png, .pdf or .svg)."
+    ),
+]
+
+
+def junction(
+    name: str, bearings: str | None, side: str, profile: str, clearance: float = CLEARANCE
+) -> tuple[Scenario, HarmonyMatrix]:
+    """A scenario and the harmony matrix of its movements; raises `MinisimError`."""
+    from dim import HarmonyMatrix
+
+    scenario = build_scenario(name, bearings, profile=profile, side=side)
+    vehicle = scenario.profile.vehicle
+    return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicle, clearance)
+
+
+def answer(
+    as_json: bool, facts: Mapping[str, Any], *texts: Text | Table, wrote: Path | None = None
+) -> None:
+    """Print the facts as JSON, or else the texts and which file was written."""
+    if as_json:
+        show_json(facts)
+        return
+    show(*texts)
+    if wrote is not None:
+        typer.echo(f"wrote {wrote}")
+
+
+def names(things: Iterable[object]) -> list[str]:
+    """Movements or events as texts."""
+    return list(map(str, things))
 
 
 def claims_table(name: str, analysis: Analysis) -> Table:
-    """Each claim, in how many cases it was tried, and in how many it is false."""
+    """Each claim, with the number of cases in which it was tried, and in which it is false."""
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"{name}, {analysis.n} arms: all {analysis.cases} cases, order {analysis.order}",
@@ -32,7 +85,7 @@ def claims_table(name: str, analysis: Analysis) -> Table:
             claim.statement,
             str(claim.cases),
             Text(str(claim.failures), style="bold green" if claim.holds else "bold red"),
-            "" if claim.example is None else " ".join(map(str, claim.example)),
+            "" if claim.example is None else _spaced(claim.example),
         )
     return table
 
@@ -54,32 +107,32 @@ def analysis_text(analysis: Analysis) -> Text:
     )
     for size, (first, count) in analysis.worst.items():
         cases = "1 case" if count == 1 else f"{count} cases"
-        text.append(f"\n{'':29}of size {size}: {cases}, such as {' '.join(map(str, first))}")
+        text.append(f"\n{'':29}of size {size}: {cases}, such as {_spaced(first)}")
     return text
 
 
-def protocol_text(name: str, found: Exploration, lassos: Sequence[Lasso | None]) -> Text:
-    """Safe, stuck, and who can wait for ever."""
-    rules = found.protocol
+def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]) -> Text:
+    """Whether it is safe and live, and which lanes can wait for ever."""
+    rules = search.protocol
     text = Text.assemble(
         (f"{name}", "bold"),
         f": commit {rules.commit}, gate {rules.gate}, order {rules.order}, "
         f"priorities {rules.priorities}\n",
         ("states       ", "dim"),
-        f"{found.states}, with {found.transitions} transitions",
-        "" if found.complete else " up to the nearest unsafe ones",
+        f"{search.states}, with {search.transitions} transitions",
+        "" if search.complete else " up to the nearest unsafe ones",
     )
     text.append("\nsafe         ", "dim")
-    if found.unsafe:
-        text.append("no", "bold red").append(f": {', '.join(map(str, found.unsafe[0]))}")
-        text.append(f"\n{'':13}({len(found.unsafe)} such paths of {len(found.unsafe[0])} events)")
+    if search.unsafe:
+        text.append("no", "bold red").append(f": {', '.join(map(str, search.unsafe[0]))}")
+        text.append(f"\n{'':13}({len(search.unsafe)} such paths of {len(search.unsafe[0])} events)")
     else:
         text.append("yes", "bold green").append(": movements in conflict are never inside at once")
     text.append("\nlive         ", "dim")
-    if found.stuck is not None:
-        text.append("no", "bold red").append(f": {', '.join(map(str, found.stuck))}")
-    elif found.complete:
-        text.append("yes", "bold green").append(": in every state somebody can go on")
+    if search.stuck is not None:
+        text.append("no", "bold red").append(f": {', '.join(map(str, search.stuck))}")
+    elif search.complete:
+        text.append("yes", "bold green").append(": in every state a vehicle can go on")
     else:
         text.append("not stuck in the states visited")
     for lane, lasso in zip(ARM_NAMES, lassos, strict=False):
@@ -92,3 +145,48 @@ def protocol_text(name: str, found: Exploration, lassos: Sequence[Lasso | None])
                 f"{', '.join(map(str, lasso.cycle))}"
             )
     return text
+
+
+def harmony_table(matrix: HarmonyMatrix) -> Table:
+    """The matrix with one column a lane: ● harmony, · conflict."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("")
+    manoeuvres = range(1, matrix.n)
+    for lane in ARM_NAMES[: matrix.n]:
+        table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
+    for movement, values in zip(matrix.movements, matrix.values, strict=True):
+        cells = [Text(str(movement), style="bold")]
+        for first in range(0, len(values), matrix.n - 1):
+            part = values[first:].tolist()
+            cells.append(Text("").join(map(_mark, part, manoeuvres)))
+        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
+    return table
+
+
+def decision_text(explanation: Explanation) -> Text:
+    """The graph, its cliques, which vehicles go, and why."""
+    text = Text()
+    edges = "  ".join(f"{a}–{b}" for a, b in explanation.edges) or "none"
+    text.append("vehicles         ", "dim").append(_spaced(explanation.participants) + "\n")
+    text.append("in harmony       ", "dim").append(edges + "\n")
+    tied = len(explanation.tied) > 1
+    for k, clique in enumerate(explanation.cliques):
+        text.append("maximal cliques  " if k == 0 else " " * 17, "dim")
+        text.append(f"{{{_spaced(clique)}}}", "bold" if k == 0 else "")
+        if tied and clique in explanation.tied:
+            text.append("  tied", "yellow")
+        if k == 0:
+            text.append("  ← right of way", "green")
+        text.append("\n")
+    text.append("right of way     ", "dim").append(_spaced(explanation.right_of_way), "bold green")
+    text.append("\nwhy              ", "dim").append(explanation.reason)
+    return text
+
+
+def _spaced(things: Iterable[object]) -> str:
+    return " ".join(names(things))
+
+
+def _mark(harmony: bool, manoeuvre: int) -> Text:
+    width = len(str(manoeuvre)) + 2
+    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")

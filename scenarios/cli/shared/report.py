@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.junction.geometry import ARM_NAMES
+from minisim.results.metrics import METRICS, SPREAD, Metric, heading
+from minisim.results.summary import GROUPS
 from scenarios.statistics import FILLING
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from dim import Explanation, HarmonyMatrix
-    from figures.gallery import Item
-    from scenarios.sweep.experiment import Experiment
+    from figures.studies.shared.section import Item
+    from scenarios.recipe import Recipe
 
-#: Metric of a summary -> heading.
-HEADINGS = {
-    "waiting_time_s": "waiting [s]",
-    "travel_time_s": "travel [s]",
-    "depart_delay_s": "departure delay [s]",
-}
+#: Closest calls that every run of the command line shows.
+CLOSEST = ("min_ttc_s", "min_pet_s")
+
+#: Columns of the table of a run, and of that of a sweep, where no others are asked for.
+RUN_COLUMNS = ("waiting_time_s", "travel_time_s", "depart_delay_s")
+CELL_COLUMNS = (
+    "waiting_time_s",
+    "complete_waiting_time_s",
+    "travel_time_s",
+    "complete_depart_delay_s",
+)
 
 
 def run_title(summary: Mapping[str, Any]) -> Text:
@@ -33,41 +38,77 @@ def run_title(summary: Mapping[str, Any]) -> Text:
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
         f": {summary['density']:g} veh/h/lane, profile {summary['profile']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s",
+        f" after a warm-up of {summary['warmup_s']:g} s" if summary["warmup_s"] else "",
         "" if summary["host"] == "minisim" else f", host {summary['host']}",
     )
 
 
-def run_table(summary: Mapping[str, Any]) -> Table:
-    """Per-lane and total means of one run."""
+def run_table(
+    summary: Mapping[str, Any], metrics: Sequence[Metric] = (), by: str = "lane"
+) -> Table:
+    """Means of one run by group and in total, of the metrics that were asked for or of the usual.
+
+    Metrics that were asked for have their percentiles too.
+    """
+    columns = _run_columns(metrics)
     table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("lane")
-    for heading in ("served", "unfinished", *HEADINGS.values()):
-        table.add_column(heading, justify="right")
-    lanes = list(summary["lanes"].items())
-    for k, (lane, means) in enumerate(lanes, start=1):
-        table.add_row(lane, *_counts(means), *_means(means), end_section=k == len(lanes))
-    table.add_row("all", *_counts(summary), *_means(summary), style="bold")
-    table.add_row("with unfinished", "", "", *_means(summary["complete"]), style="dim")
-    for name, means in summary.get("drivers", {}).items():
-        table.add_row(name, *_counts(means), *_means(means))
+    table.add_column(by)
+    for title in ("served", "unfinished", *columns.values()):
+        table.add_column(title, justify="right")
+    groups = list(summary.get(GROUPS[by], {}).items())
+    for k, (name, means) in enumerate(groups, start=1):
+        table.add_row(name, *_counts(means), *_means(means, columns), end_section=k == len(groups))
+    table.add_row("all", *_counts(summary), *_means(summary, columns), style="bold")
+    table.add_row("with unfinished", "", "", *_means(summary["complete"], columns), style="dim")
+    if by != "kind":
+        for name, means in summary.get("kinds", {}).items():
+            table.add_row(name, *_counts(means), *_means(means, columns))
+    return table
+
+
+def _run_columns(metrics: Sequence[Metric]) -> dict[str, str]:
+    """Column of a group of trips -> heading."""
+    columns = {}
+    for metric in metrics:
+        if metric.grouped and metric.name not in ("trips", "unfinished"):
+            columns[metric.name] = metric.heading
+        if metric.per == "trip":
+            columns |= {f"{metric.name}_{what}": what for what in SPREAD}
+    return columns or {name: METRICS[name].heading for name in RUN_COLUMNS}
+
+
+def number_lines(summary: Mapping[str, Any], metrics: Iterable[Metric]) -> Iterator[Text]:
+    """What was asked for and has one number a run only."""
+    for metric in metrics:
+        if metric.per == "run" and not metric.grouped:
+            value = summary[metric.name]
+            shown = "–" if value is None else f"{value:g} {metric.unit}".rstrip()
+            yield Text.assemble(f"  {metric.title or metric.name} ", (shown, "bold"))
+
+
+def metrics_table(metrics: Iterable[Metric]) -> Table:
+    """What is measured, in what unit and by which equation."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for title in ("name", "unit", "per", "needs", "meaning", "equation"):
+        table.add_column(title, no_wrap=title == "name")
+    for metric in metrics:
+        equation = " = ".join(filter(None, (metric.symbol, metric.equation)))
+        table.add_row(metric.name, metric.unit, metric.per, metric.needs, metric.meaning, equation)
     return table
 
 
 def safety_line(summary: Mapping[str, Any]) -> Text:
     """Collisions and, where measured, the closest calls of one run."""
-    safety = summary["safety"]
     collisions = summary["collisions"]
     line = Text.assemble(
         "  collisions ", (str(collisions), "bold red" if collisions else "bold green")
     )
-    if safety is None:
-        return line
-    return line + Text.assemble(
-        "   minimum TTC ",
-        (_seconds(safety["min_ttc_s"], " s"), "bold"),
-        "   minimum PET ",
-        (_seconds(safety["min_pet_s"], " s"), "bold"),
-    )
+    for name in CLOSEST:
+        if name in summary:
+            metric = METRICS[name]
+            line.append(f"   {metric.title} ")
+            line.append(_seconds(summary[name], f" {metric.unit}"), "bold")
+    return line
 
 
 def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
@@ -80,68 +121,24 @@ def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
         )
 
 
-def harmony_table(matrix: HarmonyMatrix) -> Table:
-    """The matrix with one column a lane: ● harmony, · conflict."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("")
-    manoeuvres = range(1, matrix.n)
-    for lane in ARM_NAMES[: matrix.n]:
-        table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
-    for movement, values in zip(matrix.movements, matrix.values, strict=True):
-        cells = [Text(str(movement), style="bold")]
-        for first in range(0, len(values), matrix.n - 1):
-            part = values[first:].tolist()
-            cells.append(Text("").join(map(_mark, part, manoeuvres)))
-        table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
-    return table
-
-
-def decision_text(explanation: Explanation) -> Text:
-    """The graph, its cliques, who goes and why."""
-    text = Text()
-    edges = "  ".join(f"{a}–{b}" for a, b in explanation.edges) or "none"
-    text.append("vehicles         ", "dim").append(_names(explanation.participants) + "\n")
-    text.append("in harmony       ", "dim").append(edges + "\n")
-    tied = len(explanation.tied) > 1
-    for k, clique in enumerate(explanation.cliques):
-        text.append("maximal cliques  " if k == 0 else " " * 17, "dim")
-        text.append(f"{{{_names(clique)}}}", "bold" if k == 0 else "")
-        if tied and clique in explanation.tied:
-            text.append("  tied", "yellow")
-        if k == 0:
-            text.append("  ← right of way", "green")
-        text.append("\n")
-    text.append("right of way     ", "dim").append(_names(explanation.right_of_way), "bold green")
-    text.append("\nwhy              ", "dim").append(explanation.reason)
-    return text
-
-
 def gallery_table(items: Iterable[Item]) -> Table:
     """Names and titles of figures and tables, and the studies that they need."""
     table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("name", "what", "studies"):
-        table.add_column(heading)
+    for title in ("name", "what", "studies"):
+        table.add_column(title)
     for item in items:
         table.add_row(item.name, item.title, ", ".join(item.needs) or "none")
     return table
 
 
-#: Column of `scenarios.studies.cells.cells` -> heading.
-CELL_HEADINGS = {
-    "waiting_time_s": "waiting [s]",
-    "complete_waiting_time_s": "with unfinished",
-    "travel_time_s": "travel [s]",
-    "complete_depart_delay_s": "departure delay [s]",
-}
-
-
 def sweep_table(cells: pd.DataFrame) -> Table:
     """One line a cell: means over seeds with 95 % confidence intervals."""
     table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("scenario", "profile", "split", "veh/h/lane", "controller"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("runs", *CELL_HEADINGS.values(), "unfinished", "collisions", ""):
-        table.add_column(heading, justify="right", no_wrap=True)
+    for title in ("scenario", "profile", "split", "veh/h/lane", "controller"):
+        table.add_column(title, no_wrap=True)
+    headings = map(heading, CELL_COLUMNS)
+    for title in ("runs", *headings, "unfinished", "collisions", ""):
+        table.add_column(title, justify="right", no_wrap=True)
     for cell in cells.to_dict("records"):
         named = (cell["scenario"], cell["profile"], cell["split"], f"{cell['density']:g}")
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
@@ -151,7 +148,7 @@ def sweep_table(cells: pd.DataFrame) -> Table:
                 *named,
                 cell["controller"],
                 f"{cell['runs']}{failed}",
-                *(_interval(cell, metric) for metric in CELL_HEADINGS),
+                *(_interval(cell, metric) for metric in CELL_COLUMNS),
                 f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
                 Text(str(collisions), style="bold red" if collisions else ""),
                 Text(_settled(cell), style="yellow"),
@@ -166,7 +163,7 @@ def _settled(cell: Mapping[Hashable, Any]) -> str:
     return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
 
 
-def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Experiment]) -> Text:
+def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know of the table: growing queues, capped signals, the first failure."""
     text = Text()
     if "too_short" in cells and cells["too_short"].eq(True).any():
@@ -194,7 +191,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[E
     return text
 
 
-def _capped(experiments: Sequence[Experiment]) -> list[str]:
+def _capped(experiments: Sequence[Recipe]) -> list[str]:
     """A line for each signal whose demand is beyond Webster's formula."""
     from baselines import FixedTime
 
@@ -222,17 +219,8 @@ def _counts(means: Mapping[str, Any]) -> tuple[str, str]:
     return str(means["trips"] - means["unfinished"]), str(means["unfinished"])
 
 
-def _means(means: Mapping[str, Any]) -> list[str]:
-    return [_seconds(means[key]) for key in HEADINGS]
-
-
-def _names(movements: tuple[Any, ...]) -> str:
-    return " ".join(map(str, movements))
-
-
-def _mark(harmony: bool, manoeuvre: int) -> Text:
-    width = len(str(manoeuvre)) + 2
-    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")
+def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
+    return [_seconds(means[key]) if key in means else "" for key in columns]
 
 
 def _seconds(value: float | None, unit: str = "") -> str:

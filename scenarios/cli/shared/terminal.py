@@ -19,52 +19,52 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: One character for one, where the terminal's encoding lacks it: tables keep their columns.
+#: Characters that stand in for those that the terminal's encoding lacks, one for one: tables keep
+#: their columns.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
-
-#: Without a terminal, progress is told once in so many seconds.
+#: How often progress is told where there is no terminal [s].
 SILENCE = 20.0
 
 
 class Bar:
-    """Shows `done` of `total`, once there is something to show."""
+    """A progress bar on a terminal."""
 
     def __init__(self, progress: Progress, label: str) -> None:
         self._progress = progress
         self._task = progress.add_task(label, total=None)
 
     def __call__(self, done: int, total: int) -> None:
-        """Move the bar."""
+        """Show `done` of `total`."""
         self._progress.update(self._task, completed=done, total=total)
 
     def label(self, text: str) -> None:
-        """Say something else in front of it."""
+        """Change the text in front of the bar."""
         self._progress.update(self._task, description=text)
 
 
 class Lines:
-    """Says in a line now and then how far it is, where there is no terminal for a bar."""
+    """A line of progress now and then, where there is no terminal for a bar."""
 
     def __init__(self, label: str) -> None:
         self._label = label
         self._said = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
-        """Say so, when it was not said lately."""
+        """Print `done` of `total`, at most once in `SILENCE` seconds."""
         now = time.monotonic()
         if now - self._said >= SILENCE:
             self._said = now
             typer.echo(f"{self._label}: {done} of {total}", err=True)
 
     def label(self, text: str) -> None:
-        """Say something else in front of it."""
+        """Change the text in front of the numbers."""
         self._label = text
 
 
 @contextmanager
 def bar(label: str) -> Iterator[Bar | Lines]:
-    """A progress bar on stderr that leaves nothing behind; lines where that is no terminal."""
+    """A progress bar on stderr that vanishes at the end; lines where stderr is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
         yield Lines(label)
@@ -75,7 +75,7 @@ def bar(label: str) -> Iterator[Bar | Lines]:
 
 
 def show(*renderables: Text | Table) -> None:
-    """Print on stdout; only text is wrapped, and only for a terminal."""
+    """Print on stdout; only text is wrapped, and only on a terminal."""
     console = Console(highlight=False, markup=False)
     for renderable in renderables:
         if isinstance(renderable, Table) or not console.is_terminal:
@@ -83,13 +83,18 @@ def show(*renderables: Text | Table) -> None:
         console.print(renderable)
 
 
+def show_json(value: Any) -> None:
+    """Print JSON and nothing else; a missing value is null."""
+    typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
+
+
 def _width(console: Console, renderable: Text | Table) -> int:
-    """Columns that it takes where there is room for everything."""
+    """The columns that it takes where there is room for everything."""
     return Measurement.get(console, console.options.update(max_width=10_000), renderable).maximum
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text: into nowhere where closed, in plainer characters."""
+    """Let stdout and stderr take any text: nowhere if closed, in plainer characters if need be."""
     codecs.register_error("minisim-plain", _plain)
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
@@ -101,7 +106,7 @@ def prepare_streams() -> None:
 
 
 def drop_output() -> None:
-    """Send what is still to be written to stdout nowhere, for it cannot be written."""
+    """Send the rest of stdout nowhere, since it cannot be written."""
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
@@ -111,8 +116,3 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
         raise error
     text = error.object[error.start : error.end].translate(_PLAIN)
     return "".join(c if c.isascii() else "?" for c in text), error.end
-
-
-def show_json(value: Any) -> None:
-    """Print JSON and nothing else; what has no value is null."""
-    typer.echo(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))

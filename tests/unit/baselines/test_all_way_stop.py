@@ -258,5 +258,3 @@ def test_nobody_is_passed_over_for_ever() -> None:
 def test_bad_parameters_are_named(reaction: Any) -> None:
     with pytest.raises(InputError, match="reaction"):
         AllWayStop(reaction=reaction)
-    with pytest.raises(InputError, match="name"):
-        AllWayStop(name=3)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ import pytest
 
 import minisim
 from baselines import Reservation
-from baselines.prediction import Leader, Motion, predict, ways
+from baselines.prediction import Following, Leader, courses, predict
 from baselines.reservation import Manager, ReservationSession
 from minisim.control import Go, Hold, Observed, Unregulated, View, Wake
 from minisim.errors import InputError
@@ -61,7 +61,7 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
     tracks = [run.trace[run.trace["row"] == row] for row in (0, 1)]
     now = int(tracks[1]["tick"][0]) + 300
     first, second = (track[track["tick"] >= now] for track in tracks)
-    motion, lane_ways = Motion.of(site), ways(site)
+    motion, lane_ways = Following.of(site), courses(site)
     leader = predict(motion, lane_ways[1], first["s"][0] - ENTRY, first["v"][0], beyond=60.0)
     assert leader is not None
     assert np.allclose(leader[0], first["s"][: len(leader[0])] - ENTRY, atol=1e-6)
@@ -78,7 +78,7 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
 
 
 def test_who_does_not_get_through_is_not_predicted() -> None:
-    motion, way = Motion.of(SITE), ways(SITE)[0]
+    motion, way = Following.of(SITE), courses(SITE)[0]
     assert predict(motion, way, -400.0, 14.0, horizon=5.0) is None
 
 
@@ -244,7 +244,7 @@ def test_at_low_demand_nobody_is_delayed_and_below_the_all_way_stop_at_350() -> 
 
 
 def test_bad_input() -> None:
-    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}, {"name": None}):
+    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}):
         with pytest.raises(InputError):
             Reservation(**options)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="CruiseVehicle"):

@@ -155,7 +155,7 @@ def test_advice_spares_stops() -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [{"reach": 0}, {"reach": math.nan}, {"period": 0}, {"period": "1"}, {"name": 5}],
+    [{"reach": 0}, {"reach": math.nan}, {"period": 0}, {"period": "1"}],
 )
 def test_impossible_values(options: dict[str, Any]) -> None:
     with pytest.raises(InputError):

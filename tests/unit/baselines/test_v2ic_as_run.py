@@ -168,7 +168,7 @@ def test_it_collides_where_the_matrix_is_blind() -> None:
 def test_it_is_what_v2ic_means_under_as_run() -> None:
     assert controller_named("v2ic", "as_run") == V2ICAsRun()
     assert controller_named("v2ic", "fair").name == "v2ic"
-    assert controller_named("v2ic-as-run-14").name == "v2ic-as-run-14"
+    assert controller_named("v2ic-as-run:approach_speed=14").name == "v2ic-as-run:approach_speed=14"
     assert Movement(0, 1) == MOVEMENTS[0]
 
 

@@ -331,15 +331,14 @@ def test_names_and_orders() -> None:
     assert isinstance(controller_named("dim", "as_run"), AsRunDim)
     assert controller_named("dim", "as_run") == AsRunDim(order="lanes")
     assert controller_named("dim", "fair") == Dim()
-    assert controller_named("dim-as-run-size").name == "dim-as-run-size"
-    assert controller_named("dim-as-run-exit-14").name == "dim-as-run-exit-14"
+    assert controller_named("dim-as-run:order=size") == AsRunDim(order="size")
 
 
 def test_the_exit_speed_can_be_that_of_the_signals() -> None:
     """as_run.md, discrepancy 15."""
     rule = AsRunRules(4, HarmonyMatrix.paper(4), "lanes", exit_speed=14.0)
     assert step(rule, car("v1.a_1", 508.01)) == {1: 14.0}
-    assert AsRunDim(exit_speed=0.5).name == "dim-as-run-exit-0.5"
+    assert AsRunDim(exit_speed=0.5).name == "dim-as-run:exit_speed=0.5"
     with pytest.raises(InputError, match=r"exit_speed \[m/s\]"):
         AsRunDim(exit_speed=0.0)
     with pytest.raises(InputError, match="order"):

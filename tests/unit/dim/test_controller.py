@@ -264,12 +264,15 @@ def test_wake_up_marks(gate: str, commit: str, marks: tuple[float, ...]) -> None
     ("dim", "name"),
     [
         (Dim(), "dim"),
-        (Dim(gate="harmonious"), "dim-harmonious"),
-        (Dim(order="lanes"), "dim-lanes"),
-        (Dim(commit="paper"), "dim-paper-commit"),
-        (Dim(priorities="inflow"), "dim-inflow"),
-        (Dim(priorities=(1, 0, 2)), "dim-priorities"),
-        (Dim("lanes", "paper", "harmonious", "inflow"), "dim-harmonious-lanes-paper-commit-inflow"),
+        (Dim(gate="harmonious"), "dim:gate=harmonious"),
+        (Dim(order="lanes"), "dim:order=lanes"),
+        (Dim(commit="paper"), "dim:commit=paper"),
+        (Dim(priorities="inflow"), "dim:priorities=inflow"),
+        (Dim(priorities=(1, 0, 2)), "dim:priorities=(1,0,2)"),
+        (
+            Dim("lanes", "paper", "harmonious", "inflow"),
+            "dim:order=lanes,commit=paper,gate=harmonious,priorities=inflow",
+        ),
     ],
 )
 def test_name(dim: Dim, name: str) -> None:

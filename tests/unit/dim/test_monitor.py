@@ -516,4 +516,4 @@ def test_what_is_no_monitor_is_refused() -> None:
 
 
 def test_its_name_tells() -> None:
-    assert Dim(monitor=Monitor()).name == "dim-monitored"
+    assert Dim(monitor=Monitor()).name == "dim:monitor=on"

@@ -152,8 +152,8 @@ def test_a_session_lets_go_who_waits_longest() -> None:
 
 
 def test_names() -> None:
-    assert Dim(priorities="rotating").name == "dim-rotating"
-    assert Dim(order="lanes", priorities="waiting").name == "dim-lanes-waiting"
+    assert Dim(priorities="rotating").name == "dim:priorities=rotating"
+    assert Dim(order="lanes", priorities="waiting").name == "dim:order=lanes,priorities=waiting"
 
 
 @given(

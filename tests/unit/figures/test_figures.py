@@ -23,7 +23,7 @@ from dim import Dim, HarmonyMatrix, explain
 from figures import decision_figure, performance_figure, save, style, write_animation
 from figures.film.animate import Picture, frame_times
 from figures.film.encode import COLOURS, palette_of, write_gif, write_html
-from figures.film.frames import RELEASED, Film
+from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from minisim.control import Plan, Unregulated
 from minisim.errors import FileError, InputError
@@ -107,7 +107,7 @@ def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
 
 
 def test_film_counts_what_the_trajectories_say(run: Run) -> None:
-    film, frame = Film(run, 100.0), run.trajectories
+    film, frame = Frames(run, 100.0), run.trajectories
     for time in (100.1, 112.0, 129.9):
         now = frame[np.isclose(frame["time_s"], time)]
         assert film.at(time).stop - film.at(time).start == len(now)
@@ -123,7 +123,7 @@ def test_film_counts_what_the_trajectories_say(run: Run) -> None:
 
 
 def test_lanes_open_with_their_first_vehicle(run: Run) -> None:
-    film = Film(run, 100.0)
+    film = Frames(run, 100.0)
     opened = set()
     for time in frame_times(100.1, 29.0, 10.0, 0.1).tolist():
         rows = film.rows(film.at(time), 1e9)
@@ -135,7 +135,7 @@ def test_lanes_open_with_their_first_vehicle(run: Run) -> None:
 
 
 def test_ways_end_at_the_exit(run: Run) -> None:
-    film, intersection = Film(run, 100.0), run.site.intersection
+    film, intersection = Frames(run, 100.0), run.site.intersection
     exits = np.array([path.position(path.exit) for path in intersection.paths])
     ways = [way for t in range(101, 130) for way in film.ways(film.rows(film.at(t), 1e9))]
     assert ways
@@ -148,7 +148,7 @@ def test_indicators_follow_the_turn() -> None:
     right_now = minisim.simulate(
         four_way(400, horizon=60), Unregulated(), seed=1, record="all", on_collision="record"
     )
-    film = Film(right_now, 0.0)
+    film = Frames(right_now, 0.0)
     assert film.turn.tolist() == [-1, 0, 1] * 4
 
 
@@ -156,7 +156,7 @@ def test_collisions_are_ringed() -> None:
     crash = minisim.simulate(
         four_way(350, horizon=150), Unregulated(), seed=1, record="all", on_collision="record"
     )
-    film, first = Film(crash, 0.0), crash.collisions[0]
+    film, first = Frames(crash, 0.0), crash.collisions[0]
     assert film.collided(first.time - 0.1) == 0
     assert film.crashes(first.time - 0.1) == []
     (ring,) = film.crashes(first.time)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,30 +18,35 @@ from matplotlib.lines import Line2D
 
 from baselines import webster
 from dim import HarmonyMatrix
-from figures import lines, report, style
-from figures.gallery import GALLERY, item_named, write
-from figures.paper_tables import harmony_table, webster_table
+from figures import plots, style
+from figures import reproduction_report as report
+from figures.gallery import GALLERY, SECTIONS, item_named, write
+from figures.junction.tables import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
 from minisim.errors import FileError, InputError
+from scenarios import studies
+from scenarios.controllers import RIVALS
 from scenarios.paper import SERIES, Cell, reference_value
-from scenarios.studies.archive import Archive, MissingRunsError, missing_note
-from scenarios.studies.capacity import Search
-from scenarios.studies.cells import saturated
-from scenarios.studies.reproduction import CAPACITY, PARTS, Made
-from scenarios.studies.results import Effort
-from scenarios.studies.study import RIVALS, STUDIES
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
+from scenarios.studies import NAMES, study_named
+from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
+from scenarios.studies.shared.effort import Effort, Search
+from scenarios.studies.shared.reproduction import Made
+from scenarios.sweep.cells import saturated
+from scenarios.sweep.keys import key_of
+from tests import ROOT
 from tests.builders import capacity_of, synthetic_find, synthetic_row
 
-EFFORT, SEARCH = Effort(seeds=2), Search(step=20.0, steps=64, seeds=2)
+SEARCH = Search(step=20.0, steps=64, seeds=2)
+EFFORT = Effort(seeds=2, search=SEARCH)
 
 
 @pytest.fixture(scope="module")
 def archive() -> Archive:
-    return Archive(synthetic_find, EFFORT, SEARCH)
+    return Archive(synthetic_find, EFFORT)
 
 
-def partial_find(experiments: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+def partial_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
     """A store without adaptive signals."""
     return [None if e.label == "adaptive" else synthetic_row(e) for e in experiments]
 
@@ -66,7 +74,22 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
 
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
     needed = {need for item in GALLERY.values() for need in item.needs}
-    assert needed == set(PARTS) == {*STUDIES, CAPACITY}
+    assert needed == set(NAMES)
+
+
+def test_the_study_of_the_guide_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    for room in ("scenarios", "figures"):
+        name = f"{room}.studies.signals"
+        head = f'"""{name.replace(".", "/")}.py"""'
+        (block,) = re.findall(rf"```python\n({head}\n.*?)```", guide, re.DOTALL)
+        module = ModuleType(name)
+        monkeypatch.setitem(sys.modules, name, module)
+        exec(block, module.__dict__)
+    monkeypatch.setattr(studies, "NAMES", (*NAMES, "signals"))
+    (item,) = module.SECTION.items
+    figure = item.build(Archive(synthetic_find, EFFORT))
+    assert [len(axes.get_legend_handles_labels()[0]) for axes in figure.axes] == [2, 2, 2]
 
 
 def test_unknown_figure_names_the_nearest() -> None:
@@ -87,7 +110,7 @@ def test_same_results_same_bytes(name: str, archive: Archive, tmp_path: Path) ->
 
 
 def test_nothing_to_draw_says_how_to_make_it() -> None:
-    empty = Archive(lambda asked: [None] * len(asked), EFFORT, SEARCH)
+    empty = Archive(lambda asked: [None] * len(asked), EFFORT)
     for name, item in GALLERY.items():
         if item.needs:
             with pytest.raises(MissingRunsError, match=r"minisim reproduce --only .* --seeds 2"):
@@ -99,12 +122,12 @@ def test_nothing_to_draw_says_how_to_make_it() -> None:
 @pytest.mark.parametrize("study", ["text", "as-run"])
 @pytest.mark.parametrize("name", ["waiting-balanced", "travel-arms", "lanes"])
 def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
-    runs = {experiment.key for _, experiment in EFFORT.runs(STUDIES[study])}
+    runs = {key_of(recipe) for _, recipe in study_named(study).runs(EFFORT.seeds)}
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
-        return [synthetic_row(e) if e.key in runs else None for e in asked]
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        return [synthetic_row(e) if key_of(e) in runs else None for e in asked]
 
-    drawing = GALLERY[name].build(Archive(find, EFFORT, SEARCH))
+    drawing = GALLERY[name].build(Archive(find, EFFORT))
     if isinstance(drawing, Table):
         columns = {"as-run": 3, "text": 5}
         for other, column in columns.items():
@@ -117,7 +140,7 @@ def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
 
 
 def test_what_is_missing_is_said_in_the_picture() -> None:
-    figure = GALLERY["fair"].build(Archive(partial_find, EFFORT, SEARCH))
+    figure = GALLERY["fair"].build(Archive(partial_find, EFFORT))
     assert isinstance(figure, Figure)
     notes = [" ".join(t.get_text().split()) for t in figure.texts if "no run" in t.get_text()]
     assert len(notes) == 1
@@ -128,22 +151,22 @@ def test_what_is_missing_is_said_in_the_picture() -> None:
 def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
 
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         lost = ("all-way-stop", 2)
         return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
 
-    figure = GALLERY["fair"].build(Archive(find, EFFORT, SEARCH))
+    figure = GALLERY["fair"].build(Archive(find, EFFORT))
     assert isinstance(figure, Figure)
     (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
     assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
-    archive = Archive(synthetic_find, Effort(seeds=5), SEARCH)
-    assert missing_note([archive.study("as-run")], lambda _: True).startswith("3 to 5 seeds, 3600")
+    archive = Archive(synthetic_find, Effort(seeds=5))
+    assert missing_note([archive.study("as-run")]).startswith("3 to 5 seeds, 3600")
 
 
 def test_losses_end_where_the_runs_do() -> None:
-    archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)), SEARCH)
+    archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)))
     table = GALLERY["losses-table"].build(archive)
     assert isinstance(table, Table)
     assert "demands tried, 150 to 350." in table.notes[0]
@@ -155,11 +178,11 @@ def test_losses_end_where_the_runs_do() -> None:
         assert bars
         assert all(150.0 <= low <= high <= 350.0 for low, high in bars)
 
-    def alone(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def alone(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [synthetic_row(e) if e.label == "dim" else None for e in asked]
 
     with pytest.raises(MissingRunsError, match="DIM and another controller"):
-        GALLERY["losses"].build(Archive(alone, EFFORT, SEARCH))
+        GALLERY["losses"].build(Archive(alone, EFFORT))
 
 
 # --- what the pictures say -------------------------------------------------------------------
@@ -209,7 +232,11 @@ def test_growing_queues_get_an_arrow(archive: Archive) -> None:
 
 
 def test_series_are_told_apart_without_colour() -> None:
-    together = [RIVALS, ("dim", "dim-rotating", "dim-waiting"), ("dim-3", "dim-4", "dim-5")]
+    together = [
+        RIVALS,
+        ("dim", "dim:priorities=rotating", "dim:priorities=waiting"),
+        ("dim-3", "dim-4", "dim-5"),
+    ]
     for group in together:
         looks = [style.look(name) for name in group]
         assert len({look.marker for look in looks}) == len(looks)
@@ -219,7 +246,7 @@ def test_series_are_told_apart_without_colour() -> None:
 def test_log_axis_shows_plain_numbers() -> None:
     figure = style.new_figure(4, 3)
     axes = figure.add_subplot()
-    lines.log_time(axes, 0.0, 500.0, linear=0.1)
+    plots.log_time(axes, 0.0, 500.0, linear=0.1)
     figure.draw_without_rendering()
     assert [t.get_text() for t in axes.get_yticklabels()] == ["0", "0.1", "1", "10", "100"]
 
@@ -293,14 +320,13 @@ FEW = ("webster", "gate", "losses-table", "comparison-text")
 def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a few figures: all of them are made above."""
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
-    monkeypatch.setattr(report, "SECTIONS", {"Results": FEW[:3]})
     pictures = tmp_path / "figures"
     pictures.mkdir()
     failed = {"controller": "x", "scenario": "four-way", "density": 1.0, "seed": 3, "error": "no"}
     made = [Made("text", 700, 700.0, 699, 12.3, 45.6, (failed,))]
     drawn: list[int] = []
     count = report.write_report(
-        Archive(partial_find, EFFORT, SEARCH), made, 2, tmp_path, pictures,
+        Archive(partial_find, EFFORT), made, 2, tmp_path, pictures,
         lambda done, total: drawn.append(done),
     )  # fmt: skip
     assert count == len(FEW) == len(drawn)
@@ -315,7 +341,7 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "**13** " in text
     assert "**9a** " in text
     assert "None in any run." in text, "no collision"
-    empty = Archive(lambda asked: [None] * len(asked), EFFORT, SEARCH)
+    empty = Archive(lambda asked: [None] * len(asked), EFFORT)
     assert report.write_report(empty, made, 1, tmp_path, pictures, lambda done, total: None) == 1
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "the store has no run of gate" in text
@@ -331,7 +357,7 @@ def test_a_report_on_one_study_has_nothing_of_others(
     pictures.mkdir()
     made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
     count = report.write_report(
-        Archive(synthetic_find, EFFORT, SEARCH), made, 2, tmp_path, pictures,
+        Archive(synthetic_find, EFFORT), made, 2, tmp_path, pictures,
         lambda done, total: None, parts=("gate",),
     )  # fmt: skip
     assert count == 1
@@ -339,7 +365,7 @@ def test_a_report_on_one_study_has_nothing_of_others(
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
     assert headings == [
-        "What was run", "When does DIM lose, and how far does the harmonious gate move it?",
+        "What was run", "How far does the harmonious gate move it?",
         "Collisions", "Over-saturated cells", "Failed runs",
     ]  # fmt: skip
     assert "| controller | gate |" in text
@@ -347,11 +373,11 @@ def test_a_report_on_one_study_has_nothing_of_others(
 
 
 def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
-    def find(asked: Sequence[Experiment]) -> list[Mapping[str, Any] | None]:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
 
     report.write_report(
-        Archive(find, Effort.quick(), SEARCH), [], 1, tmp_path, tmp_path, lambda done, total: None,
+        Archive(find, Effort.of(quick=True)), [], 1, tmp_path, tmp_path, lambda done, total: None,
         parts=("as-run",),
     )  # fmt: skip
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
@@ -360,7 +386,14 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
     assert "- `as-run`: Smoke test, which means nothing: " in text
 
 
-def test_every_section_names_figures() -> None:
-    shown = [name for names in report.SECTIONS.values() for name in names]
-    assert len(shown) == len(set(shown))
-    assert set(shown) <= set(GALLERY)
+def test_the_report_keeps_its_appendix_for_the_end() -> None:
+    assert [section.appendix for section in SECTIONS] == sorted(s.appendix for s in SECTIONS)
+    names = [item.name for section in SECTIONS for item in section.items]
+    assert len(names) == len(set(names))
+
+
+def test_causes_that_share_a_number_are_named_once(archive: Archive) -> None:
+    table = GALLERY["comparison-as-run"].build(archive)
+    assert isinstance(table, Table)
+    for row in table.rows:
+        assert len(row[-1].split()) == len(set(row[-1].split()))

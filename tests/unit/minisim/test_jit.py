@@ -42,11 +42,11 @@ print(answer(10.0), "kept" if answer.stats.cache_hits else "compiled")
 """
 
 
-def ask(folder: Path) -> str:
+def ask(folder: Path, code: str = ASK) -> str:
     """What a fresh process computes with the tree's sources, and where it has the code from."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "kept")}
     done = subprocess.run(
-        [sys.executable, "-c", ASK],
+        [sys.executable, "-c", code],
         cwd=folder, env=environment, capture_output=True, text=True, check=True,
     )  # fmt: skip
     return done.stdout.strip()
@@ -100,3 +100,22 @@ def test_looking_at_the_sources_is_quick() -> None:
         _digest(folder)
         times.append(time.perf_counter() - begin)
     assert min(times) < 0.02  # measured: 2 ms; importing numba takes 300
+
+
+def test_a_class_may_change_its_name(tmp_path: Path) -> None:
+    """What is on disk holds the classes of arguments; it must not be read when they have gone."""
+    tree = copied(tmp_path)
+    ask_with = (
+        "from outside.caller import answer, {name}\n"
+        "print(answer({name}(10.0)), 'kept' if answer.stats.cache_hits else 'compiled')"
+    )
+    for name in ("Old", "New"):
+        (tree / "outside" / "caller.py").write_text(
+            "from typing import NamedTuple\n"
+            "from minisim.jit import njit\n"
+            f"class {name}(NamedTuple):\n    x: float\n"
+            "@njit\n"
+            "def answer(of):\n    return of.x\n"
+        )
+        assert ask(tree, ask_with.format(name=name)) == "10.0 compiled"
+        assert ask(tree, ask_with.format(name=name)) == "10.0 kept"

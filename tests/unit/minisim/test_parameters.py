@@ -16,6 +16,7 @@ from minisim.parameters import (
     part,
     real,
     reals,
+    spelled,
     switch,
     text,
     whole,
@@ -141,3 +142,33 @@ def test_a_subclass_keeps_the_rules_between_fields() -> None:
         Tandem(gear="high", load=3)
     with pytest.raises(InputError, match="seats must be an integer of at least 2"):
         Tandem(seats=1)
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({}, "bike"),
+        ({"load": 5.0, "bell": False}, "bike:bell=false,load=5"),
+        ({"bell": True, "pedals": 2}, "bike"),
+        ({"load": 0.1 + 0.2}, "bike:load=0.30000000000000004"),
+        ({"owner": "ann"}, "bike:owner=ann"),
+        ({"owner": "ann b"}, "bike:owner='ann b'"),
+        ({"owner": "None"}, "bike:owner='None'"),
+        ({"owner": "class"}, "bike:owner='class'"),
+        ({"stops": [1]}, "bike:stops=(1,)"),
+        ({"stops": (1, 2.5)}, "bike:stops=(1,2.5)"),
+        ({"front": Wheel(0.3)}, "bike"),
+        ({"front": Wheel(0.5, 20)}, "bike:front=small(radius=0.5,spokes=20)"),
+    ],
+)
+def test_a_spelling_has_what_differs(given: dict[str, Any], name: str) -> None:
+    assert spelled("bike", Bicycle(**given)) == name
+
+
+def test_a_value_without_a_text_is_a_digest() -> None:
+    class Other(Wheel):
+        """No word for it."""
+
+    first, second = (spelled("bike", Bicycle(front=Other(radius))) for radius in (0.1, 0.2))
+    assert first.startswith("bike:front=Other#")
+    assert first != second == spelled("bike", Bicycle(front=Other(0.2)))

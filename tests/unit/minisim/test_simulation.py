@@ -30,9 +30,10 @@ from minisim.control import (
     Wake,
 )
 from minisim.errors import CollisionError, ControllerError, InputError
-from minisim.results.trips import METRICS, TRIP_COLUMNS
+from minisim.results.metrics import MEANS
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.simulation import Simulation
-from minisim.vehicle import CruiseVehicle, VehicleType
+from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
 from tests.builders import Fixed, digest, replayed
@@ -154,12 +155,7 @@ def braked(
     return minisim.simulate(scenario, Timed(script, reach), record="all")
 
 
-LAWS = {
-    "idm": VehicleType(),
-    "iidm": VehicleType(model="iidm"),
-    "krauss": VehicleType(model="krauss"),
-    "cc": CruiseVehicle(),
-}
+LAWS = {model: CruiseVehicle() if model == "cc" else VehicleType(model=model) for model in MODELS}
 
 
 @pytest.mark.parametrize("asked", [3.0, 6.0, 50.0])
@@ -178,7 +174,7 @@ def test_braking_takes_what_it_takes(model: str, asked: float, time: float) -> N
     assert (trace[trace["speed_mps"] == 0.0]["acceleration_mps2"].iloc[1:] == 0.0).all()
     needed = before["speed_mps"] ** 2 / (2.0 * b)
     # A law that drives each step at its new speed comes v·dt/2 short of that.
-    short = 14.0 * FAIR.dt / 2.0 if model in ("krauss", "cc") else 0.0
+    short = 14.0 * FAIR.dt / 2.0 if MODELS[model].stepwise else 0.0
     driven = trace["s_m"].iloc[-1] - before["s_m"]
     assert driven == pytest.approx(needed - short, abs=0.05)
 
@@ -368,7 +364,7 @@ def test_metrics_come_in_two_forms() -> None:
     assert complete["travel_time_s"] == pytest.approx((arrived + 100.0) / 2, abs=0.11)
     assert complete["waiting_time_s"] > 20.0
     assert complete["depart_delay_s"] == pytest.approx(0.05 / 3, abs=0.05)
-    assert set(METRICS) <= set(complete)
+    assert set(MEANS) <= set(complete)
 
 
 def test_trip_table_has_the_documented_columns_in_demand_order() -> None:
@@ -376,6 +372,7 @@ def test_trip_table_has_the_documented_columns_in_demand_order() -> None:
     assert tuple(run.trips.columns) == TRIP_COLUMNS
     assert run.trips["demand_time_s"].is_monotonic_increasing
     assert set(run.trips["lane"]) <= set("abcd")
+    assert run.trips["vehicle"].tolist() == list(range(len(run.trips)))
     ended = run.trips.dropna()
     assert (ended["arrival_s"] - ended["depart_s"]).to_numpy() == pytest.approx(
         ended["travel_time_s"].to_numpy()

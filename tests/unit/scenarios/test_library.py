@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
 import pytest
 
 import scenarios
 from minisim.errors import InputError
 from scenarios.library import (
+    Options,
     five_way,
     four_way,
     from_bearings,
@@ -14,7 +19,8 @@ from scenarios.library import (
     scenario_named,
     three_way,
 )
-from scenarios.scenario import FAIR
+from scenarios.scenario import FAIR, Scenario
+from tests import ROOT
 
 
 @pytest.mark.parametrize(
@@ -49,6 +55,51 @@ def test_demand_and_profile_go_through() -> None:
     assert scenario.demand.turns == (3.0, 1.0)
     assert (scenario.demand.model, scenario.demand.min_headway) == ("shifted", 2.0)
     assert scenario.profile is FAIR
+
+
+@pytest.mark.parametrize("split", [(4, 3, 2, 1), [4.0, 3.0, 2.0, 1.0], "4:3:2:1"])
+def test_shares_are_numbers_or_a_text(split: str | Sequence[float]) -> None:
+    assert four_way(split=split).demand.split == (4.0, 3.0, 2.0, 1.0)
+    assert four_way(turns="1:2:1") == four_way(turns=(1, 2, 1))
+    assert four_way(split="balanced", turns="uniform") == four_way()
+
+
+@pytest.mark.parametrize("text", ["", "4,3", "4:x", "::", "even"])
+def test_bad_shares_are_one_sentence(text: str) -> None:
+    with pytest.raises(InputError, match="split is balanced or written like 4:3:2:1, got"):
+        four_way(split=text)
+    with pytest.raises(InputError, match="turns is uniform or written like 4:3:2:1, got"):
+        four_way(turns=text)
+
+
+@pytest.mark.parametrize("make", [three_way, four_way, five_way])
+def test_a_misspelt_keyword_is_told_with_the_nearest(make: Callable[..., Scenario]) -> None:
+    with pytest.raises(InputError, match=r"unknown keyword of a scenario 'splt'.*'split'"):
+        make(splt="4:3:2:1")
+
+
+def test_keywords_are_seen_by_completion() -> None:
+    for make in (three_way, four_way, five_way, regular, from_bearings):
+        shown = inspect.signature(make).parameters
+        assert set(Options.__annotations__) | {"density"} <= set(shown)
+        assert shown["horizon"].default == 3600.0
+        assert all(parameter.kind is not parameter.VAR_KEYWORD for parameter in shown.values())
+
+
+def test_keywords_are_seen_by_mypy(tmp_path: Path) -> None:
+    from mypy import api
+
+    code = (
+        "from scenarios import four_way, from_bearings, regular\n"
+        "four_way(200, splt='4:3:2:1')\n"
+        "regular(6, horizn=60.0)\n"
+        "from_bearings((0, 90, 180), profile=3)\n"
+        "four_way(200, split='4:3:2:1', warmup=60.0)\n"
+    )
+    (tmp_path / "used.py").write_text(code, encoding="utf-8")
+    told = api.run(["--config-file", str(ROOT / "pyproject.toml"), str(tmp_path / "used.py")])[0]
+    assert [line.split(":")[1] for line in told.splitlines() if "error:" in line] == ["2", "3", "4"]
+    assert "splt" in told
 
 
 def test_scenarios_have_the_names_of_the_command_line() -> None:
@@ -93,7 +144,7 @@ def test_bad_options_are_refused_where_they_are_given() -> None:
         ({"density": -1}, "density"),
         ({"profile": "papers"}, "did you mean 'paper'"),
         ({"side": "centre"}, "unknown side"),
-        ({"split": "4:3:2:1"}, "split must be a sequence"),
+        ({"split": 4}, "split must be a sequence"),
         ({"horizon": 0}, "horizon"),
         ({"lane_width": 30}, "lane_width"),
     ]:

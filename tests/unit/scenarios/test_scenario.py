@@ -18,7 +18,6 @@ from scenarios.scenario import (
     PROFILES,
     Profile,
     Scenario,
-    parse_split,
     profile_named,
 )
 
@@ -101,6 +100,8 @@ def test_scenarios_are_frozen_hashable_and_survive_pickling() -> None:
         ({"profile": "paper"}, "profile must be a Profile"),
         ({"horizon": 0}, "horizon .* above 0"),
         ({"horizon": -1}, "horizon"),
+        ({"warmup": -1}, r"warmup \[s\] must be at least 0"),
+        ({"warmup": 60, "horizon": 60}, r"warmup \[s\] must be below 60"),
         ({"demand": Demand(density=350, split=(1, 1, 1))}, "split has 3 shares for 4 lanes"),
         ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
         ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
@@ -129,10 +130,3 @@ def test_profiles_are_checked(change: dict[str, object], message: str) -> None:
     options = {"name": "x", "vehicle": VehicleType(), "speed_limit": 14.0}
     with pytest.raises(InputError, match=message):
         Profile(**{**options, **change})  # type: ignore[arg-type]
-
-
-def test_a_split_is_read_from_text() -> None:
-    assert parse_split("4:3:2:1") == (4.0, 3.0, 2.0, 1.0)
-    for text in ("", "4,3", "4:x", "::", None, 5, b"1:2"):
-        with pytest.raises(InputError, match="written like 4:3:2:1"):
-            parse_split(text)  # type: ignore[arg-type]

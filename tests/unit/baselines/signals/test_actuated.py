@@ -150,7 +150,6 @@ def test_short_roads_serve_everybody() -> None:
         ({"min_green": 20.0, "max_green": 10.0}, "max_green must be at least min_green, 20 s"),
         ({"amber": -1.0}, "amber"),
         ({"order": 5}, "order must be a sequence of lanes"),
-        ({"name": None}, "name"),
     ],
 )
 def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:

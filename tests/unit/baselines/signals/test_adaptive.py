@@ -228,7 +228,6 @@ def test_it_waits_less_than_the_fixed_time_signal() -> None:
         ({"min_green": 20.0, "max_green": 10.0}, "max_green must be at least min_green, 20 s"),
         ({"extend_max_green": 1}, "extend_max_green"),
         ({"amber": -1.0}, "amber"),
-        ({"name": None}, "name"),
         ({"order": "abc"}, "order must be a sequence of lanes"),
         ({"order": (0, 1.5)}, "lane in order"),
     ],

@@ -80,7 +80,6 @@ def test_an_over_saturated_junction_has_a_capped_cycle() -> None:
         ({"lost_time": -2}, "lost_time"),
         ({"equal_greens": 1}, "equal_greens"),
         ({"max_cycle": 0}, "max_cycle"),
-        ({"name": 5}, "name"),
     ],
 )
 def test_bad_arguments_are_clear_errors(arguments: dict[str, Any], message: str) -> None:

@@ -162,9 +162,9 @@ def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"critical_gaps": (6.2, 6.5)}, "critical_gaps must be 3 numbers"),
+        ({"critical_gaps": (6.2, 6.5)}, r"critical_gaps \[s\] must be 3 numbers"),
         ({"critical_gaps": (6.2, 6.5, -1)}, r"critical gap \[s\] must be at least 0"),
-        ({"critical_gaps": 6.2}, "critical_gaps must be a sequence"),
+        ({"critical_gaps": 6.2}, r"critical_gaps \[s\] must be a sequence"),
         ({"critical_gaps": (6.2, 6.5, "x")}, "must be a number, got 'x'"),
         ({"follow_up": (3.3, 4.0, math.inf)}, "follow_up"),
         ({"follow_up": (3.3, 4.0, 61.0)}, r"follow-up time \[s\] must be .* at most 60"),

@@ -18,8 +18,8 @@ from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Movement
 from scenarios import four_way
-from scenarios.mixing import driver_means, with_humans
-from scenarios.sweep.experiment import Experiment, run_experiment
+from scenarios.recipe import Recipe
+from scenarios.sweep.rows import outcome_of
 from tests.builders import digest, replayed
 
 SITE = four_way(profile="fair").site()
@@ -142,7 +142,7 @@ def test_what_the_host_has_to_provide() -> None:
     assert hasty.sight == alone.sight
     noisy = Dim(perception=NoisyPerception(0.15, frame=0.2))
     assert Mixed(noisy).start(SITE).plan.period == 0.2
-    assert Mixed(noisy).name == "dim-missed-0.15-humans-0.2"
+    assert Mixed(noisy).name == "dim:perception=noisy(intent_error=0.15,frame=0.2)-humans-0.2"
 
 
 def wakes(session: Session, time: float, *vehicles: Observed) -> list[float]:
@@ -274,7 +274,7 @@ def test_a_share_that_hits_nobody_changes_nothing_either() -> None:
     rare = Mixed(share=1e-9)
     assert not rare.human(4, 200).any()
     run, alone = (minisim.simulate(scenario, c, 4) for c in (rare, Dim()))
-    assert run.trips.equals(alone.trips)
+    assert run.trips.drop(columns="kind").equals(alone.trips)
 
 
 def test_one_driver_alone_loses_what_stopping_costs() -> None:
@@ -297,32 +297,25 @@ def test_who_believes_in_silence_collides() -> None:
 
 def test_the_groups_of_a_run_make_up_the_whole() -> None:
     run = minisim.simulate(four_way(150, profile="fair", horizon=600.0), Mixed(share=0.4), 2)
-    groups = driver_means(run)
+    groups = run.summary()["kinds"]
     human = run.controller.human(run.seed, len(run.columns.lane))  # type: ignore[attr-defined]
     assert groups["human"]["trips"] == int(human.sum()) > 10
     assert groups["human"]["trips"] + groups["automated"]["trips"] == len(human)
     waits = run.columns.waiting_time[human & run.columns.departed]
     assert groups["human"]["complete"]["waiting_time_s"] == pytest.approx(float(waits.mean()))
-    row = run_experiment(Experiment(run.scenario, run.controller, 2)).row  # type: ignore[arg-type]
-    assert row["human_trips"] == groups["human"]["trips"]
-    assert driver_means(minisim.simulate(four_way(50, horizon=60.0), Dim())) == {}
+    row = outcome_of(Recipe(run.scenario, Dim(), 2, humans=0.4)).row  # type: ignore[arg-type]
+    assert row["kinds_human_trips"] == groups["human"]["trips"]
+    assert run.trips["kind"].tolist() == ["human" if one else "automated" for one in human]
+    alone = minisim.simulate(four_way(50, horizon=60.0), Dim())
+    assert "kinds" not in alone.summary()
+    assert "kind" not in alone.trips
 
 
 def test_a_mixed_controller_is_a_value() -> None:
     mixed = Mixed(Dim(gate="harmonious"), 0.25)
-    assert mixed.name == "dim-harmonious-humans-0.25"
+    assert mixed.name == "dim:gate=harmonious-humans-0.25"
     assert pickle.loads(pickle.dumps(mixed)) == mixed
     assert hash(mixed) == hash(Mixed(Dim(gate="harmonious"), 0.25))
-
-
-def test_with_humans() -> None:
-    dim = Dim(order="lanes")
-    assert with_humans(dim, 0.0) is dim
-    assert with_humans(dim, 1) == Mixed(dim, 1.0)
-    stop = AllWayStop()
-    assert with_humans(stop, 0.0) is stop
-    with pytest.raises(InputError, match=r"among vehicles of DIM .* not with 'all-way-stop'"):
-        with_humans(stop, 0.5)
 
 
 @pytest.mark.parametrize(

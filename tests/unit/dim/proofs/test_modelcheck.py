@@ -34,7 +34,7 @@ class Few(Protocol):
 
 
 class OneOf(Protocol):
-    """Only a2 ever comes, and once it has entered nobody leaves."""
+    """Only a2 ever comes, and once it has entered it never leaves."""
 
     def arrivals(self, state: State):  # type: ignore[no-untyped-def]
         yield from (step for step in super().arrivals(state) if step[0][1:] == (0, 2))
@@ -46,11 +46,11 @@ class OneOf(Protocol):
 def test_all_states_of_a_lone_lane() -> None:
     """The lane empty, waiting, going, committed; then inside, and another one waiting for ever."""
     protocol = OneOf(PAPER)
-    found = explore(protocol)
-    assert found.protocol is protocol
-    assert (found.states, found.transitions) == (6, 5)
-    assert (found.complete, found.unsafe) == (True, ())
-    path = [str(event) for event in found.stuck or ()]
+    search = explore(protocol)
+    assert search.protocol is protocol
+    assert (search.states, search.transitions) == (6, 5)
+    assert (search.complete, search.unsafe) == (True, ())
+    path = [str(event) for event in search.stuck or ()]
     assert path == ["arrive a2", "look", "commit a2", "enter a2"]
 
 
@@ -68,30 +68,30 @@ def test_the_limit_of_states_is_the_last_allowed() -> None:
 
 def test_progress_is_told_now_and_then() -> None:
     told: list[int] = []
-    found = explore(Protocol(PAPER), progress=told.append)
+    search = explore(Protocol(PAPER), progress=told.append)
     assert told == sorted(told)
-    assert 0 < len(told) < found.transitions / 100
-    assert told[-1] <= found.states
+    assert 0 < len(told) < search.transitions / 100
+    assert told[-1] <= search.states
 
 
 def test_the_nearest_unsafe_states_are_all_found_and_none_beyond() -> None:
     class Blind(Few):
-        """Nobody looks before it goes."""
+        """No vehicle looks before it goes."""
 
         def look(self, state: State) -> State:
             fronts = tuple(f and Front(f.manoeuvre, f.phase, True) for f in state.fronts)
             return state._replace(fronts=fronts)
 
-    found = explore(Blind(PAPER))
-    assert isinstance(found, Exploration)
-    assert not found.complete
-    for path in found.unsafe:
+    search = explore(Blind(PAPER))
+    assert isinstance(search, Exploration)
+    assert not search.complete
+    for path in search.unsafe:
         state = Blind(PAPER).start
         for event in path:
             (state,) = [s for e, s in Blind(PAPER).successors(state) if e == event]
         assert Blind(PAPER).conflict(state) is not None
     # Two come, all look, both commit and enter: one state, which has other ways to it.
-    (path,) = found.unsafe
+    (path,) = search.unsafe
     assert len(path) == 7
     words = [event.what for event in path]
     assert sorted(words) == ["arrive", "arrive", "commit", "commit", "enter", "enter", "look"]
@@ -128,7 +128,7 @@ ENTER = Event("enter", 1, 2)
 @pytest.mark.parametrize(
     ("fair", "steps"),
     [
-        (False, [(State((None, None, None)), Event("arrive", 0, 1))]),  # nobody enters
+        (False, [(State((None, None, None)), Event("arrive", 0, 1))]),  # none enters
         (True, [(State((WAITS, ENTERS, None)), ENTER)]),
         (False, [(State((GOES, ENTERS, None)), ENTER)]),  # a could go and does not
         (False, [(State((ENTERS, ENTERS, None)), ENTER)]),

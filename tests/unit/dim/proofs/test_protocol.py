@@ -142,8 +142,8 @@ def test_the_harmonious_gate_keeps_out_who_is_in_conflict() -> None:
     ],
 )
 def test_conflicts_inside(inside: int, pair: str | None) -> None:
-    found = protocol().conflict(State((None,) * 3, inside))
-    assert (found and " ".join(map(str, found))) == pair
+    conflict = protocol().conflict(State((None,) * 3, inside))
+    assert (conflict and " ".join(map(str, conflict))) == pair
 
 
 def test_a_turn_ends_after_a_decision_or_when_nobody_is_there() -> None:
@@ -159,7 +159,7 @@ def test_a_turn_ends_after_a_decision_or_when_nobody_is_there() -> None:
     assert (after.turn, after.decided) == (1, False)
     assert goes(rules, after) == "b"  # a2 and b2 are in conflict, and it is b's turn
     assert rules.look(state(front("a1"))).decided
-    frozen = state(front("a2"), inside=B2)  # no decision: somebody crosses
+    frozen = state(front("a2"), inside=B2)  # no decision: b2 crosses
     assert not rules.look(frozen).decided
     assert not rules.look(state(inside=B2)).decided
     assert rules.look(rules.start) == rules.start
@@ -182,4 +182,4 @@ def test_who_came_first_goes_first() -> None:
     assert after == state(front("c2"), front("a2"), came=(2, 0))
     assert goes(rules, after) == "c"
     assert goes(rules, after._replace(came=(0, 2))) == "a"
-    assert goes(rules, state(front("b2"), front("c2"))) == "b"  # lanes nobody remembers: by name
+    assert goes(rules, state(front("b2"), front("c2"))) == "b"  # no lane came first: by name

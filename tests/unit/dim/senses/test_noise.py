@@ -50,7 +50,6 @@ def crowd(count: int, time: float = 0.0) -> View:
 def test_by_default_it_is_exact() -> None:
     assert NoisyPerception().start(SITE) is see_all
     assert NoisyPerception().period is None
-    assert Dim(perception=NoisyPerception()).name == "dim"
     assert isinstance(NoisyPerception(), Perception)
 
 
@@ -122,16 +121,7 @@ def test_bounds_are_allowed(given: dict[str, Any]) -> None:
 def test_whoever_may_err_in_anything_looks_every_frame(given: dict[str, Any]) -> None:
     assert NoisyPerception(**given).period == 0.1
     assert NoisyPerception(**given, frame=0.2).period == 0.2
-    assert NoisyPerception(**given).name != "exact"
     assert NoisyPerception(confidence=0.9).period is None, "nothing to be unsure of"
-
-
-def test_names_tell_what_errs() -> None:
-    assert ALL.name == (
-        "symmetric-0.15-unsignalled-own-flicker-sure-0.7-range-25.0-occlusion-late-0.3-"
-        "position-0.5-speed-0.5"
-    )
-    assert Dim(perception=NoisyPerception(0.15)).name == "dim-missed-0.15"
 
 
 def test_it_is_a_value() -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import pickle
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dim import DecisionTable, Dim, HarmonyMatrix, Monitor, NoisyPerception, Perception
+from dim import DecisionTable, Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception, Perception
+from dim.controller import DimSession
 from dim.perception import See
-from dim.senses.tally import Tallied, TallySession
 from minisim import simulate
-from minisim.control import Counting, Observed, Session, Site, View
-from minisim.errors import InputError
-from minisim.testing import check_controller, small_scenario
+from minisim.control import Observed, Session, Site, View
+from minisim.testing import small_scenario
 from tests.builders import said, seen
 
 SITE = small_scenario(4).site(0)
@@ -24,7 +22,7 @@ NONE = {"crossings": 0, "false_grants": 0, "disagreement_s": 0.0, "deadlock_s": 
 
 @dataclass(frozen=True)
 class Told:
-    """Everybody is told what to take another's manoeuvre for: (observer, vehicle) -> read."""
+    """Vehicles are told what to take another's manoeuvre for: (observer, vehicle) -> read."""
 
     readings: tuple[tuple[tuple[int, int], int], ...] = ()
     name: str = "told"
@@ -45,48 +43,53 @@ class Told:
         return see
 
 
-def session(perception: Perception, **rules: Any) -> TallySession:
-    return Tallied(Dim(perception=perception, **rules)).start(SITE)
+def session(perception: Perception, **rules: Any) -> DimSession:
+    return Dim(perception=perception, **rules).start(SITE)
 
 
 def show(session: Session, time: float, *vehicles: Observed) -> str:
     return ", ".join(said(session.decide(View(time, vehicles))))
 
 
-def test_it_is_the_controller_that_it_counts_for() -> None:
-    dim = Dim(perception=NoisyPerception(0.15))
-    assert Tallied(dim).name == dim.name
-    assert pickle.loads(pickle.dumps(Tallied(dim))) == Tallied(dim)
-    assert isinstance(Tallied(dim).start(SITE), Counting)
-    assert not isinstance(dim.start(SITE), Counting)
-    with pytest.raises(InputError, match="dim must be a Dim"):
-        Tallied(NoisyPerception())  # type: ignore[arg-type]
+def test_exact_perception_counts_nothing() -> None:
+    assert Dim(perception=NoisyPerception()).start(SITE).counts == {}
+    assert simulate(small_scenario(4, demand_time=60.0), Dim(), 1).counts == {}
 
 
-@pytest.mark.parametrize(
-    "perception", [NoisyPerception(), NoisyPerception(0.2, "symmetric", shared=False)]
-)
-def test_counting_changes_nothing(perception: NoisyPerception) -> None:
-    scenario, dim = small_scenario(4, demand_time=200.0), Dim(perception=perception)
-    plain, counted = (simulate(scenario, c, 1, on_collision="record") for c in (dim, Tallied(dim)))
-    assert plain.trips.equals(counted.trips)
-    assert plain.counts == {}
-    assert plain.summary() == {k: v for k, v in counted.summary().items() if k not in NONE}
+def test_counting_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = small_scenario(4, demand_time=200.0)
+    dim = Dim(perception=NoisyPerception(0.2, "symmetric", shared=False))
+    counted = simulate(scenario, dim, 1, on_collision="record")
+    monkeypatch.setattr("dim.senses.tally.Tally.count", lambda *_: None)
+    assert simulate(scenario, dim, 1, on_collision="record").trips.equals(counted.trips)
+    assert counted.counts["crossings"] > 0
 
 
 @pytest.mark.parametrize(
     "dim", [Dim(), Dim(gate="harmonious"), Dim(order="lanes"), Dim(priorities="waiting"),
-            Dim(period=0.1), Dim(monitor=Monitor())]
+            Dim(monitor=Monitor()), Mixed(), Mixed(share=1.0)]
 )  # fmt: skip
-def test_exact_perception_has_nothing_to_count(dim: Dim) -> None:
-    """But the crossings: whoever is not in the junction or on the approach at the end."""
-    run = simulate(small_scenario(4, drain=300.0), Tallied(dim), 1)
+def test_right_readings_have_nothing_to_count(dim: Dim | Mixed) -> None:
+    """But the crossings: all vehicles, human drivers too, have crossed at the end."""
+    if isinstance(dim, Mixed):
+        dim = replace(dim, dim=replace(dim.dim, perception=Told()))
+    else:
+        dim = replace(dim, perception=Told())
+    run = simulate(small_scenario(4, drain=300.0), dim, 1)
     assert run.counts == {**NONE, "crossings": len(run.columns.lane)}
     assert np.all(run.columns.arrived)
 
 
-def test_the_contract() -> None:
-    check_controller(Tallied(Dim()), arms=(4,), horizon=60.0)
+def test_wrong_readings_are_counted_among_human_drivers() -> None:
+    scenario = small_scenario(4, density=250.0, demand_time=600.0)
+    dim = Dim(perception=NoisyPerception(0.25, "symmetric"))
+    none, few = (
+        simulate(scenario, Mixed(dim, share), 1, on_collision="record").counts
+        for share in (0.0, 0.3)
+    )
+    assert none == simulate(scenario, dim, 1, on_collision="record").counts
+    assert 0 < few["false_grants"] < few["crossings"]
+    assert few["disagreement_s"] > 0.0
 
 
 def test_a_right_of_way_that_the_truth_does_not_give_is_false() -> None:
@@ -111,7 +114,7 @@ def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
     assert tally.counts["false_grants"] == 1
 
 
-def test_one_wrong_reading_can_stop_everybody() -> None:
+def test_one_wrong_reading_can_stop_all_vehicles() -> None:
     """a2, b2 and d3 all conflict, so a goes; but for a d is d2, which goes with b2."""
     trio = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1)
     assert show(session(Told()), 0.0, *trio) == "Go 1"
@@ -140,7 +143,7 @@ def test_crossings_are_counted_however_rarely_one_looks() -> None:
     assert tally.counts["crossings"] == 2
 
 
-def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
+def test_a_vehicle_at_the_entry_has_not_crossed_it() -> None:
     tally = session(Told())
     for time, distance, crossings in ((0.0, 2.1, 0), (1.0, 0.5, 0), (2.0, 0.0, 0), (3.0, -0.1, 1)):
         show(tally, time, seen(1, 0, 2, distance))
@@ -148,7 +151,7 @@ def test_whoever_is_at_the_entry_has_not_crossed_it() -> None:
 
 
 def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
-    for distance, crossings in ((8.0, 1), (8.001, 0)):  # who leaves between two looks
+    for distance, crossings in ((8.0, 1), (8.001, 0)):  # that leaves between two looks
         tally = session(Told())
         show(tally, 5.0, seen(1, 0, 2, distance, 5.0))
         show(tally, 9.0)
@@ -156,7 +159,7 @@ def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
 
 
 @pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
-def test_who_must_wait_anyway_disagrees_with_nobody(gate: str, lasts: float) -> None:
+def test_a_vehicle_that_must_wait_anyway_does_not_disagree(gate: str, lasts: float) -> None:
     """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
     views = [
         (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
@@ -173,7 +176,7 @@ def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> N
     """The experiment can fail: with one reading in four wrong, bodies touch."""
     scenario = small_scenario(4, density=300.0, demand_time=1200.0)
     wrong = NoisyPerception(0.25, "symmetric")
-    run = simulate(scenario, Tallied(Dim(perception=wrong)), 1, on_collision="record")
+    run = simulate(scenario, Dim(perception=wrong), 1, on_collision="record")
     assert run.collisions
     assert run.counts["false_grants"] >= len(run.collisions)
     assert run.counts["disagreement_s"] > 0.0
@@ -189,11 +192,11 @@ def test_lanes_first_lets_the_first_lane_go_in_every_case() -> None:
 
 @pytest.mark.parametrize("confidence", [None, 0.9])
 def test_lanes_first_never_blocks_on_wrong_intents(confidence: float | None) -> None:
-    """The first lane that takes part belongs to the clique of every case: it goes, whoever errs."""
+    """The first lane that takes part is in the clique of every case: it always goes."""
     scenario = small_scenario(4, density=250.0, demand_time=600.0)
     wrong = NoisyPerception(0.25, "symmetric", shared=False, confidence=confidence)
     size, lanes = (
-        simulate(scenario, Tallied(Dim(order=order, perception=wrong)), 1, on_collision="record")
+        simulate(scenario, Dim(order=order, perception=wrong), 1, on_collision="record")
         for order in ("size", "lanes")
     )
     assert size.counts["deadlock_s"] > 100.0

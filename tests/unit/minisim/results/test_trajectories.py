@@ -19,15 +19,14 @@ from baselines import FixedTime
 from minisim.errors import FileError, InputError, MissingExtraError
 from minisim.results import trajectories as recording
 from minisim.results.run import Run
+from minisim.results.summary import TRIP_COLUMNS
 from minisim.results.trajectories import (
     TRAJECTORY_COLUMNS,
     movement_index,
-    replacing,
     write_fcd,
     write_trajectories,
     write_trips,
 )
-from minisim.results.trips import TRIP_COLUMNS
 from minisim.testing import small_scenario
 
 
@@ -246,26 +245,6 @@ def test_a_failure_halfway_leaves_the_old_file(
         write_fcd(run.trajectories, path, run.site)
     assert path.read_text(encoding="utf-8") == "old"
     assert os.listdir(tmp_path) == ["fcd.xml"]
-
-
-def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "out.txt"
-    with replacing(path) as temporary:
-        temporary.write_text("new", encoding="utf-8")
-        assert not path.exists()
-        assert temporary.parent == path.parent
-    assert path.read_text(encoding="utf-8") == "new"
-    assert os.listdir(tmp_path) == ["out.txt"]
-
-
-def test_a_symbolic_link_keeps_pointing_to_the_file(tmp_path: Path) -> None:
-    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
-    real.write_text("old", encoding="utf-8")
-    link.symlink_to(real)
-    with replacing(link) as temporary:
-        temporary.write_text("new", encoding="utf-8")
-    assert link.is_symlink()
-    assert real.read_text(encoding="utf-8") == "new"
 
 
 @pytest.mark.parametrize("path", [5, None, b"x.csv"])

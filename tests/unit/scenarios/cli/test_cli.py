@@ -19,12 +19,13 @@ from PIL import Image
 import minisim.simulation
 from dim import HarmonyMatrix
 from minisim.errors import InputError
-from minisim.results.trips import TRIP_COLUMNS
+from minisim.results.metrics import METRICS, SAFETY
+from minisim.results.summary import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
-from scenarios.cli.shared.report import harmony_table
+from scenarios.cli.shared.proof import harmony_table
 from scenarios.cli.shared.terminal import show
-from scenarios.controllers import CONTROLLERS, controller_named
+from scenarios.controllers import controller_named
 from scenarios.demo import Tour
 from tests import ROOT
 
@@ -74,13 +75,33 @@ def test_nothing_typed_is_help(capsys: pytest.CaptureFixture[str]) -> None:
 def test_run_help_has_examples_that_work(capsys: pytest.CaptureFixture[str]) -> None:
     lines = [" ".join(line.split()) for line in ok(capsys, "run", "--help").splitlines()]
     examples = [line for line in lines if line.startswith("minisim run ")]
-    assert len(examples) >= 3
+    assert len(examples) == 2
     for example in examples:
         short = [*example.split()[1:], "--horizon", "60"]
         written = [k for k, word in enumerate(short) if word in ("--trips", "--fcd")]
         for k in reversed(written):
             del short[k : k + 2]
         ok(capsys, *short)
+
+
+def test_run_help_fits_on_two_screens() -> None:
+    environment = {**os.environ, "COLUMNS": "80", "TERMINAL_WIDTH": "80"}
+    done = subprocess.run(
+        [sys.executable, "-m", "minisim", "run", "--help"],
+        cwd=ROOT, env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 2 * 25
+    assert max(map(len, lines)) <= 80
+
+
+def test_python_runs_the_package_as_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "minisim", "run", "for-way"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "did you mean 'four-way'" in done.stderr
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -104,8 +125,8 @@ def test_help_loads_nothing_heavy() -> None:
 def test_run_json_is_the_summary_and_safety(capsys: pytest.CaptureFixture[str]) -> None:
     printed = json.loads(ok(capsys, "run", "four-way", *SHORT, "--seed", "3", "--json"))
     run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
-    assert set(printed) >= RUN_KEYS | {"safety"}
-    safety = printed.pop("safety")
+    assert set(printed) >= RUN_KEYS
+    safety = {name: printed.pop(name) for name in SAFETY}
     assert printed == run.summary()
     assert set(printed["lanes"]) == set("abcd")
     assert set(printed["lanes"]["a"]) >= {"trips", "waiting_time_s", "travel_time_s"}
@@ -127,7 +148,7 @@ def test_run_tells_humans_from_the_others(capsys: pytest.CaptureFixture[str]) ->
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
     printed = json.loads(ok(capsys, *arguments, "--json"))
     assert printed["controller"] == "dim-humans-0.4"
-    groups = printed["drivers"]
+    groups = printed["kinds"]
     assert groups["human"]["trips"] + groups["automated"]["trips"] == printed["trips"]
     rows = {words[0]: words[1:] for line in ok(capsys, *arguments).splitlines()
             if (words := line.split())}  # fmt: skip
@@ -205,8 +226,46 @@ def test_without_safety_nothing_is_recorded(
     with_safety = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json"))
     without = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json", "--no-safety"))
     assert records == ["junction", None]
-    assert without == {**with_safety, "safety": None}
+    assert without == {k: v for k, v in with_safety.items() if k not in SAFETY}
     assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
+
+
+def test_metrics_that_were_asked_for_by_movement(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
+    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--no-safety", "--json"))
+    assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
+    assert len(printed["movements"]) == 12
+    assert printed["max_drac_mps2"] > 0.0, "its trajectories are recorded for it"
+    assert "min_ttc_s" not in printed
+    out = ok(capsys, "run", "four-way", *SHORT, *asked)
+    rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
+    means = printed["movements"]["a1"]
+    expected = [means[f"time_loss_s{what}"] for what in ("", "_p50", "_p95", "_max")]
+    assert rows["a1"][2:] == [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
+    for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"):
+        assert word in out
+
+
+def test_metrics_lists_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = json.loads(ok(capsys, "metrics", "--json"))
+    assert [metric["name"] for metric in listed] == list(METRICS)
+    out = ok(capsys, "metrics")
+    for metric in METRICS.values():
+        assert metric.name in out
+        assert metric.meaning in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
+        (("--by", "lan"), "did you mean 'lane'?"),
+    ],
+)
+def test_unknown_metrics_and_groups(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    assert message in fails(capsys, "run", "four-way", *SHORT, *arguments)
 
 
 # --- harmony and decide ----------------------------------------------------------------------
@@ -303,7 +362,7 @@ def test_demo_quick(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
     points = pd.read_csv(folder / "demo.csv")
-    assert sorted(points["controller"].unique()) == ["dim", "dim-harmonious", "fixed-time"]
+    assert sorted(points["controller"].unique()) == ["dim", "dim:gate=harmonious", "fixed-time"]
     assert set(points["density"]) == {150.0, 350.0}
     assert (points["waiting_time_s_ci95"] > 0).all()
     assert (points["collisions"] == 0).all()
@@ -348,7 +407,7 @@ BAD = [
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "0,nan,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
-    (("run", "four-way", "--split", "1:1:inf:1"), "'inf' is no finite number"),
+    (("run", "four-way", "--split", "1:1:inf:1"), "written like 4:3:2:1, got '1:1:inf:1'"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
@@ -492,14 +551,6 @@ def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     assert "a1-b2" in decision.stdout
 
 
-# --- controllers -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-def test_controllers_are_called_what_they_say(name: str) -> None:
-    assert controller_named(name, "fair").name == name
-
-
 # --- verify and protocol ---------------------------------------------------------------------
 
 
@@ -511,17 +562,17 @@ def test_verify_tells_what_all_cases_showed(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_verify_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    found = json.loads(ok(capsys, "verify", "three-way", "--json"))
-    assert (found["arms"], found["cases"], found["most_cliques_tied"]) == (3, 26, 3)
-    assert all(claim["holds"] for claim in found["claims"])
-    assert found["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
-    assert found["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
+    printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
+    assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
+    assert all(claim["holds"] for claim in printed["claims"])
+    assert printed["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
+    assert printed["worst_cases"] == [{"clique_size": 1, "cases": 1, "first": ["a2", "b2", "c2"]}]
 
 
 def test_verify_shows_a_false_claim_and_exits_1(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", "three-way", "--order", "lanes", "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    (false,) = [claim for claim in found["claims"] if not claim["holds"]]
+    printed = json.loads(capsys.readouterr().out)
+    (false,) = [claim for claim in printed["claims"] if not claim["holds"]]
     assert (false["name"], false["failures"]) == ("largest", 1)
     assert false["smallest_counterexample"] == ["a2", "b1", "c2"]
 
@@ -544,10 +595,10 @@ def test_protocol_of_the_default_rules(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_protocol_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     rules = ("--order", "lanes", "--priorities", "waiting")
-    found = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
-    assert found["all_states"] is True
-    assert (found["unsafe"], found["stuck"]) == ([], None)
-    assert found["starving"] == {"a": None, "b": None, "c": None}
+    printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
+    assert printed["all_states"] is True
+    assert (printed["unsafe"], printed["stuck"]) == ([], None)
+    assert printed["starving"] == {"a": None, "b": None, "c": None}
 
 
 def test_protocol_writes_a_counterexample_that_collides(
@@ -559,7 +610,7 @@ def test_protocol_writes_a_counterexample_that_collides(
     assert "safe         no: arrive b1, look, roll b1, arrive a2, look," in text
     assert f"wrote {file}" in text
     run = ("run", "three-way", "--arrivals", str(file), "-c")
-    assert "touched" in fails(capsys, *run, "dim-paper-commit", "--horizon", "120", code=1)
+    assert "touched" in fails(capsys, *run, "dim:commit=paper", "--horizon", "120", code=1)
     assert "collisions 0" in ok(capsys, *run, "dim", "--horizon", "120")
 
 

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from figures import gallery, report
+from figures import gallery
+from figures import reproduction_report as report
 from figures.gallery import GALLERY
 from figures.tables import WRITERS
-from minisim.errors import InputError
 from scenarios.cli import main
 from scenarios.cli.shared import terminal
-from scenarios.studies import reproduction
-from scenarios.studies.archive import MissingRunsError
-from scenarios.studies.capacity import CASES, Search
-from scenarios.studies.reproduction import PARTS, Plan, find_in, reproduce
-from scenarios.studies.results import Effort
+from scenarios.studies import NAMES, capacity
+from scenarios.studies.shared.archive import Archive, MissingRunsError, find_in
+from scenarios.studies.shared.effort import Effort, Search
+from scenarios.studies.shared.reproduction import reproduce
 from scenarios.sweep.store import Store
 
 
@@ -89,33 +89,41 @@ def test_an_empty_store_says_what_makes_its_runs(
     assert "minisim reproduce --only gate --seeds 10" in capsys.readouterr().err
 
 
-TINY = Plan(
-    effort=Effort(seeds=2, horizon=100.0, densities=(350.0,)),
+TINY = Effort(
+    seeds=2, horizon=100.0, densities=(350.0,),
     search=Search(step=400.0, steps=2, seeds=1, horizon=100.0),
-    parts=("fairness", "capacity"),
-)
+)  # fmt: skip
 
 
-def test_reproduce_computes_what_is_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(reproduction, "CASES", CASES[:2])
+@pytest.fixture
+def small_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    few = replace(capacity.STUDY, points=capacity.STUDY.points[:2])
+    monkeypatch.setattr(capacity, "STUDY", few)
+
+
+@pytest.mark.usefixtures("small_search")
+def test_reproduce_computes_what_is_missing(tmp_path: Path) -> None:
+    names = ("fairness", "capacity")
     seen: list[tuple[int, int]] = []
     with Store(tmp_path / "runs.sqlite") as store:
-        first = reproduce(TINY, store, 1, lambda done, total: seen.append((done, total)))
-        again = reproduce(TINY, store, 1, lambda done, total: None)
-        archive = TINY.archive(find_in(store))
+        first = [
+            reproduce(name, TINY, store, 1, lambda done, total: seen.append((done, total)))
+            for name in names
+        ]
+        again = [reproduce(name, TINY, store, 1, lambda done, total: None) for name in names]
+        archive = Archive(find_in(store), TINY)
         assert archive.study("fairness").missing == ()
+        assert len(capacity.capacities(archive.study("capacity"))) == 2
         with pytest.raises(MissingRunsError):
             archive.need("text")
-    assert [(part.name, part.runs, part.computed) for part in first] == [
+    assert [(made.name, made.runs, made.computed) for made in first] == [
         ("fairness", 6, 6), ("capacity", 2, 2),
     ]  # fmt: skip
-    assert [part.computed for part in again] == [0, 0]
+    assert [made.computed for made in again] == [0, 0]
     assert seen[5] == (6, 6)
     assert seen[-1] == (2, 2)
-    assert first[0].hours == pytest.approx(6 * 100 / 3600)
-    assert not any(part.failed for part in first)
+    assert [made.hours for made in first] == pytest.approx([600 / 3600, 200 / 3600])
+    assert not any(made.failed for made in first)
 
 
 def test_progress_is_told_without_a_terminal(
@@ -132,28 +140,27 @@ def test_progress_is_told_without_a_terminal(
     assert capsys.readouterr().err == "simulating text: 2 of 9\nstill: 4 of 9\n"
 
 
+@pytest.mark.usefixtures("small_search")
 def test_reproduce_says_what_each_study_took(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(reproduction.Plan, "of", lambda **_: TINY)
-    monkeypatch.setattr(reproduction, "CASES", CASES[:1])
+    monkeypatch.setattr(Effort, "of", lambda **_: TINY)
     monkeypatch.setattr(report, "write_report", lambda *_, parts: len(parts))
-    assert main(["reproduce", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    only = ("--only", "fairness", "--only", "capacity")
+    assert main(["reproduce", "--jobs", "1", "--out", str(tmp_path), *only]) == 0
     captured = capsys.readouterr()
     took = captured.err.splitlines()
     assert [line.rpartition(" in ")[0] for line in took] == [
-        "fairness: 6 of 6 runs computed", "capacity: 1 of 1 runs computed",
+        "fairness: 6 of 6 runs computed", "capacity: 2 of 2 runs computed",
     ]  # fmt: skip
     assert "wrote 2 figures and tables" in captured.out
 
 
-def test_plans() -> None:
-    assert Plan.of().effort == Effort()
-    assert Plan.of().parts == PARTS
-    assert Plan.of(quick=True, seeds=3).effort.seeds == 3
-    assert Plan.of(parts=["text"]).parts == ("text",)
-    with pytest.raises(InputError, match="did you mean 'text'"):
-        Plan.of(parts=["texts"])
+@pytest.mark.parametrize("command", ["reproduce", "sweep"])
+def test_help_names_every_study(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    words = capsys.readouterr().out.replace("│", " ").replace(",", " ").replace(".", " ").split()
+    assert {*NAMES} - {"capacity"} <= {*words}
 
 
 @pytest.mark.slow

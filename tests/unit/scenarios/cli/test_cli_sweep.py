@@ -14,10 +14,9 @@ import pandas as pd
 import pytest
 
 from scenarios.cli import main
-from scenarios.studies import study as studies
-from scenarios.studies.reproduction import find_in
-from scenarios.studies.results import Effort, collect
-from scenarios.studies.study import STUDIES
+from scenarios.studies import text
+from scenarios.studies.shared.archive import find_in
+from scenarios.studies.shared.effort import Effort
 from scenarios.sweep.store import Store
 from tests import ROOT
 
@@ -85,9 +84,9 @@ def test_the_papers_grid(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The study `text`: what `minisim reproduce` needs of it is then in the store."""
-    text = STUDIES["text"]
-    some = replace(text, cases=tuple(case for case in text.cases if case.density == 300))
-    monkeypatch.setattr(studies, "STUDIES", {"text": some})
+    points = tuple(point for point in text.STUDY.points if point.density == 300)
+    some = replace(text.STUDY, points=points)
+    monkeypatch.setattr(text, "STUDY", some)
     store = tmp_path / "s.db"
     few = ["--seeds", "2", "--horizon", "5", "--jobs", "1", "--out", str(store)]
     assert main(["sweep", "paper", *few]) == 0
@@ -96,7 +95,7 @@ def test_the_papers_grid(
         assert len(kept) == 28
         assert set(kept.frame()["profile"]) == {"paper"}
         effort = Effort(seeds=2, horizon=5.0, densities=(300.0,))
-        assert collect(text, effort, find_in(kept)).missing == ()
+        assert some.collect(effort, find_in(kept)).missing == ()
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,9 @@ from figures import save
 from figures.crossval import DODGE, crossval_figures
 from minisim.errors import InputError, SumoError
 from minisim.junction.geometry import Floats
+from minisim.results.metrics import MEANS
 from minisim.results.run import Run
-from minisim.results.trips import METRICS, Trips
+from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.cli import main
@@ -112,7 +113,7 @@ def test_ks_distance_needs_numbers(bad: object) -> None:
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
     rows = {(row.lane, row.metric): row for row in compare([pair()], 2)}
-    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b") for metric in METRICS}
+    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b") for metric in MEANS}
     everyone = rows["all", "waiting_time_s"]
     assert everyone.trips == (4, 3)
     assert everyone.minisim.mean == pytest.approx(1.5)
@@ -134,7 +135,7 @@ def test_differences_are_paired_by_seed() -> None:
         ours = trips(waiting.tolist(), [50.0] * 4, ended)
         theirs = trips((waiting + 0.1 * (seed + 1)).tolist(), [50.0] * 4, ended)
         pairs.append(Pair(seed, ours, theirs))
-    row = compare(pairs, 2)[METRICS.index("waiting_time_s")]
+    row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
 
@@ -231,7 +232,7 @@ def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> No
     """What ran, not what the label says; the numbers are those of the label."""
     (v2ic,) = replayed_cases([], ["v2ic"], [350], ["4:3:2:1"], None, 3600.0)
     assert v2ic.name == "four-way 4:3:2:1 350 v2ic"
-    assert v2ic.decider() == V2ICAsRun(approach_speed=14.0)
+    assert v2ic.recipe().controller == V2ICAsRun(approach_speed=14.0)
     assert v2ic.reference("travel_time_s", "all") == reference_value(
         Cell("4:3:2:1", 350, 4, "v2ic"), "travel_time_s"
     )
@@ -240,22 +241,22 @@ def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> No
         [], ["fixed-time"], [200], ["balanced", "4:3:2:1"], None, 3600.0
     )
     assert balanced.scenario.profile == AS_RUN_SIGNALS
-    assert balanced.decider() == FixedTime(greens=GREENS[200], order=PHASES)
+    assert balanced.recipe().controller == FixedTime(greens=GREENS[200], order=PHASES)
     assert unbalanced.scenario.profile == AS_RUN
-    assert unbalanced.decider() == FixedTime(greens=5.0, order=PHASES)
+    assert unbalanced.recipe().controller == FixedTime(greens=5.0, order=PHASES)
     assert balanced.reference_tolerance("travel_time_s") == Tolerance(0.0, 2.0)
 
 
 def test_dims_arms_have_the_names_of_their_run() -> None:
     (case,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
-    assert case.decider() == AsRunDim(names="acbd")
+    assert case.recipe().controller == AsRunDim(names="acbd")
     assert case.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
 
 
 def test_published_arrivals_with_another_vehicle() -> None:
     """The controller goes with the vehicle, and the paper's numbers are not asked for."""
     dim, signal = replayed_cases([], ["dim", "fixed-time"], [200], ["4:1:4:1"], "fair", 3600.0)
-    assert (dim.decider(), signal.decider()) == (Dim(), FixedTime())
+    assert (dim.recipe().controller, signal.recipe().controller) == (Dim(), FixedTime())
     assert dim.reference("waiting_time_s", "all") is None
     recorded = dim.scenario.arrivals(0)
     assert np.array_equal(recorded.time, published_arrivals("4:1:4:1", 200, 4).time)
@@ -335,7 +336,7 @@ def test_replays_are_judged_by_the_papers_means() -> None:
 def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
     case = Case(four_way(150, profile="fair"), "dim")
     frame = table([result(case, pair(1), pair(2))])
-    assert len(frame) == 5 * len(METRICS)
+    assert len(frame) == 5 * len(MEANS)
     assert frame["error"].isna().all()
     row = frame[(frame["lane"] == "all") & (frame["metric"] == "waiting_time_s")].iloc[0]
     assert (row["seeds"], row["trips_minisim"], row["trips_sumo"]) == (2, 8, 6)
@@ -402,7 +403,7 @@ def test_runs_of_sumo_are_kept_and_used_again(
     files[0].write_bytes(b"PK half of a file")
     assert agreement_of(case) == 1.0
     assert len(ran) == 3, "what is not whole is run again"
-    agreement_of(Case(case.scenario, "dim-harmonious"))
+    agreement_of(Case(case.scenario, "dim:gate=harmonious"))
     assert len(ran) == 5, "another controller is another run"
 
 

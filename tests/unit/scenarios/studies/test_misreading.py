@@ -5,41 +5,16 @@ from __future__ import annotations
 import json
 import math
 
-import pandas as pd
 import pytest
 
-from dim import Dim, ExactPerception, Monitor, NoisyPerception
-from dim.senses.intent import RATES
-from dim.senses.noise import UNSIGNALLED
-from dim.senses.tally import Tallied
+from dim import Dim, NoisyPerception
 from minisim import simulate
 from minisim.errors import CollisionError, InputError
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.controllers import controller_named
-from scenarios.misreading import counted, with_perception
 from scenarios.statistics import poisson_interval
-from scenarios.studies.misreading import CROSSINGS, MANNERS, Misreading, rate_of
-from scenarios.studies.results import Effort
-from scenarios.studies.study import STUDIES
-from scenarios.sweep.experiment import run_experiment
 
 WRONG = NoisyPerception(0.15)
-
-
-def test_only_vehicles_of_dim_misread() -> None:
-    assert with_perception(Dim(gate="harmonious"), WRONG) == Dim("size", gate="harmonious",
-                                                                perception=WRONG)  # fmt: skip
-    fixed = controller_named("fixed-time")
-    assert with_perception(fixed, ExactPerception()) is fixed
-    with pytest.raises(InputError, match="can misread each other, not those of 'fixed-time'"):
-        with_perception(fixed, WRONG)
-
-
-def test_what_errs_is_counted() -> None:
-    assert counted(Dim(perception=WRONG)) == Tallied(Dim(perception=WRONG))
-    assert counted(Dim()) == Dim()
-    assert counted(controller_named("adaptive")).name == "adaptive"
 
 
 # --- rates -----------------------------------------------------------------------------------
@@ -70,63 +45,6 @@ def test_poisson_interval_by_its_definition() -> None:
         poisson_interval(1, 1.0)
 
 
-def test_a_rate_is_that_of_all_runs_together() -> None:
-    rows = pd.DataFrame(
-        {"collisions": [3, 2], "crossings": [900.0, 1100.0], "trips": [9, 9], "unfinished": [0, 0]}
-    )
-    rate = rate_of(rows, "collisions")
-    assert rate is not None
-    low, high = poisson_interval(5)
-    assert rate == pytest.approx((25.0, 5.0 * low, 5.0 * high, 5, 2000))
-    assert rate.rate == 5 * CROSSINGS / 2000
-
-
-def test_runs_without_tally_have_their_trips() -> None:
-    rows = pd.DataFrame({"collisions": [0], "trips": [1010], "unfinished": [10]})
-    collisions, grants = rate_of(rows, "collisions"), rate_of(rows, "false_grants")
-    assert collisions == grants
-    assert collisions is not None
-    assert (collisions.crossings, collisions.rate) == (1000, 0.0)
-    assert rate_of(rows.assign(trips=10), "collisions") is None
-
-
-# --- studies ---------------------------------------------------------------------------------
-
-
-def test_the_study_goes_over_rates_kinds_and_manners() -> None:
-    cases = [c for c in STUDIES["perception"].cases if isinstance(c, Misreading)]
-    assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
-    found = {
-        (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
-    }
-    assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
-    exact = [c.experiment(1).controller for c in cases if c.perception.period is None]
-    assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
-    assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
-    keys = {c.experiment(1).key for c in cases}
-    assert len(keys) == len(cases)
-
-
-@pytest.mark.parametrize("name", ["perception", "confidence"])
-def test_all_cases_meet_the_same_arrivals_and_count(name: str) -> None:
-    runs = [e for _, e in STUDIES[name].runs(10)]
-    assert len(runs) == 5 * len(STUDIES[name].cases)
-    assert len({(e.scenario, e.seed) for e in runs}) == 5
-    assert {e.on_collision for e in runs} == {"record"}
-    assert Effort.quick().cases(STUDIES[name]) == STUDIES[name].cases
-
-
-def test_a_row_holds_what_was_counted() -> None:
-    row, _ = run_experiment(Misreading("dim", "symmetric", 0.25).experiment(1, 300.0))
-    assert row["controller"] == "dim-symmetric-0.25"
-    assert row["crossings"] > 50
-    assert row["false_grants"] > 0
-    assert row["disagreement_s"] > 0.0
-    assert row["deadlock_s"] == 0.0
-    plain, _ = run_experiment(Misreading("dim").experiment(1, 60.0))
-    assert "crossings" not in plain
-
-
 def test_the_collision_that_docs_explain() -> None:
     """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
     scenario = four_way(250, profile="fair")
@@ -147,32 +65,10 @@ RUN = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", 
 
 
 def test_one_run_tells_what_was_counted(capsys: Captured) -> None:
-    assert main([*RUN, "--intent-error", "0.25", "--error-kind", "symmetric"]) == 0
-    text = capsys.readouterr().out
-    assert "dim-symmetric-0.25" in text
-    assert "false grants" in text
-    assert main([*RUN, "--json", "-c", "dim-unsignalled"]) == 0
+    assert main([*RUN, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)"]) == 0
+    assert "false grants" in capsys.readouterr().out
+    assert main([*RUN, "--json", "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["crossings"] >= found["trips"] - found["unfinished"]
     assert main(RUN) == 0
     assert "false grants" not in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--intent-error", "1.5"), "intent_error must be at least 0 and at most 1, got 1.5"),
-        (("--intent-error", "nan"), "intent_error must be"),
-        (("--error-kind", "mised"), "did you mean 'missed'"),
-        (("--error-kind", "symmetric"), "--error-kind symmetric needs --intent-error P above 0"),
-        (("-c", "dim-occlusion", "--intent-error", "0.1"), "has a perception of its own"),
-        (("--intent-error", "0.1", "-c", "fixed-time"), "not those of 'fixed-time'"),
-    ],
-)
-def test_bad_values_exit_2(capsys: Captured, options: tuple[str, ...], message: str) -> None:
-    assert main([*RUN, *options]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("minisim: ")
-    assert message in captured.err
-    assert captured.err.count("\n") == 1

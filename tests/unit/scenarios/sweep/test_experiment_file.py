@@ -13,11 +13,12 @@ from minisim.errors import FileError, InputError, MinisimError
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.cli import main, sweep
 from scenarios.cli.sweep import DEFAULTS
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
 from scenarios.sweep.file import AXES, CUSTOM, SINGLE, check_can_run, read_experiments
+from scenarios.sweep.rows import identity_of
 
 
-def read(tmp_path: Path, text: str) -> list[Experiment]:
+def read(tmp_path: Path, text: str) -> list[Recipe]:
     file = tmp_path / "e.toml"
     file.write_text(text)
     return read_experiments(file)
@@ -32,13 +33,14 @@ def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
 def test_the_help_has_the_values_of_what_is_left_out() -> None:
     drawn = {**AXES, **SINGLE}
     assert drawn.pop("arrivals") is None
+    assert drawn.pop("metrics") == ()
     assert drawn == DEFAULTS
     assert sweep.CUSTOM == CUSTOM
 
 
 def test_a_short_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
     found = read(tmp_path, "horizon = 3600")
-    assert found == [Experiment(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
+    assert found == [Recipe(four_way(350.0), Dim(), seed) for seed in range(1, 11)]
 
 
 def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
@@ -48,7 +50,7 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
         'controller = ["dim", "fixed-time"]\nprofile = "fair"\nhorizon = 600\n',
     )
     assert found == [
-        Experiment(make(density, profile="fair", horizon=600.0), controller, seed)
+        Recipe(make(density, profile="fair", horizon=600.0), controller, seed)
         for make in (three_way, five_way)
         for density in (150.0, 350.0)
         for controller in (Dim(), FixedTime())
@@ -57,10 +59,10 @@ def test_every_combination_of_what_is_listed(tmp_path: Path) -> None:
 
 
 def test_shares_of_humans(tmp_path: Path) -> None:
-    found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim-harmonious"\n')
+    found = read(tmp_path, 'humans = [0, 0.25]\nseeds = [1]\ncontroller = "dim:gate=harmonious"\n')
     dim = Dim(gate="harmonious")
-    assert [e.controller for e in found] == [dim, Mixed(dim, 0.25)]
-    assert [e.name for e in found] == ["dim-harmonious", "dim-harmonious-humans-0.25"]
+    assert [e.driven for e in found] == [dim, Mixed(dim, 0.25)]
+    assert [e.name for e in found] == ["dim:gate=harmonious", "dim:gate=harmonious-humans-0.25"]
 
 
 def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
@@ -82,8 +84,26 @@ def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
     assert found.controller.priorities == "inflow"
     assert (found.controller.zones.red, found.controller.zones.yellow) == (20, 6)
     assert (found.name, found.seed, found.on_collision) == ("inflow", 5, "record")
-    assert found.identity()["split"] == "4:3:2:1"
-    assert found.identity()["turns"] == "1:2:1"
+    assert identity_of(found)["split"] == "4:3:2:1"
+    assert identity_of(found)["turns"] == "1:2:1"
+
+
+def test_shares_are_numbers_or_a_text(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, "seeds = [1]\nsplit = [4, 3, 2, 1]\nturns = [1, 2, 1]\n")
+    assert one.scenario == four_way(split="4:3:2:1", turns="1:2:1")
+    several = read(tmp_path, 'seeds = [1]\nsplit = [[4, 3, 2, 1], "balanced", "4:1:4:1"]\n')
+    splits = ("4:3:2:1", None, "4:1:4:1")
+    assert [e.scenario for e in several] == [four_way(split=split) for split in splits]
+
+
+def test_a_warmup_holds_for_the_block(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, "seeds = [1]\nwarmup = 600\n")
+    assert one.scenario == four_way(warmup=600.0)
+
+
+def test_metrics_hold_for_the_block(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, 'seeds = [1]\nmetrics = ["waiting_time_s", "min_pet_s"]\n')
+    assert one.metrics == ("waiting_time_s", "min_pet_s")
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -95,11 +115,11 @@ def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
         "[[experiment]]\n",
     )
     assert found == [
-        Experiment(four_way(150.0), FixedTime(), 1),
-        Experiment(three_way(300.0), Dim(), 1),
-        Experiment(four_way(150.0), Dim(), 1),  # and not a second time by the last block
-        Experiment(four_way(150.0), Dim(), 2),
-        Experiment(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, "x"),
+        Recipe(four_way(150.0), FixedTime(), 1),
+        Recipe(three_way(300.0), Dim(), 1),
+        Recipe(four_way(150.0), Dim(), 1),  # and not a second time by the last block
+        Recipe(four_way(150.0), Dim(), 2),
+        Recipe(four_way(150.0), FixedTime(greens=(9.0, 8.0, 7.0, 6.0)), 1, label="x"),
     ]
 
 
@@ -110,7 +130,7 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     assert found.scenario.recorded is not None
     assert found.scenario.recorded.time.tolist() == arrivals.time.tolist()
     assert found.scenario.density == pytest.approx(len(arrivals) * 36 / 4)
-    assert found.identity()["split"] == "recorded"
+    assert identity_of(found)["split"] == "recorded"
 
 
 def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
@@ -130,18 +150,19 @@ WRONG = [
     ('scenario = {name = "custom", bearing = [0]}', r"key of a scenario 'bearing'.*'bearings'"),
     ('scenario = {bearings = [0]}', r"has no name"),
     ('scenario = "custom"', r"needs bearings, such as scenario = { name = \"custom\", bea"),
-    ("split = [4, 3, 2, 1]", r'split must be a text such as "4:3:2:1", got 4'),
+    ("split = [[4, 3], 2]", r"split has 2 shares for 4 lanes"),
+    ("warmup = 3600", r"warmup \[s\] must be .*below 3600"),
     ('scenario = {name = "four-way", label = 3}', r"label must be a str"),
     ("scenario = 4", r"scenario: must be a name"),
     ('controller = "dmi"', r"controller: unknown controller 'dmi'.*'dim'"),
-    ('controller = {name = "dim", ordr = "size"}', r"parameter of dim 'ordr'.*'order'"),
-    ('controller = {name = "dim", zones = {rd = 3}}', r"parameter of dim.zones 'rd'.*'red'"),
+    ('controller = {name = "dim", ordr = "size"}', r"dim parameter 'ordr'.*'order'"),
+    ('controller = {name = "dim", zones = {rd = 3}}', r"zones=zones parameter 'rd'.*'red'"),
     ('controller = {name = "dim", order = "sise"}', r"unknown order 'sise'.*'size'"),
     ('controller = {name = "dim", zones = 3}', r"zones must be a Zones"),
-    ('controller = {name = "unregulated", x = 3}', r"parameter of unregulated 'x'"),
+    ('controller = {name = "unregulated", x = 3}', r"unregulated has no parameters, got x"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"profile must be a text"),
-    ('split = "4-3"', r"split: a split is written like"),
+    ('split = "4-3"', r"split is balanced or written like"),
     ('split = "4:3"', r"split has 2 shares for 4 lanes"),
     ('turns = "1:2"', r"turns has 2 shares for 3 manoeuvres"),
     ('side = "middle"', r"'middle'"),
@@ -157,14 +178,17 @@ WRONG = [
     ("density = [1, 2, 3]\nseeds = 1000000", r"3000000 experiments are more than"),
     ("horizon = 0", r"horizon"),
     ("horizon = [1]", r"horizon"),
-    ('humans = 1.5', r"humans: share of humans must be at least 0 and at most 1, got 1.5"),
-    ('humans = "all"', r"humans: share of humans must be a number, got 'all'"),
-    ('humans = 0.1\ncontroller = "fixed-time"', r"humans: .*not with 'fixed-time'"),
+    ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
+    ('humans = "all"', r"share of humans must be a number, got 'all'"),
+    ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
+    ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
+    ('metrics = "trips"', r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('controller = ["dim", {name = "dim", zones = {red = 3}}]', r"both be called dim.*label"),
+    ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
+     r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
 ]  # fmt: skip
 
@@ -197,9 +221,11 @@ def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
     found = read(
         tmp_path, 'scenario = "three-way"\ncontroller = {name = "fixed-time", greens = [1, 2]}\n'
     )
-    with pytest.raises(InputError, match=r"fixed-time cannot serve three-way at 350 .*2 values"):
+    with pytest.raises(
+        InputError, match=r"greens=\(1,2\) cannot serve three-way at 350 .*2 values"
+    ):
         check_can_run(found)
     store = tmp_path / "s.db"
     assert main(["sweep", str(tmp_path / "e.toml"), "--out", str(store)]) == 2
-    assert "fixed-time cannot serve three-way" in capsys.readouterr().err
+    assert "fixed-time:greens=(1,2) cannot serve three-way" in capsys.readouterr().err
     assert not store.exists()

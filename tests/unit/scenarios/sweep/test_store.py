@@ -18,28 +18,29 @@ from dim import Dim
 from minisim.errors import FileError, InputError
 from scenarios import four_way, three_way
 from scenarios.cli import main
-from scenarios.sweep import experiment as experiment_module
-from scenarios.sweep import sweep
-from scenarios.sweep.experiment import Experiment, Outcome, failed, run_experiment
+from scenarios.recipe import Recipe
+from scenarios.sweep import keys, sweep
+from scenarios.sweep.keys import key_of
+from scenarios.sweep.rows import Outcome, failed, outcome_of
 from scenarios.sweep.store import APPLICATION, SCHEMA, Store
 from tests import ROOT
 
 
-def experiment(seed: int = 1) -> Experiment:
-    return Experiment(three_way(200, horizon=60), Dim(), seed)
+def experiment(seed: int = 1) -> Recipe:
+    return Recipe(three_way(200, horizon=60), Dim(), seed)
 
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return run_experiment(experiment())
+    return outcome_of(experiment())
 
 
 def test_a_row_comes_back_as_it_was(tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
         store.put(experiment(), outcome)
     with Store(tmp_path / "s.db", create=False) as store:
-        assert store.valid([experiment().key]) == {experiment().key: outcome.row}
-        assert store.valid([experiment(2).key]) == {}
+        assert store.valid([key_of(experiment())]) == {key_of(experiment()): outcome.row}
+        assert store.valid([key_of(experiment(2))]) == {}
         pd.testing.assert_frame_equal(store.frame(), pd.DataFrame([outcome.row]))
     assert [file.name for file in tmp_path.iterdir()] == ["s.db"], "one file"
 
@@ -59,14 +60,14 @@ def test_the_file_tells_how_to_run_it_again(tmp_path: Path, outcome: Outcome) ->
 
 def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[int] = []
-    original = run_experiment
+    original = outcome_of
 
-    def watched(wanted: Experiment) -> Outcome:
+    def watched(wanted: Recipe) -> Outcome:
         if wanted.scenario.horizon > 1:  # not the one that compiles
             ran.append(wanted.seed)
         return original(wanted)
 
-    monkeypatch.setattr("scenarios.sweep.runner.run_experiment", watched)
+    monkeypatch.setattr("scenarios.sweep.runner.outcome_of", watched)
     with Store(tmp_path / "s.db") as store:
         first = sweep([experiment(1), experiment(2)], jobs=1, store=store)
         again = sweep([experiment(1), experiment(2)], jobs=1, store=store)
@@ -75,7 +76,7 @@ def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
         store.put(experiment(2), failed(experiment(2), MemoryError()))
         sweep([experiment(1), experiment(2), experiment(3)], jobs=1, store=store)
         assert ran == [1, 2, 2, 3], "what failed, and what is new"
-        monkeypatch.setattr(experiment_module, "RESULTS", experiment_module.RESULTS + 1)
+        monkeypatch.setattr(keys, "RESULTS", keys.RESULTS + 1)
         sweep([experiment(1)], jobs=1, store=store)
         assert ran == [1, 2, 2, 3, 1], "what another version computed"
         assert len(store) == 3
@@ -111,7 +112,7 @@ def other_columns(path: Path) -> None:
 
 
 def filled(path: Path) -> None:
-    result = run_experiment(experiment())
+    result = outcome_of(experiment())
     with Store(path) as store:
         for seed in range(40):
             store.put(experiment(seed), result)
@@ -206,7 +207,7 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
         pass
 
     odd = Odd()
-    object.__setattr__(odd, "period", lambda: 1)
+    object.__setattr__(odd, "period", object())
     with Store(tmp_path / "s.db") as store, pytest.raises(InputError, match="cannot be stored"):
         sweep([replace(experiment(), controller=odd)], jobs=1, store=store)
 
@@ -248,7 +249,7 @@ import resource, sys
 from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
-from scenarios.sweep.experiment import Experiment
+from scenarios.recipe import Recipe
 from scenarios.sweep.store import Store
 from scenarios.sweep import sweep
 from minisim.simulation import simulate
@@ -257,7 +258,7 @@ simulate(three_way(200, horizon=1), Dim())  # compile, and write what that write
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
 try:
     with Store(sys.argv[1]) as store:
-        todo = [Experiment(three_way(200, horizon=20), Dim(), seed) for seed in range(60)]
+        todo = [Recipe(three_way(200, horizon=20), Dim(), seed) for seed in range(60)]
         sweep(todo, jobs=1, store=store)
 except FileError as error:
     print(error)
@@ -281,7 +282,7 @@ def test_a_full_disk_is_told_and_what_was_stored_stays(tmp_path: Path, limit: in
         assert kept < 60
         assert kept > 0 or limit < 150_000
         rows = sweep(
-            [Experiment(three_way(200, horizon=20), Dim(), seed) for seed in range(5)],
+            [Recipe(three_way(200, horizon=20), Dim(), seed) for seed in range(5)],
             jobs=1, store=store,
         )  # fmt: skip
         assert rows["error"].isna().all()
@@ -302,4 +303,4 @@ def test_four_way_and_label_are_other_experiments() -> None:
         replace(base, scenario=replace(base.scenario, recorded=base.scenario.arrivals(1))),
         replace(base, scenario=replace(base.scenario, recorded=base.scenario.arrivals(2))),
     ]
-    assert len({base.key, *(other.key for other in others)}) == len(others) + 1
+    assert len({key_of(base), *(key_of(other) for other in others)}) == len(others) + 1

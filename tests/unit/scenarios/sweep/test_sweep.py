@@ -12,9 +12,6 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy import stats
 
 import minisim
 from dim import Dim
@@ -22,10 +19,11 @@ from minisim.control import Command, Plan, Site, Unregulated, View
 from minisim.errors import InputError, MinisimError
 from scenarios import four_way, three_way
 from scenarios.demo import METRICS, Tour, average, run_tour
-from scenarios.statistics import mean_interval, student_quantile
-from scenarios.sweep import Experiment, sweep
-from scenarios.sweep.experiment import MEASURED
+from scenarios.recipe import Recipe
+from scenarios.statistics import mean_interval
+from scenarios.sweep import sweep
 from scenarios.sweep.pool import workers
+from scenarios.sweep.rows import MEASURED
 from tests import ROOT
 
 
@@ -66,9 +64,9 @@ def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.drop(columns=list(MEASURED))
 
 
-def experiments() -> list[Experiment]:
+def experiments() -> list[Recipe]:
     return [
-        Experiment(scenario(300, horizon=120), Dim(), seed)
+        Recipe(scenario(300, horizon=120), Dim(), seed)
         for scenario in (three_way, four_way)
         for seed in (1, 2)
     ]
@@ -96,11 +94,12 @@ def test_rows_do_not_depend_on_the_executor() -> None:
 
 def test_default_is_a_pool_of_processes() -> None:
     script = (
-        "from scenarios.sweep import Experiment, sweep\n"
+        "from scenarios.recipe import Recipe\n"
+        "from scenarios.sweep import sweep\n"
         "from scenarios import three_way\n"
         "from dim import Dim\n"
         "if __name__ == '__main__':\n"
-        "    rows = sweep([Experiment(three_way(0, horizon=1), Dim())])\n"
+        "    rows = sweep([Recipe(three_way(0, horizon=1), Dim())])\n"
         "    print(len(rows), rows['trips'].sum())\n"
     )
     done = subprocess.run(
@@ -110,9 +109,9 @@ def test_default_is_a_pool_of_processes() -> None:
 
 
 def test_a_failed_run_is_a_row() -> None:
-    crash = Experiment(four_way(300, horizon=600), Unregulated(), 1)
-    bug = Experiment(four_way(300, horizon=60), Broken(), 1)
-    good = Experiment(four_way(300, horizon=60), Dim(), 1)
+    crash = Recipe(four_way(300, horizon=600), Unregulated(), 1)
+    bug = Recipe(four_way(300, horizon=60), Broken(), 1)
+    good = Recipe(four_way(300, horizon=60), Dim(), 1)
     rows = sweep([crash, bug, good], workers(1))
     assert list(rows["controller"]) == ["unregulated", "broken", "dim"]
     assert "touched" in rows["error"][0]
@@ -137,7 +136,7 @@ def test_interrupt_cancels_what_has_not_begun() -> None:
         raise KeyboardInterrupt
 
     with workers(1) as executor:
-        many = [Experiment(four_way(300, horizon=120), Dim(), seed) for seed in range(50)]
+        many = [Recipe(four_way(300, horizon=120), Dim(), seed) for seed in range(50)]
         with pytest.raises(KeyboardInterrupt):
             sweep(many, executor, interrupt)
         after = executor.submit(int)
@@ -147,11 +146,11 @@ def test_interrupt_cancels_what_has_not_begun() -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda: Experiment("four-way", Dim()),  # type: ignore[arg-type]
-        lambda: Experiment(four_way(), "dim"),  # type: ignore[arg-type]
-        lambda: Experiment(four_way(), Dim),  # type: ignore[arg-type]
-        lambda: Experiment(four_way(), Dim(), -1),
-        lambda: Experiment(four_way(), Dim(), 1.5),  # type: ignore[arg-type]
+        lambda: Recipe("four-way", Dim()),  # type: ignore[arg-type]
+        lambda: Recipe(four_way(), "dim"),  # type: ignore[arg-type]
+        lambda: Recipe(four_way(), Dim),  # type: ignore[arg-type]
+        lambda: Recipe(four_way(), Dim(), -1),
+        lambda: Recipe(four_way(), Dim(), 1.5),  # type: ignore[arg-type]
         lambda: sweep([four_way()], ThreadPoolExecutor(1)),  # type: ignore[list-item]
         lambda: sweep([], store="s.db"),  # type: ignore[arg-type]
         lambda: workers(0),
@@ -173,25 +172,20 @@ def test_what_a_controller_lacks_is_said() -> None:
             return BrokenSession()
 
     with pytest.raises(InputError, match=r"got Plain\(x=40.0\), which has no name$"):
-        Experiment(four_way(), Plain(40.0))  # type: ignore[arg-type]
+        Recipe(four_way(), Plain(40.0))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"which is a class$"):
-        Experiment(four_way(), Dim)  # type: ignore[arg-type]
+        Recipe(four_way(), Dim)  # type: ignore[arg-type]
 
 
 # --- statistics ------------------------------------------------------------------------------
 
 
-@given(st.integers(1, 200), st.floats(0.5, 0.9999))
-def test_student_quantile_is_scipys(freedom: int, probability: float) -> None:
-    expected = stats.t.ppf(probability, freedom)
-    assert student_quantile(probability, freedom) == pytest.approx(expected, rel=1e-8, abs=1e-8)
-
-
-def test_student_quantile_of_the_tables() -> None:
-    # Student's table, two-sided 95 %: e.g. Abramowitz & Stegun, table 26.10.
-    table = {1: 12.706, 2: 4.303, 4: 2.776, 9: 2.262, 30: 2.042}
-    for freedom, value in table.items():
-        assert student_quantile(0.975, freedom) == pytest.approx(value, abs=5e-4)
+def test_half_widths_of_student_s_table() -> None:
+    # Two-sided 95 %, e.g. Abramowitz & Stegun, table 26.10.
+    for freedom, quantile in {1: 12.706, 2: 4.303, 4: 2.776, 9: 2.262, 30: 2.042}.items():
+        _, half_width, size = mean_interval([*[0.0] * freedom, math.sqrt(freedom + 1.0)])
+        # n values, all 0 but one √n, have variance 1.
+        assert half_width * math.sqrt(size) == pytest.approx(quantile, abs=5e-4)
 
 
 def test_mean_interval_by_hand() -> None:

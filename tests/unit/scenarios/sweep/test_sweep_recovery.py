@@ -17,10 +17,12 @@ import pytest
 from dim import Dim
 from minisim.errors import FileError
 from scenarios import three_way
-from scenarios.sweep import Experiment, sweep
-from scenarios.sweep.experiment import MEASURED
+from scenarios.recipe import Recipe
+from scenarios.sweep import sweep
 from scenarios.sweep.file import read_experiments
+from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
+from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
 from tests.builders import Deadly, killing
@@ -30,8 +32,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSI
 EMPTY = three_way(0, horizon=1)
 
 
-def quick(count: int) -> list[Experiment]:
-    return [Experiment(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
+def quick(count: int) -> list[Recipe]:
+    return [Recipe(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
 
 
 def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
@@ -39,7 +41,7 @@ def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
-    once = Experiment(EMPTY, Deadly(str(tmp_path / "killed")))
+    once = Recipe(EMPTY, Deadly(str(tmp_path / "killed")))
     todo = [*quick(3), once, *quick(6)[3:]]
     rows = sweep(todo, jobs=2)
     assert (tmp_path / "killed").exists()
@@ -48,7 +50,7 @@ def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
 
 
 def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
-    todo = [*quick(6)[:2], Experiment(EMPTY, Deadly()), *quick(6)[2:]]
+    todo = [*quick(6)[:2], Recipe(EMPTY, Deadly()), *quick(6)[2:]]
     with Store(tmp_path / "s.db") as store:
         rows = sweep(todo, jobs=2, store=store)
         assert len(store) == 7
@@ -58,7 +60,7 @@ def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
 
 
 def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
-    """Whose process dies is tried alone; what dies every time is lost, and nothing else."""
+    """A task whose process dies is tried again alone; only one that dies every time is lost."""
     once = {k: str(tmp_path / "killed") if k == 1 else "" for k in range(3)}
     answers = dict(pooled(killing, once, 2, pool_of=processes))
     assert answers == {0: 7, 1: 7, 2: 7}
@@ -172,8 +174,8 @@ def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, hori
     todo = read_experiments(file)
     with Store(path, create=False) as store:
         assert len(store) == len(todo) == total
-        kept = store.valid([experiment.key for experiment in todo])
-    rows = pd.DataFrame([kept[experiment.key] for experiment in todo])
+        kept = store.valid([key_of(experiment) for experiment in todo])
+    rows = pd.DataFrame([kept[key_of(experiment)] for experiment in todo])
     pd.testing.assert_frame_equal(repeatable(rows), repeatable(sweep(todo, jobs=1)))
 
 

@@ -1,0 +1,273 @@
+"""Plots of means with intervals, their axes and legends, and the small print below."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
+
+from figures import style
+from scenarios.paper import DENSITIES
+from scenarios.statistics import mean_interval
+from scenarios.sweep.cells import saturated
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Series are drawn side by side, so that their bars do not cover each other, over this share of
+#: the range, and at least so much apart.
+DODGE = 0.028
+APART = 0.0075
+DENSITY_LABEL = "demand [veh/h/lane]"
+#: Of small print [pt].
+FOOTNOTE_SIZE = 7.5
+
+
+#: A line with few points, see `draw_line`.
+BOLD: Mapping[str, Any] = MappingProxyType(
+    {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
+)
+
+
+class Estimate(NamedTuple):
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def mean_estimate(values: pd.Series[Any]) -> Estimate:
+    """Mean and Student-t interval; a single value is its own interval."""
+    mean, half, size = mean_interval(values.astype(float).tolist())
+    half = half if size > 1 else 0.0
+    return Estimate(mean, mean - half, mean + half)
+
+
+def draw_line(
+    axes: Axes, x: Sequence[float], estimates: Sequence[Estimate], look: style.Look,
+    growing: Iterable[bool] = (), **changes: Any,
+) -> None:  # fmt: skip
+    """A line with intervals, and arrows where the queue still grew.
+
+    Args:
+        axes: to draw on.
+        x, estimates: of its points.
+        look: of the line.
+        growing: of each point, where known.
+        changes: of the keywords of `Axes.errorbar`.
+    """
+    bars = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
+    drawn: dict[str, Any] = {
+        "color": look.colour, "marker": look.marker, "linestyle": look.dashes, "linewidth": 1.7,
+        "markersize": 5.0, "capsize": 2.6, "elinewidth": 1.1, "zorder": 3, "label": look.label,
+    }  # fmt: skip
+    axes.errorbar(x, [e.value for e in estimates], yerr=bars, **(drawn | changes))
+    for place, estimate, grown in zip(x, estimates, growing, strict=False):
+        if grown:
+            growth_arrow(axes, place, estimate.high, look.colour)
+
+
+def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
+    """One line a series over demand: mean over seeds, interval, arrows where queues still grow.
+
+    Args:
+        axes: to draw on.
+        rows: of a study (`Results.good`).
+        metric: a column.
+        series: in the order of the legend; one without rows is left out.
+    """
+    if rows.empty:
+        axes.text(
+            0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top", fontsize=11,
+            color=style.MUTED,
+        )  # fmt: skip
+        return
+    for place, name in enumerate(series):
+        known = rows[(rows["series"] == name) & rows[metric].notna()]
+        if known.empty:
+            continue
+        cells = list(known.groupby("density"))
+        shift = offset(rows, place, len(series))
+        draw_line(
+            axes, [float(str(density)) + shift for density, _ in cells],
+            [mean_estimate(cell[metric]) for _, cell in cells], style.look(name),
+            [saturated(cell) for _, cell in cells],
+        )  # fmt: skip
+
+
+def growth_arrow(axes: Axes, x: float, y: float, colour: str) -> None:
+    """An arrow up from above a marker or the end of its bar: the queue was still growing there."""
+    axes.annotate(
+        "", (x, y), xytext=(0, 16), textcoords="offset points", zorder=4,
+        arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 1.1, "shrinkA": 0,
+                    "shrinkB": 5.5},
+    )  # fmt: skip
+
+
+def draw_published(
+    axes: Axes, table: pd.DataFrame, rows: pd.DataFrame, series: Sequence[str]
+) -> None:
+    """The paper's values as hollow markers; those that are not comparable are crossed out.
+
+    Args:
+        axes: to draw on.
+        table: columns `series`, `density`, `paper`, `comparable`.
+        rows: ours, for the same sideways shift.
+        series: in the order of the legend.
+    """
+    for place, name in enumerate(series):
+        look = style.look(name)
+        chosen = table[table["series"] == name]
+        x = chosen["density"].astype(float) + offset(rows, place, len(series))
+        axes.plot(
+            x, chosen["paper"], marker=look.marker, markersize=8.0, markeredgewidth=1.2,
+            markeredgecolor=look.colour, markerfacecolor="none", linestyle="none", zorder=5,
+        )  # fmt: skip
+        crossed = (chosen["comparable"] != "yes").to_numpy()
+        axes.plot(
+            x[crossed], chosen["paper"][crossed], marker="x", markersize=7.0,
+            markeredgewidth=1.2, color=look.colour, linestyle="none", zorder=6,
+        )  # fmt: skip
+
+
+def offset(rows: pd.DataFrame, place: int, count: int) -> float:
+    """Sideways shift of a series [veh/h/lane]."""
+    if rows.empty or count < 2:
+        return 0.0
+    span = float(rows["density"].max() - rows["density"].min())
+    return max(DODGE, APART * (count - 1)) * span * (place / (count - 1) - 0.5)
+
+
+def density_axis(axes: Axes, densities: Iterable[float]) -> None:
+    """The demands that were run as ticks, six at most, with a margin around them."""
+    shown = sorted(set(densities))
+    step = math.ceil(len(shown) / 6)
+    axes.set_xticks(shown[(len(shown) - 1) % step :: step], minor=False)
+    margin = 0.05 * (shown[-1] - shown[0]) or 14.0
+    axes.set_xlim(shown[0] - margin, shown[-1] + margin)
+
+
+def paper_densities(axes: Axes) -> None:
+    """The paper's demands as ticks, with a margin around them."""
+    axes.set_xticks(DENSITIES)
+    axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
+
+
+def ylabel(axes: Axes, text: str) -> None:
+    """Write beside the vertical axis."""
+    axes.set_ylabel(text, fontsize=9.5, color=style.INK)
+
+
+def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
+    """A logarithmic time axis from `low` to `high` [s] with plain numbers.
+
+    Args:
+        axes: to scale.
+        low, high: its ends; with `linear`, `low` may be 0.
+        linear: below it the axis is linear, so that 0 can be shown.
+    """
+    if linear is None:
+        axes.set_yscale("log")
+    else:
+        axes.set_yscale("symlog", linthresh=linear, linscale=0.35)
+    ticks = [t for e in range(-2, 5) for t in (10.0**e, 2 * 10.0**e, 5 * 10.0**e)]
+    decade = high / max(low, linear or low) > 60.0
+    shown = [t for t in ticks if low <= t <= high and (not decade or f"{t:g}".strip("0.") == "1")]
+    axes.set_yticks(([0.0] if low == 0.0 else []) + [t for t in shown if t >= (linear or 0.0)])
+    axes.set_yticks([], minor=True)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    # A marker on 0 is whole, and so is one on the lowest value.
+    axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
+
+
+def scale_words(linear: float | None) -> str:
+    """What to say of an axis of `log_time` beside its label."""
+    return "logarithmic" if linear is None else f"log., linear below {linear:g}"
+
+
+def panels(
+    width: float, height: float, count: int, *, rows: int = 1, sharey: bool = True, **edges: float
+) -> tuple[Figure, list[Axes]]:
+    """A figure of inches with panels in rows; `edges` as of `Figure.subplots_adjust`."""
+    figure = style.new_figure(width, height)
+    drawn = figure.subplots(rows, count // rows, sharey=sharey, squeeze=False)
+    figure.subplots_adjust(**edges)
+    return figure, list(drawn.flat)
+
+
+def heading(figure: Figure, text: str) -> None:
+    """The title of a figure, above its legends."""
+    figure.text(0.012, 0.965, text, fontsize=13, fontweight="bold", color=style.INK, va="center")
+
+
+def looks_legend(
+    figure: Figure, looks: Iterable[style.Look], left: float, top: float, ncols: int | None = None,
+    *, lines: bool = True, **changes: Any,
+) -> None:  # fmt: skip
+    """A legend of lines and markers, or of markers only; `changes` as in `legend`."""
+    shown = list(looks)
+    handles = [
+        Line2D([], [], color=k.colour, marker=k.marker, linewidth=1.7, markersize=5.5,
+               linestyle=k.dashes if lines else "none")
+        for k in shown
+    ]  # fmt: skip
+    legend(figure, handles, [k.label for k in shown], left, top, ncols, **changes)
+
+
+def series_legend(
+    figure: Figure, series: Iterable[str], left: float, top: float, ncols: int | None = None
+) -> None:
+    """A legend of lines and markers by series."""
+    looks_legend(figure, map(style.look, series), left, top, ncols)
+
+
+def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> None:
+    """A legend of what markers mean, whatever the series."""
+    handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
+    labels = ["ours, mean and 95 % interval"]
+    if paper:
+        hollow = _mark("o", 8.0, markerfacecolor="none")
+        handles += [hollow, (hollow, _mark("x", 7.0))]
+        labels += ["the paper's value", "not the run that its label says"]
+    handles.append(_mark(r"$\uparrow$", 8.0))
+    labels.append("queue still growing at the end")
+    legend(figure, handles, labels, left, top, fontsize=8.5)
+
+
+def _mark(marker: str, size: float, **look: Any) -> Line2D:
+    return Line2D(
+        [], [], color=style.MUTED, marker=marker, linestyle="none", markersize=size, **look
+    )
+
+
+def legend(
+    figure: Figure, handles: Sequence[Any], labels: Sequence[str], left: float, top: float,
+    ncols: int | None = None, **changes: Any,
+) -> None:  # fmt: skip
+    """A legend in the quiet style; `changes` are of the keywords of `Figure.legend`."""
+    drawn: dict[str, Any] = {
+        "loc": "upper left", "bbox_to_anchor": (left, top), "frameon": False, "fontsize": 9.5,
+        "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
+        "handler_map": {tuple: HandlerTuple(ndivide=1)}, "columnspacing": 1.7,
+        "ncols": len(labels) if ncols is None else ncols,
+    }  # fmt: skip
+    figure.legend(handles, labels, **(drawn | changes))
+
+
+def footnote(figure: Figure, text: str) -> None:
+    """Small print along the lower edge, in as many lines as it takes."""
+    # Sans serif is half as wide as high, in points of which there are 72 an inch; with a margin.
+    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
+    figure.text(
+        0.012, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        va="bottom", linespacing=1.05,
+    )  # fmt: skip

@@ -1,0 +1,121 @@
+"""The largest demand served without a growing queue, by controller and arms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from figures import plots, style
+from figures.studies.shared.section import Item, Section
+from figures.tables import Table
+from scenarios.controllers import RIVALS
+from scenarios.studies.capacity import STUDY, Capacity, capacities
+from scenarios.studies.shared.archive import Archive, MissingRunsError
+
+#: Arms -> how a capacity is drawn.
+LOOKS: Mapping[int, style.Look] = MappingProxyType({
+    arms: style.Look(f"{arms} arms", colour, marker, "-")
+    for arms, colour, marker in (
+        (3, style.GREEN, "^"), (4, style.BLUE, "s"), (5, style.VERMILLION, "p"), (6, style.INK, "h")
+    )
+})  # fmt: skip
+
+
+def needed_capacities(archive: Archive) -> list[Capacity]:
+    """Every capacity that is known.
+
+    Raises:
+        MissingRunsError: none is.
+    """
+    (results,) = archive.need("capacity")
+    known = capacities(results)
+    if not known:
+        raise MissingRunsError(
+            "the store has no search for a capacity that ran to its end; make it with: "
+            f"{archive.effort.command('capacity')}"
+        )
+    return known
+
+
+def capacity_figure(archive: Archive) -> Figure:
+    """Capacities with their intervals; errors as `needed_capacities`."""
+    known = needed_capacities(archive)
+    figure = style.new_figure(9.2, 5.2)
+    axes = figure.add_axes((0.2, 0.15, 0.78, 0.67))
+    ends = [end for c in known for bracket in c.brackets for end in bracket if end < math.inf]
+    highest = 100.0 * math.ceil(1.04 * max(ends) / 100.0)
+    for capacity in known:
+        _draw_capacity(axes, capacity, highest)
+    style.plot_axes(axes, "", "capacity [veh/h/lane]", "")
+    axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
+    axes.grid(axis="y", visible=False)
+    axes.set_yticks(range(len(RIVALS)), [style.look(name).label for name in RIVALS])
+    axes.set_ylim(len(RIVALS) - 0.5, -0.5)
+    for edge in range(1, len(RIVALS)):
+        axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
+    axes.set_xlim(0.0, highest)
+    plots.heading(figure, "Capacity: the largest demand served without a growing queue")
+    plots.looks_legend(figure, LOOKS.values(), 0.012, 0.91, lines=False)
+    note = f"{_extent(archive)}; profile fair.  Pale line: a bound is all that is known."
+    if len(known) < len(STUDY.points):
+        missing = len(STUDY.points) - len(known)
+        note += f"  Not drawn, for there is no run: {missing} of {len(STUDY.points)} cases."
+    plots.footnote(figure, note)
+    return figure
+
+
+def capacity_table(archive: Archive) -> Table:
+    """Capacities in numbers [veh/h/lane]; errors as `needed_capacities`."""
+    known = needed_capacities(archive)
+    texts = {(c.series, c.arms): str(c) for c in known}
+    arms = sorted({c.arms for c in known})
+    return Table(
+        "Capacity [veh/h/lane]",
+        ("controller", *(f"{n} arms" for n in arms)),
+        tuple(
+            (style.look(name).label, *(texts.get((name, n), "–") for n in arms))
+            for name in dict.fromkeys(c.series for c in known)
+        ),
+        notes=(
+            f"{_extent(archive)}; “<” and “>”: every demand tried was too much for a seed, or none "
+            "was. Served means that the queue grows by less than 2 % of the arrivals.",
+        ),
+    )  # fmt: skip
+
+
+def _extent(archive: Archive) -> str:
+    search = archive.effort.search
+    return (
+        f"{archive.effort.warning}Mean and 95 % interval over {search.seeds} seeds of "
+        f"{search.horizon:g} s, with the {search.step / 2.0:g} veh/h/lane by which the search "
+        "rounds"
+    )
+
+
+def _draw_capacity(axes: Axes, capacity: Capacity, highest: float) -> None:
+    """Mean and interval; a pale line where only a bound is known."""
+    look = LOOKS[capacity.arms]
+    place = RIVALS.index(capacity.series) + 0.17 * (capacity.arms - 4.5)
+    low, high = capacity.above, capacity.below
+    if low is None and high is None:
+        mean, half, _ = capacity.interval
+        axes.errorbar(
+            [mean], [place], xerr=[0.0 if math.isnan(half) else half], color=look.colour,
+            marker=look.marker, linestyle="none", markersize=6.5, capsize=2.6, elinewidth=1.2,
+        )  # fmt: skip
+        return
+    ends = (0.0 if low is None else low, highest if high is None else high)
+    axes.plot(ends, [place, place], color=look.colour, alpha=0.35, linewidth=3.0)
+
+
+SECTION = Section(
+    "Capacity",
+    (
+        Item("capacity", "largest demand served", capacity_figure, ("capacity",)),
+        Item("capacity-table", "capacity in numbers", capacity_table, ("capacity",)),
+    ),
+)

@@ -1,0 +1,51 @@
+"""What misread intents do, over the confidence below which an intent is taken for unknown."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from dim.senses.noise import CLASSIFIER
+from figures import plots
+from figures.studies.shared import outcomes
+from figures.studies.shared.section import Item, Section
+from scenarios.studies.confidence import THRESHOLDS
+from scenarios.studies.shared.archive import Archive, missing_note
+from scenarios.studies.shared.delay import with_total_delay
+
+
+def confidence_figure(archive: Archive) -> Figure:
+    """Collisions, false grants and delay over the threshold of confidence.
+
+    Raises:
+        MissingRunsError: nothing was run.
+    """
+    (results,) = archive.need("confidence")
+    rows = with_total_delay(results.good)
+    figure, panels = plots.panels(
+        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.735,
+        bottom=0.155, wspace=0.22,
+    )  # fmt: skip
+    for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
+        for kind, look in outcomes.KIND_LOOKS.items():
+            cells = [
+                outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
+            ]
+            outcomes.draw(axes, range(len(THRESHOLDS)), cells, outcome, look)
+        ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
+        outcomes.dress(axes, outcome, outcome, "least confidence that is believed", ticks)
+    plots.heading(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents "
+                          "misread by all alike, lasting")  # fmt: skip
+    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.012, 0.93, 3)
+    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note([results])}")
+    return figure
+
+
+SECTION = Section(
+    "Believing only sure readings",
+    (
+        Item(
+            "confidence", "collisions, false grants and delay over the confidence that is believed",
+            confidence_figure, ("confidence",),
+        ),
+    ),
+)  # fmt: skip

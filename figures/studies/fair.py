@@ -1,0 +1,174 @@
+"""Every controller on equal terms, and the demands at which DIM does worse than another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from figures import plots, style
+from figures.studies.shared.section import Item, Section
+from figures.tables import Table
+from scenarios.controllers import RIVALS
+from scenarios.studies.fair import GATES, OTHERS, losses
+from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
+from scenarios.studies.shared.crossing import Crossing, tried
+from scenarios.studies.shared.delay import MEASURES, with_total_delay
+from scenarios.studies.shared.study import Results
+
+
+def fair_figure(archive: Archive) -> Figure:
+    """Every controller with one vehicle and speed limit: three measures over demand.
+
+    Raises:
+        MissingRunsError: nothing was run.
+    """
+    (results,) = archive.need("fair")
+    rows = with_total_delay(results.good)
+    figure, panels = plots.panels(
+        11.5, 5.4, len(MEASURES), left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06
+    )
+    for axes, (measure, column) in zip(panels, MEASURES.items(), strict=True):
+        plots.draw_means(axes, rows, column, RIVALS)
+        style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
+        plots.log_time(axes, 0.0, 4000.0, linear=0.1)
+        plots.density_axis(axes, rows["density"])
+    plots.ylabel(panels[0], f"mean of all vehicles [s], {plots.scale_words(0.1)}")
+    plots.heading(figure, "Every controller on four arms, profile fair")
+    plots.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
+    plots.marks_legend(figure, 0.012, 0.842, paper=False)
+    plots.footnote(figure, (
+        f"{missing_note([results])}  Waiting is standing on the road: it leaves out the queue "
+        "before a full road, and V2I-C's vehicles crawl."
+    ))  # fmt: skip
+    return figure
+
+
+def needed_losses(archive: Archive) -> tuple[Results, Mapping[tuple[str, str, str], Crossing]]:
+    """The study, and from which demand on DIM does worse.
+
+    Raises:
+        MissingRunsError: no pair has two demands in common.
+    """
+    (results,) = archive.need("fair")
+    known = losses(results.good)
+    if not known:
+        raise MissingRunsError(
+            "the store has no two demands at which DIM and another controller ran with two common "
+            f"seeds; make them with: {archive.effort.command('fair')}"
+        )
+    return results, known
+
+
+def crossing_figure(archive: Archive) -> Figure:
+    """Demand from which on DIM loses to each rival, with both gates; see `needed_losses`."""
+    results, known = needed_losses(archive)
+    figure, panels = plots.panels(
+        11.0, 4.7, len(MEASURES), left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06
+    )
+    for axes, measure in zip(panels, MEASURES, strict=True):
+        for place, rival in enumerate(OTHERS):
+            for gate, aside in zip(GATES, (-0.16, 0.16), strict=True):
+                if (measure, gate, rival) in known:
+                    _draw_crossing(axes, known[measure, gate, rival], gate, place + aside)
+        style.plot_axes(axes, measure.capitalize(), plots.DENSITY_LABEL, "")
+        axes.grid(axis="x", color=style.FAINT, linewidth=0.8)
+        plots.density_axis(axes, results.good["density"])
+    panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
+    panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
+    plots.heading(figure, "Demands at which DIM does worse than …")
+    plots.series_legend(figure, GATES, 0.012, 0.925)
+    figure.text(
+        0.012, 0.845, "pale bar: demands at which DIM does worse     marker and line: where that "
+        "begins, with its 95 % interval", fontsize=8.5, color=style.INK, va="center",
+    )  # fmt: skip
+    plots.footnote(figure, missing_note([results]))
+    return figure
+
+
+def loss_table(archive: Archive) -> Table:
+    """From which demand on DIM does worse than each rival; errors as `needed_losses`."""
+    results, known = needed_losses(archive)
+    low, high = tried(known.values())
+    rows = []
+    for rival in OTHERS:
+        for measure in MEASURES:
+            cells = [known.get((measure, gate, rival)) for gate in GATES]
+            if any(cells):
+                rows.append((
+                    style.look(rival).label, measure,
+                    *(text for c in cells for text in ((c.point, c.interval) if c else ("–", "–"))),
+                ))  # fmt: skip
+    return Table(
+        "Demand from which on DIM does worse [veh/h/lane]",
+        ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
+        tuple(rows), labels=2,
+        notes=(
+            f"{missing_note([results])}  "
+            "Four arms, profile fair, complete means; paired differences over common arrivals, "
+            f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
+            "b only, for beyond the capacity of both their order may turn again. “all”: at every "
+            "demand tried, in the mean; “c at the latest” then says that only from c on it is "
+            "sure. “never”: at none in the mean; “c at the earliest” says that from c on it may "
+            "be.",
+        ),
+    )  # fmt: skip
+
+
+def answer(archive: Archive) -> str:
+    """The question that the paper leaves open, answered in sentences."""
+    try:
+        _, known = needed_losses(archive)
+    except MissingRunsError as error:
+        return f"From which demand on DIM loses is not known: {error}."
+    low, high = tried(known.values())
+    lines = []
+    for rival in OTHERS:
+        losing = [
+            f"{measure} "
+            + " → ".join(str(known.get((measure, gate, rival), "not run")) for gate in GATES)
+            for measure in MEASURES
+        ]
+        lines.append(f"- {style.look(rival).label}: {'; '.join(losing)}")
+    return "\n".join([
+        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
+        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
+        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
+        "mean:\n",
+        *lines,
+    ])  # fmt: skip
+
+
+def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
+    look = style.look(gate)
+    low, high = crossing.tried
+
+    def shown(value: float) -> float:
+        return min(max(value, low), high)
+
+    start, end = shown(crossing.density), shown(crossing.until)
+    if crossing.density < math.inf:
+        axes.barh([y], end - start, left=start, height=0.24, color=look.colour, alpha=0.35,
+                  zorder=2)  # fmt: skip
+    elif not math.isfinite(crossing.low):
+        axes.text(high, y, "nowhere", ha="right", va="center", fontsize=8.5, color=style.MUTED)
+    if math.isfinite(crossing.low) or math.isfinite(crossing.high):
+        axes.plot(
+            [shown(crossing.low), shown(crossing.high)], [y, y], color=look.colour, marker="|",
+            markersize=8.0, markeredgewidth=1.6, linewidth=1.6, zorder=3,
+        )  # fmt: skip
+    if math.isfinite(crossing.density):
+        axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4)
+
+
+SECTION = Section(
+    "When does DIM lose?",
+    (
+        Item("fair", "every controller up to 800 veh/h/lane", fair_figure, ("fair",)),
+        Item("losses", "demand from which on DIM loses", crossing_figure, ("fair",)),
+        Item("losses-table", "losses in numbers", loss_table, ("fair",)),
+    ),
+    answer,
+)

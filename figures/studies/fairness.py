@@ -1,0 +1,73 @@
+"""Which lanes wait under fixed, rotating and longest-waiting priority."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from figures import plots, style
+from figures.studies.shared.section import Item, Section
+from minisim.junction.geometry import ARM_NAMES
+from scenarios.studies.fairness import LANE_WAIT, PRIORITIES, lane_waits
+from scenarios.studies.shared.archive import Archive, missing_note
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: The demand at which lanes are compared, or the nearest that was run [veh/h/lane].
+LANE_DENSITY = 300.0
+
+
+def fairness_figure(archive: Archive) -> Figure:
+    """Waiting by lane, in the worst lane, and how unequal it is.
+
+    Raises:
+        MissingRunsError: nothing was run.
+    """
+    (results,) = archive.need("fairness")
+    rows = lane_waits(results.good, 4)
+    figure, (by_lane, worst, spread) = plots.panels(
+        11.0, 4.7, 3, sharey=False, left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22
+    )
+    compared = min(set(rows["density"]), key=lambda density: abs(density - LANE_DENSITY))
+    _draw_lanes(by_lane, rows[rows["density"] == compared])
+    style.plot_axes(by_lane, f"By lane, {compared:g} veh/h/lane", "lane", "mean waiting [s]")
+    for axes, metric, title, label in (
+        (worst, "worst_lane_s", "Worst lane", f"its mean waiting [s], {plots.scale_words(0.1)}"),
+        (spread, "gini", "Inequality between lanes", "Gini coefficient of the lanes' means"),
+    ):
+        plots.draw_means(axes, rows, metric, PRIORITIES)
+        style.plot_axes(axes, title, plots.DENSITY_LABEL, label)
+        plots.paper_densities(axes)
+    plots.log_time(worst, 0.0, 500.0, linear=0.1)
+    spread.set_ylim(0.0, 0.8)
+    by_lane.set_ylim(bottom=0.0)
+    plots.heading(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
+    plots.series_legend(figure, PRIORITIES, 0.012, 0.925)
+    plots.marks_legend(figure, 0.012, 0.865, paper=False)
+    plots.footnote(figure, missing_note([results]))
+    return figure
+
+
+def _draw_lanes(axes: Axes, rows: pd.DataFrame) -> None:
+    lanes = ARM_NAMES[:4]
+    for place, name in enumerate(PRIORITIES):
+        chosen = rows[rows["series"] == name]
+        if not chosen.empty:
+            plots.draw_line(
+                axes, [k + 0.09 * (place - 1) for k in range(len(lanes))],
+                [plots.mean_estimate(chosen[LANE_WAIT.format(lane)]) for lane in lanes],
+                style.look(name), linestyle="none", markersize=6.0,
+            )  # fmt: skip
+    axes.set_xticks(range(len(lanes)), list(lanes))
+
+
+SECTION = Section(
+    "Fairness",
+    (
+        Item("fairness", "fixed, rotating and longest-waiting priority", fairness_figure,
+             ("fairness",)),
+    ),
+)  # fmt: skip

@@ -1,0 +1,41 @@
+"""The paper's gate against the harmonious one."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from figures import plots, style
+from figures.studies.shared.section import Item, Section
+from scenarios.studies.fair import GATES
+from scenarios.studies.shared.archive import Archive, missing_note
+from scenarios.studies.shared.delay import MEASURES
+
+
+def gate_figure(archive: Archive) -> Figure:
+    """Both gates on three, four and five arms.
+
+    Raises:
+        MissingRunsError: nothing was run.
+    """
+    (results,) = archive.need("gate")
+    figure, panels = plots.panels(
+        11.0, 4.7, 3, left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.06
+    )
+    for axes, arms in zip(panels, (3, 4, 5), strict=True):
+        rows = results.good[results.good["arms"] == arms]
+        plots.draw_means(axes, rows, MEASURES["waiting time"], GATES)
+        style.plot_axes(axes, f"{arms} arms", plots.DENSITY_LABEL, "")
+        plots.log_time(axes, 0.0, 500.0, linear=0.1)
+        plots.paper_densities(axes)
+    plots.ylabel(panels[0], f"mean waiting [s], {plots.scale_words(0.1)}")
+    plots.heading(figure, "Two gates: a clear junction, or harmony with all vehicles that cross")
+    plots.series_legend(figure, GATES, 0.012, 0.925)
+    plots.marks_legend(figure, 0.012, 0.865, paper=False)
+    plots.footnote(figure, missing_note([results]))
+    return figure
+
+
+SECTION = Section(
+    "How far does the harmonious gate move it?",
+    (Item("gate", "clear against harmonious gate", gate_figure, ("gate",)),),
+)

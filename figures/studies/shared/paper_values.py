@@ -1,0 +1,65 @@
+"""How the paper's values and ours are written beside each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from figures import style
+from scenarios.studies.shared.archive import Archive
+from scenarios.studies.shared.paper_comparison import compare, score
+
+#: Study of the paper's grid -> what it is called.
+HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes it"}
+
+EXPLAINED = (
+    "† not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
+    "depends on the horizon. Inside: the paper's single run lies within our 95 % prediction "
+    "interval; where that is wide, it says little."
+)
+
+
+def agreement(archive: Archive, name: str) -> str:
+    """How many of the paper's values lie inside our intervals, in all and by controller."""
+    effort = archive.effort
+    results = archive.study(name)
+    if results.good.empty:
+        return f"- `{name}`: not run (`{effort.command(name)}`)."
+    table = compare(results.good)
+    by_series = [
+        f"{style.look(str(series)).label} {score(rows)}"
+        for series, rows in table.groupby("series", sort=False)
+        if score(rows).judged
+    ]
+    return (
+        f"- `{name}`: {effort.warning}{score(table)} comparable values of the paper lie inside our "
+        f"95 % prediction interval; of those that are not comparable, "
+        f"{score(table, comparable=False)}. Inside says that one more run of ours could well give "
+        "the paper's value; where our runs spread widely, near saturation, nearly every value is "
+        f"inside.\n  By controller: {', '.join(by_series)}."
+    )
+
+
+def marked(row: Mapping[Any, Any]) -> str:
+    """The paper's value; † where it is not the run that its label says."""
+    return f"{row['paper']:.2f}" + ("" if row["comparable"] == "yes" else " †")
+
+
+def range_words(row: Mapping[Any, Any], *, mean: bool = False) -> str:
+    """Our prediction interval, or our mean with it; ↑ where queues still grew."""
+    arrow = " ↑" if row["saturated"] else ""
+    words = f"{two_digits(row['low'])} … {two_digits(row['high'])}{arrow}"
+    if not mean:
+        return words
+    return f"{two_digits(row['mean'])} ({words})" if row["seeds"] else "–"
+
+
+def two_digits(value: object) -> str:
+    """A number, or a dash where there is none."""
+    return f"{value:.2f}" if isinstance(value, float) and math.isfinite(value) else "–"
+
+
+def inside(row: Mapping[Any, Any]) -> str:
+    """Whether the paper's value lies inside our interval."""
+    return "–" if row["inside"] is None else "yes" if row["inside"] else "no"

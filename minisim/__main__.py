@@ -1,0 +1,7 @@
+"""`python -m minisim`: the `minisim` command."""
+
+import sys
+
+from scenarios.cli import main
+
+sys.exit(main())

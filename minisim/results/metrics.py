@@ -1,0 +1,350 @@
+"""The table of metrics: what is measured of a run, in what unit, by which equation.
+
+A metric gives one value a trip or one number a run. A value a trip is averaged, by lane, movement
+and kind of vehicle too, in two forms. SUMO's, which the paper used, is over the trips that ended
+before the horizon. The complete one counts all demanded trips: what a trip that has not ended has
+waited, lost and travelled up to the horizon, and the departure delay of a vehicle that never got
+on the road.
+
+To add a metric, add an entry to `TABLE`. A caller's own is a `Metric` too:
+
+    def stops(run):
+        ...
+
+    run.summary(metrics=["waiting_time_s", Metric("stops", stops, per="trip")])
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from minisim.errors import InputError, choice, items, show
+from minisim.parameters import checked, declared, switch, text, word
+from minisim.results.trips import Floats, Trips
+
+if TYPE_CHECKING:
+    from minisim.results.run import Run
+
+#: Keys of summaries and columns of sweeps that no metric may be called.
+RESERVED: Final = frozenset({
+    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "error", "growing",
+    "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre", "movements", "profile",
+    "scenario", "seed", "side", "split", "turns", "vehicle", "version", "warmup_s",
+})  # fmt: skip
+
+#: Of a trip: from insertion to leaving, and from demand to insertion.
+PHASES: Final = ("drive", "queue")
+
+
+def _name(title: str, value: Any) -> Any:
+    if not isinstance(value, str) or not value.isidentifier() or value in RESERVED:
+        raise InputError(
+            f"{title} must be letters, digits and underscores, and no column that runs have, got "
+            f"{show(value)}"
+        )
+    return value
+
+
+def _function(title: str, value: Any) -> Any:
+    if not callable(value):
+        raise InputError(f"{title} must be a function, got {show(value)}")
+    return value
+
+
+@declared
+class Metric:
+    """One metric: its column, its meaning and the function that measures it.
+
+    The function takes the `Trips` where that is all it needs, and the `Run` otherwise. A number
+    that needs trips only is also taken by lane, movement and kind.
+
+    Raises:
+        InputError: a name that a column cannot have, or no function.
+    """
+
+    name: str = checked("the column", _name, "identifier", label="name of a metric")
+    of: Callable[[Any], Any] = checked(
+        "measures it: an array with one value a trip (NaN where there is none), or one number "
+        "(None where there is none)",
+        _function,
+        "function",
+        label="function of a metric",
+    )
+    unit: str = text("such as s", default="")
+    per: str = word("what has a value", ("trip", "run"), default="run", label="per")
+    needs: str = word(
+        "what it is measured from",
+        ("trips", "run", "trajectories", "counts"),
+        default="run",
+        label="needs",
+    )
+    phase: str = word(
+        "of a trip, in which a value accumulates: on the road, or before insertion",
+        PHASES,
+        default="drive",
+        label="phase",
+    )
+    title: str = text("for headings and axes; its name unless told", default="")
+    symbol: str = text("in equations", default="")
+    meaning: str = text("in one line", default="")
+    equation: str = text("with its source", default="")
+    usual: bool = switch("whether every summary has it", default=False)
+
+    @property
+    def grouped(self) -> bool:
+        """Whether lanes, movements and kinds have a value of their own."""
+        return self.per == "trip" or self.needs == "trips"
+
+    @property
+    def heading(self) -> str:
+        """Title and unit, such as "waiting [s]"."""
+        words = self.title or self.name
+        return f"{words} [{self.unit}]" if self.unit else words
+
+    def values(self, subject: Run | Trips, count: int) -> Floats:
+        """One value a trip, shape (count,), NaN where there is none.
+
+        Raises:
+            InputError: the function gave something else.
+        """
+        given = self._measured(subject)
+        if METRICS.get(self.name) is self:
+            return given  # type: ignore[no-any-return]  # tested, and asked for by every summary
+        values = np.asarray(given)
+        if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
+            raise InputError(
+                f"metric {self.name!r} must give one finite number a trip, an array of shape "
+                f"({count},), got {show(given)}"
+            )
+        return np.asarray(values, dtype=float)
+
+    def number(self, subject: Run | Trips) -> float | int | None:
+        """One number, or None where there is none.
+
+        Raises:
+            InputError: the function gave something else.
+        """
+        given = self._measured(subject)
+        if type(given) is int:
+            return given
+        plain = given.item() if isinstance(given, np.generic) else given
+        if plain is None:
+            return None
+        if not isinstance(plain, Real) or math.isinf(plain):
+            hint = '; per="trip" takes an array' if isinstance(given, np.ndarray) else ""
+            raise InputError(
+                f"metric {self.name!r} must give one finite number or None, got {show(given)}{hint}"
+            )
+        if isinstance(plain, Integral):
+            return int(plain)
+        return None if math.isnan(plain) else float(plain)
+
+    def _measured(self, subject: Run | Trips) -> Any:
+        try:
+            return self.of(subject)
+        except Exception as error:
+            error.add_note(f"in metric {self.name!r}")
+            raise
+
+
+def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
+    """How many more vehicles were there in the last quarter of a run than in the second.
+
+    *There* is from demand to arrival, so that queues before the road count too; the numbers are
+    means over the quarter, each trip adding the part of it that it was there. No trajectories are
+    needed, and the swing of a signal's cycle averages out. `scenarios.statistics.growing` tells
+    what is more than chance.
+
+    Args:
+        demand_time, leave: of the trips [s], shape (k,); `leave` is infinite where not reached.
+        end: of the run [s].
+        start: end of the warm-up [s]. The quarters are of the time after it.
+    """
+    length = (end - start) / 4.0
+    if length <= 0.0:  # a run that was stopped before its warm-up was over
+        return 0.0
+
+    def present(quarter: int) -> float:
+        first = start + length * quarter
+        there = np.minimum(leave, first + length) - np.maximum(demand_time, first)
+        return float(np.clip(there, 0.0, None).sum()) / length
+
+    return present(3) - present(1)
+
+
+def _growth(trips: Trips) -> float:
+    leave = np.where(trips.arrived, trips.arrival, math.inf)
+    return queue_growth(trips.demand_time, leave, trips.end, trips.start)
+
+
+def _tally(name: str) -> Callable[[Run], float | None]:
+    return lambda run: run.counts.get(name)
+
+
+def _safety(name: str) -> Callable[[Run], float | None]:
+    return lambda run: run.safety[name]
+
+
+_TRIPINFO = "(SUMO, Simulation/Output/TripInfo)"
+_SSM = "(SUMO, Simulation/Output/SSM Device)"
+
+#: Numbers of encroachments -> shorter than so many seconds.
+PETS: Final = {"pets_below_1_s": 1.0, "pets_below_1_5_s": 1.5, "pets_below_2_s": 2.0}
+
+#: Every metric of ours, in the order of tables.
+TABLE: Final = (
+    Metric(
+        "trips", lambda trips: len(trips.demand_time), needs="trips", title="trips", symbol="k",
+        meaning="vehicles demanded before the end, after the warm-up", usual=True,
+    ),
+    Metric(
+        "unfinished", lambda trips: int(np.count_nonzero(~trips.arrived)), needs="trips",
+        title="unfinished", meaning="those of them that had not arrived at the end", usual=True,
+    ),
+    Metric(
+        "waiting_time_s", lambda trips: trips.waiting_time, "s", "trip", "trips",
+        title="waiting", symbol="w", meaning="time at a standstill",
+        equation=f"Σ dt where v ≤ 0.1 m/s {_TRIPINFO}", usual=True,
+    ),
+    Metric(
+        "travel_time_s", lambda trips: trips.travel_time, "s", "trip", "trips",
+        title="travel", symbol="T", meaning="from insertion to leaving",
+        equation=f"arrival − depart {_TRIPINFO}", usual=True,
+    ),
+    Metric(
+        "time_loss_s", lambda trips: trips.time_loss, "s", "trip", "trips",
+        title="time loss", symbol="L", meaning="time lost by driving below the limit",
+        equation=f"Σ (1 − v/v_allowed) dt, v_allowed the limit at the vehicle {_TRIPINFO}",
+        usual=True,
+    ),
+    Metric(
+        "depart_delay_s", lambda trips: trips.depart_delay, "s", "trip", "trips", "queue",
+        title="departure delay", symbol="D", meaning="from demand to insertion",
+        equation=f"depart − demand {_TRIPINFO}", usual=True,
+    ),
+    Metric(
+        "collisions", lambda run: len(run.collisions), title="collisions",
+        meaning="pairs of vehicles that touched", usual=True,
+    ),
+    Metric(
+        "queue_growth", _growth, needs="trips", title="queue growth", symbol="ΔN",
+        meaning="vehicles more in the last quarter than in the second",
+        equation="N̄(4th quarter) − N̄(2nd quarter), N from demand to arrival (ours)",
+    ),
+    Metric(
+        "min_ttc_s", _safety("min_ttc_s"), "s", needs="trajectories", title="minimum TTC",
+        symbol="TTC", meaning="shortest time to collision, following and crossing",
+        equation=f"gap/Δv while closing (Hayward 1972) {_SSM}",
+    ),
+    Metric(
+        "min_pet_s", _safety("min_pet_s"), "s", needs="trajectories", title="minimum PET",
+        symbol="PET", meaning="shortest time between two vehicles in a conflict area",
+        equation=f"entry of the second − exit of the first {_SSM}",
+    ),
+    Metric(
+        "max_drac_mps2", _safety("max_drac_mps2"), "m/s²", needs="trajectories",
+        title="maximum DRAC", symbol="DRAC", meaning="deceleration that avoids a collision",
+        equation=f"Δv²/(2·gap) while closing {_SSM}",
+    ),
+    Metric(
+        "max_braking_mps2", _safety("max_braking_mps2"), "m/s²", needs="trajectories",
+        title="hardest braking", symbol="b", meaning="largest deceleration of a vehicle",
+        equation="max(−a)",
+    ),
+    Metric(
+        "pets", _safety("pets"), needs="trajectories", title="encroachments",
+        meaning="pairs of vehicles one after the other through a conflict area",
+    ),
+    *(
+        Metric(
+            name, _safety(name), needs="trajectories", title=f"PET below {limit:g} s",
+            meaning=f"encroachments shorter than {limit:g} s",
+        )
+        for name, limit in PETS.items()
+    ),
+    Metric(
+        "crossings", _tally("crossings"), needs="counts", title="crossings",
+        meaning="vehicles that entered the junction, where perception errs",
+    ),
+    Metric(
+        "false_grants", _tally("false_grants"), needs="counts", title="false grants",
+        meaning="rights of way that the true view would not have given",
+    ),
+    Metric(
+        "disagreement_s", _tally("disagreement_s"), "s", needs="counts", title="disagreement",
+        meaning="time in which vehicles had chosen different cliques",
+    ),
+    Metric(
+        "deadlock_s", _tally("deadlock_s"), "s", needs="counts", title="deadlock",
+        meaning="time in which vehicles stood and none had the right of way",
+    ),
+)  # fmt: skip
+
+METRICS: Final = {metric.name: metric for metric in TABLE}
+
+#: What every summary has.
+USUAL: Final = tuple(metric for metric in TABLE if metric.usual)
+
+#: Names of the usual metrics with a value a trip: what trip tables and means have.
+MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
+
+#: Names of the metrics of `minisim.results.safety`.
+SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajectories")
+
+#: Both forms of every mean, as columns of a sweep: over the trips that ended, and over all.
+AVERAGED: Final = (*MEANS, *(f"complete_{name}" for name in MEANS))
+
+#: What is added to the name of a metric for its percentiles (numpy's linear method) and maximum.
+SPREAD: Final = ("p50", "p95", "max")
+
+
+def metric_named(metric: str | Metric) -> Metric:
+    """Look a metric up by name; a caller's own passes through.
+
+    Raises:
+        InputError: an unknown name (with the nearest one), or an own metric called like ours.
+    """
+    if not isinstance(metric, Metric):
+        return METRICS[choice("metric", metric, METRICS)]
+    if METRICS.get(metric.name, metric) is not metric:
+        raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
+    return metric
+
+
+def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
+    """The metrics that a caller asks for, each once.
+
+    Raises:
+        InputError: as `metric_named`, no sequence, or two metrics of one name.
+    """
+    asked: dict[str, Metric] = {}
+    for metric in map(metric_named, items("metrics", metrics, "names and Metrics")):
+        if asked.setdefault(metric.name, metric) != metric:
+            raise InputError(f"two metrics are called {metric.name!r}")
+    return tuple(asked.values())
+
+
+def named_metrics(metrics: Iterable[str | Metric]) -> tuple[str | Metric, ...]:
+    """The same, with ours by their names, as recipes of runs keep them; errors as there."""
+    return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
+
+
+def recording(metrics: Iterable[str | Metric]) -> str | None:
+    """What a run has to record for these metrics: "junction", or None for nothing."""
+    asked = asked_metrics(metrics)
+    return "junction" if any(metric.needs == "trajectories" for metric in asked) else None
+
+
+def heading(column: str) -> str:
+    """Heading of a column of a sweep, such as "waiting, with unfinished [s]"."""
+    metric = METRICS.get(column.removeprefix("complete_"))
+    if metric is None:
+        return column
+    if not column.startswith("complete_"):
+        return metric.heading
+    return metric.heading.replace(metric.title, f"{metric.title}, with unfinished", 1)

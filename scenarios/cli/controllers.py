@@ -1,0 +1,107 @@
+"""`minisim controllers`."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any
+
+import typer
+
+from scenarios.cli.shared.app import app
+from scenarios.cli.shared.options import AsJson
+from scenarios.cli.shared.terminal import show_json
+
+#: Columns of the output.
+WIDTH = 80
+
+
+@app.command(
+    epilog="Name a controller with parameters as in -c dim:gate=harmonious,monitor=on. One of your "
+    "own is -c mymodule:MyController(k=3) or -c path/to/file.py:MyController, and needs a line in "
+    "no file of ours.\n\n"
+    "[bold]Examples[/bold]\n\nminisim controllers dim\n\nminisim controllers mymodule:MyController"
+)
+def controllers(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="List the parameters of this one.", show_default=False),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the controllers, or the parameters of one."""
+    if name is None:
+        meanings = dict(_meanings())
+        if as_json:
+            show_json(meanings)
+            return
+        width = max(map(len, meanings)) + 2
+        for known, meaning in meanings.items():
+            typer.echo(_wrapped(f"{known:{width}}{meaning}", width))
+        return
+    from scenarios.controllers import described
+
+    make = described(name).make
+    meaning, parameters = _meaning(make), list(_parameters(make))
+    if as_json:
+        show_json({"name": name, "meaning": meaning, "parameters": parameters})
+        return
+    typer.echo(_wrapped(f"{name}: {meaning}", 0))
+    _show_parameters(parameters)
+    for parameter in parameters:
+        for word, kind in parameter["kinds"].items():
+            if kind["parameters"]:
+                typer.echo("\n" + _wrapped(f"{parameter['name']}={word}: {kind['meaning']}", 0))
+                _show_parameters(kind["parameters"])
+
+
+def _meanings() -> Iterator[tuple[str, str]]:
+    from scenarios.controllers import CONTROLLERS, package_of, plugins
+
+    for entry in CONTROLLERS.values():
+        yield entry.name, _meaning(entry.make)
+    for name, plugin in plugins().items():
+        yield name, f"of the package {package_of(plugin)} ({plugin.value})"
+
+
+def _meaning(make: Callable[..., Any]) -> str:
+    return (inspect.getdoc(make) or "").partition("\n")[0]
+
+
+def _parameters(make: Callable[..., Any]) -> Iterator[dict[str, Any]]:
+    """What is declared of each parameter, or what the signature says."""
+    from minisim.parameters import parameters, spelled_value
+
+    declared = {it.name: it.parameter for it in parameters(make)}
+    for name, given in inspect.signature(make).parameters.items():
+        it = declared.get(name)
+        kinds: Mapping[str, Callable[..., Any]] = it.kinds if it else {}
+        empty, hint = given.empty, ""
+        if given.annotation is not empty:
+            hint = inspect.formatannotation(given.annotation).strip("'")
+        yield {
+            "name": name,
+            "default": None if given.default is empty else spelled_value(given.default, kinds),
+            "allowed": it.allowed if it else hint,
+            "unit": it.unit if it else "",
+            "meaning": it.meaning if it else "",
+            "kinds": {
+                word: {"meaning": _meaning(kind), "parameters": list(_parameters(kind))}
+                for word, kind in kinds.items()
+            },
+        }  # fmt: skip
+
+
+def _show_parameters(parameters: list[dict[str, Any]]) -> None:
+    for it in parameters:
+        default = "" if it["default"] is None else f"={it['default']}"
+        unit = f" [{it['unit']}]" if it["unit"] else ""
+        allowed = f"  ({it['allowed']})" if it["allowed"] else ""
+        typer.echo(f"\n  {it['name']}{default}{unit}{allowed}")
+        if it["meaning"]:
+            typer.echo(_wrapped(f"      {it['meaning']}", 6))
+
+
+def _wrapped(text: str, indent: int) -> str:
+    return textwrap.fill(text, WIDTH, subsequent_indent=" " * indent, break_long_words=False)

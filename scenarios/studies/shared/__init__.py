@@ -1,0 +1,1 @@
+"""What studies share: points, results, and the comparison with the paper."""

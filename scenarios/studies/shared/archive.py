@@ -1,0 +1,108 @@
+"""What figures and reports are made from: results of studies, looked up when first needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from minisim.errors import MinisimError
+from scenarios.studies import study_named
+from scenarios.studies.shared.effort import Effort
+from scenarios.studies.shared.points import Point
+from scenarios.studies.shared.study import Find, Results, Runs
+from scenarios.sweep.keys import key_of
+
+if TYPE_CHECKING:
+    from scenarios.recipe import Recipe
+    from scenarios.sweep.store import Store
+
+
+class MissingRunsError(MinisimError):
+    """A figure needs runs that were never made."""
+
+
+def find_in(store: Store | None) -> Find:
+    """Looks runs up in a store: a failed or outdated run counts as none."""
+
+    def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        if store is None:
+            return [None] * len(recipes)
+        keys = [key_of(recipe) for recipe in recipes]
+        rows = store.valid(keys)
+        return [rows.get(key) for key in keys]
+
+    return find
+
+
+class Archive:
+    """The results that a store holds.
+
+    Args:
+        find: where the runs are.
+        effort: how many runs a point.
+    """
+
+    def __init__(self, find: Find, effort: Effort) -> None:
+        self.effort = effort
+        self.study: Callable[[str], Results] = cache(
+            lambda name: study_named(name).collect(effort, find)
+        )
+
+    def need(self, *names: str) -> tuple[Results, ...]:
+        """The results of studies.
+
+        Raises:
+            MissingRunsError: none of them has a run; says how to make them.
+        """
+        results = tuple(map(self.study, names))
+        if all(each.good.empty for each in results):
+            raise MissingRunsError(
+                f"the store has no run of {' or '.join(names)} with "
+                f"{results[0].study.extent(self.effort)}; make them with: "
+                f"{self.effort.command(*names)}"
+            )
+        return results
+
+
+def missing_note(
+    results: Iterable[Results], wanted: Callable[[Point], bool] = lambda _: True
+) -> str:
+    """What a figure shows and what it lacks, in small print.
+
+    Args:
+        results: drawn.
+        wanted: whether a point belongs to the figure.
+    """
+    drawn = tuple(results)
+    effort = drawn[0].effort
+    runs = {
+        f"{point.series} ({each.study.name}, {point.where}, {point.density:g})": count
+        for each in drawn
+        for point, count in each.runs.items()
+        if wanted(point)
+    }
+    fewer = [f"{name} has {n.made}" for name, n in runs.items() if 0 < n.made < n.wanted]
+    missing = [name for name, count in runs.items() if not count.made]
+    shown = 1 if fewer and missing else 3  # there is room for two lines
+    text = f"{effort.warning}{_extent(runs.values())}, {effort.horizon:g} s each."
+    if fewer:
+        text += f"  Fewer runs: {_listed(fewer, shown)}."
+    if missing:
+        text += f"  Not drawn, for there is no run: {_listed(missing, shown)}."
+    return text
+
+
+def _extent(runs: Iterable[Runs]) -> str:
+    """How many runs there are: seeds a case, or runs of those wanted where some are missing."""
+    known = list(runs)
+    seeds = sorted({count.wanted for count in known})
+    span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else f"{seeds[0]} seeds"
+    made, wanted = sum(count.made for count in known), sum(count.wanted for count in known)
+    return span if made == wanted else f"{made} of {wanted} runs ({span} a case)"
+
+
+def _listed(texts: Sequence[str], shown: int) -> str:
+    """The first ones, and how many more there are."""
+    more = f"; and {len(texts) - shown} more" if len(texts) > shown else ""
+    return f"{'; '.join(texts[:shown])}{more}"

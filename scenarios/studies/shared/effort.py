@@ -1,0 +1,74 @@
+"""How much is simulated for studies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minisim.errors import InputError, integer
+from minisim.parameters import checked, declared, part, real, reals, whole
+
+
+def _power_of_two(title: str, value: Any) -> int:
+    steps = integer(title, value, low=2)
+    if steps.bit_count() != 1:
+        raise InputError(f"{title} must be a power of two, got {steps}")
+    return steps
+
+
+@declared(kw_only=True)
+class Search:
+    """How a limit is looked for: by bisection, `seeds` · log₂(`steps`) runs a point."""
+
+    step: float = real("demands are multiples of it", "veh/h", above=0, default=10.0)
+    steps: int = checked(
+        "the highest demand is `steps` · `step`", _power_of_two, "power of two", default=128
+    )
+    seeds: int = whole("each has a bisection of its own; the seeds 1 … `seeds`", low=1, default=4)
+    horizon: float = real("of each run", "s", above=0, default=3600.0)
+
+    @classmethod
+    def quick(cls) -> Search:
+        """A smoke test: rough, and of runs too short to mean anything."""
+        return cls(step=200.0, steps=4, seeds=2, horizon=150.0)
+
+    @property
+    def rounds(self) -> int:
+        """How often a bisection halves its bracket."""
+        return self.steps.bit_length() - 1
+
+
+@declared(kw_only=True)
+class Effort:
+    """How much is simulated for each study."""
+
+    seeds: int = whole("runs a point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
+    horizon: float = real("of each run", "s", above=0, default=3600.0)
+    densities: tuple[float, ...] | None = reals(
+        "only points with these demands, in studies that have such; none is all",
+        "veh/h/lane", optional=True, label="densities", default=None,
+    )  # fmt: skip
+    search: Search = part("for studies that search", Search, default_factory=Search)
+
+    @classmethod
+    def of(cls, *, quick: bool = False, seeds: int | None = None) -> Effort:
+        """The full effort or the smoke test; another number of seeds where it is given.
+
+        The smoke test has the same points at two demands, for some minutes each.
+        """
+        if quick:
+            return cls(
+                seeds=2 if seeds is None else seeds, horizon=150.0, densities=(150.0, 350.0),
+                search=Search.quick(),
+            )  # fmt: skip
+        return cls() if seeds is None else cls(seeds=seeds)
+
+    @property
+    def warning(self) -> str:
+        """What to say before the numbers of a smoke test; empty otherwise."""
+        return "" if self.densities is None else "Smoke test, which means nothing: "
+
+    def command(self, *names: str) -> str:
+        """The command line that makes the runs of these studies."""
+        only = "".join(f" --only {name}" for name in names)
+        quick = " --quick" if self.densities is not None else ""
+        return f"minisim reproduce{only}{quick} --seeds {self.seeds}"

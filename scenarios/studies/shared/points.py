@@ -1,0 +1,89 @@
+"""Points of figures: everything of a run but its seed and horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from itertools import product
+from typing import Any, NamedTuple, Protocol
+
+from scenarios.controllers import controller_named
+from scenarios.library import MAKERS, regular
+from scenarios.recipe import Recipe
+
+
+class Point(Protocol):
+    """One point of a figure. A named tuple of plain values, which become columns."""
+
+    @property
+    def series(self) -> str:
+        """The line of the figure that it lies on."""
+
+    @property
+    def arms(self) -> int:
+        """Of the junction."""
+
+    @property
+    def density(self) -> float:
+        """Mean inflow a lane [veh/h]."""
+
+    @property
+    def where(self) -> str:
+        """What tells it from other points of its series, but for the demand."""
+
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
+        """The run of one seed."""
+
+    def _asdict(self) -> dict[str, Any]:
+        """Its columns."""
+
+
+class ControllerPoint(NamedTuple):
+    """A controller at a demand.
+
+    Attributes:
+        profile: by name.
+        series: the controller that a reader thinks of, such as "dim", whatever variant of it the
+            study needs.
+        controller: by its name on the command line.
+        arms: of the junction.
+        split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
+        density: mean inflow a lane [veh/h].
+        humans: share of human drivers.
+    """
+
+    profile: str
+    series: str
+    controller: str
+    arms: int
+    split: str
+    density: float
+    humans: float = 0.0
+
+    def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
+        """The run of one seed; collisions are counted, for some published rules have them."""
+        make = MAKERS.get(self.arms) or partial(regular, self.arms)
+        scenario = make(self.density, split=self.split, profile=self.profile, horizon=horizon)
+        controller = controller_named(self.controller, self.profile)
+        label = f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
+        return Recipe(scenario, controller, seed, self.humans, label=label, on_collision="record")
+
+    @property
+    def where(self) -> str:
+        """What tells it from other points of its series, but for the demand."""
+        humans = f"{self.humans:.0%} humans, " if self.humans else ""
+        return f"{humans}{self.arms} arms, {self.split}"
+
+
+def fair(name: str, arms: int, density: float, humans: float = 0.0) -> ControllerPoint:
+    """A controller on equal terms: the profile `fair` and the same inflow on every lane."""
+    return ControllerPoint("fair", name, name, arms, "balanced", float(density), humans)
+
+
+def fair_grid(
+    controllers: Iterable[str], arms: Iterable[int], densities: Iterable[float]
+) -> tuple[ControllerPoint, ...]:
+    """Every combination of controllers, arms and demands [veh/h/lane] on equal terms."""
+    return tuple(
+        fair(name, n, density) for n, name, density in product(arms, controllers, densities)
+    )

@@ -1,0 +1,80 @@
+"""Runs a study and keeps its rows in a store."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from scenarios.recipe import Recipe
+from scenarios.studies import study_named
+from scenarios.studies.shared.archive import find_in
+from scenarios.studies.shared.effort import Effort
+from scenarios.sweep.rows import Row
+from scenarios.sweep.runner import finished
+from scenarios.sweep.store import Store
+
+#: Called with the runs of a study that are done, and their number.
+Report = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Made:
+    """What one call of `reproduce` did.
+
+    Attributes:
+        name: of the study.
+        runs: that it consists of.
+        hours: simulated by them.
+        computed: how many were not in the store before.
+        wall_s: time that it took.
+        cpu_s: processor time of all its runs, whenever they were made.
+        failed: rows of failed runs.
+    """
+
+    name: str
+    runs: int
+    hours: float
+    computed: int
+    wall_s: float
+    cpu_s: float
+    failed: tuple[Row, ...]
+
+
+def reproduce(name: str, effort: Effort, store: Store, jobs: int, report: Report) -> Made:
+    """Run a study; what the store has is not run again.
+
+    Args:
+        name: of the study.
+        effort: how much.
+        store: where the rows go.
+        jobs: processes.
+        report: of progress.
+
+    Raises:
+        FileError: the store cannot be written.
+    """
+    study = study_named(name)
+    total = study.most_runs(effort)
+    known = 0
+    hours = 0.0
+    rows: list[Row] = []
+    began = time.monotonic()
+
+    def run(recipes: Sequence[Recipe]) -> list[Row]:
+        nonlocal known, hours
+        known += sum(row is not None for row in find_in(store)(recipes))
+        hours += sum(recipe.scenario.horizon for recipe in recipes) / 3600.0
+        made: dict[int, Row] = {}
+        for k, row in finished(recipes, jobs=jobs, store=store):
+            made[k] = row
+            report(len(rows) + len(made), total)
+        rows.extend(made[k] for k in range(len(recipes)))
+        return [made[k] for k in range(len(recipes))]
+
+    study.collect(effort, run)
+    return Made(
+        name, len(rows), hours, len(rows) - known, time.monotonic() - began,
+        sum(row.get("cpu_s", 0.0) for row in rows),
+        tuple(row for row in rows if row["error"] is not None),
+    )  # fmt: skip

@@ -1,0 +1,182 @@
+"""Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
+
+A cell is all that was run alike but for the seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Final
+
+from minisim.errors import InputError, choice
+from minisim.results.metrics import AVERAGED, Metric
+from minisim.results.summary import GROUPS
+from scenarios.statistics import FILLING, mean_interval, prediction_interval
+from scenarios.sweep.rows import grows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns that name a cell.
+CELL: Final = (
+    "scenario",
+    "arms",
+    "side",
+    "profile",
+    "split",
+    "turns",
+    "density",
+    "horizon_s",
+    "warmup_s",
+    "controller",
+)
+
+#: Summed over the runs of a cell.
+SUMS: Final = ("trips", "unfinished", "collisions")
+
+#: Other columns of runs that are no metric of a cell.
+OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
+
+#: What columns of groups of trips begin with.
+GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
+
+
+def cells(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row a cell, in the order in which the cells come.
+
+    Returns:
+        `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
+        (sums); each of the columns `averaged` with the half widths of its 95 % confidence interval
+        (`…_ci95`) and of the 95 % prediction interval of one more run (`…_pi95`), NaN where
+        unknown;
+        `growing`, whether its queues kept growing, asked of all its runs together; `too_short`,
+        whether the runs are too short to tell; `cpu_s`, mean processor time of a run.
+    """
+    import pandas as pd
+
+    made = []
+    for names, group in rows.groupby(list(CELL), sort=False):
+        good = group[group["error"].isna()]
+        cell: dict[str, object] = dict(zip(CELL, names, strict=True))
+        cell |= {"runs": len(good), "failed": len(group) - len(good)}
+        if len(good):
+            cell |= _averaged(good)
+        made.append(cell)
+    return pd.DataFrame(made)
+
+
+def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
+    """Columns that are averaged: both forms of the usual means, and what was asked for besides."""
+    known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
+    more = [
+        column
+        for column in rows.columns
+        if column not in known and not column.startswith(GROUPED) and _is_numeric(rows[column])
+    ]
+    return (*AVERAGED, *more)
+
+
+def _is_numeric(column: pd.Series[Any]) -> bool:
+    """Whether it holds a number, and nothing but numbers where it holds something."""
+    there = column.dropna()
+    return len(there) > 0 and all(isinstance(value, Real) for value in there)
+
+
+def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
+    """Mean of `metric`, a column or a `Metric`, under one controller less that under another.
+
+    Runs are compared one by one.
+
+    Returns:
+        One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` and
+        `difference_ci95`.
+
+    Raises:
+        InputError: an unknown metric or controller, or two runs of one seed with other arrivals.
+    """
+    import pandas as pd
+
+    metric = metric.name if isinstance(metric, Metric) else metric
+    choice("metric", metric, averaged(rows))
+    for name in (first, second):
+        choice("controller of these rows", name, sorted(set(rows["controller"])))
+    by = [column for column in CELL if column != "controller"]
+    gaps = []
+    for names, values in pairs(rows, metric, "controller", (first, second), by).items():
+        interval = mean_interval(values)
+        gaps.append({
+            **dict(zip(by, names, strict=True)),
+            "pairs": interval.size,
+            "difference": interval.mean,
+            "difference_ci95": interval.half_width,
+        })  # fmt: skip
+    return pd.DataFrame(gaps)
+
+
+def pairs(
+    rows: pd.DataFrame, metric: str, column: str, names: tuple[str, str], by: Sequence[str]
+) -> dict[tuple[Any, ...], list[float]]:
+    """Differences of `metric` between two controllers: values of `by` -> one value a seed.
+
+    Runs are paired by seed, and only where both controllers met the same arrivals, so that what
+    varies between seeds alike for both cancels.
+
+    Args:
+        rows: of a sweep; failed runs and missing values are left out.
+        metric: a column; the first controller's less the second's.
+        column: where `names` stand, such as "controller".
+        names: of both controllers.
+        by: columns that name a cell.
+
+    Raises:
+        InputError: two runs of one seed with other arrivals.
+    """
+    good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
+    one, other = (good[good[column] == name] for name in names)
+    both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
+    if (both["arrivals"] != both["arrivals_other"]).any():
+        raise InputError(f"{' and '.join(names)} did not meet the same arrivals")
+    gap = both[metric].astype(float) - both[f"{metric}_other"].astype(float)
+    grouped = gap.groupby([both[key] for key in by], sort=False)
+    return {key: values.tolist() for key, values in grouped}
+
+
+def _averaged(good: pd.DataFrame) -> dict[str, object]:
+    cell: dict[str, object] = {name: int(good[name].sum()) for name in SUMS}
+    for metric in averaged(good):
+        values = good[metric].dropna().astype(float).tolist()
+        if values:
+            interval = mean_interval(values)
+            cell[metric] = interval.mean
+            cell[f"{metric}_ci95"] = interval.half_width
+            cell[f"{metric}_pi95"] = prediction_interval(values).half_width
+    cell |= {"growing": saturated(good), "too_short": too_short(good)}
+    cell["cpu_s"] = float(good["cpu_s"].mean())
+    return cell
+
+
+def saturated(good: pd.DataFrame) -> bool:
+    """Whether the queues of a cell's runs, of the junction or of a lane, kept growing together.
+
+    No where the runs are `too_short` to tell.
+    """
+    if too_short(good):
+        return False
+    arms = int(good["arms"].iloc[0])
+    return grows(good.filter(regex="(queue_growth|trips)$").sum(), arms)
+
+
+def too_short(good: pd.DataFrame) -> bool:
+    """Whether a cell's runs end before growing queues can be told from roads that fill.
+
+    The travel time on a free road is taken as travel time less time loss: of the trips that ended,
+    and where none did, of what was driven.
+    """
+    horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
+    ended, driven = (
+        (good[f"{form}travel_time_s"].astype(float) - good[f"{form}time_loss_s"].astype(float))
+        for form in ("", "complete_")
+    )
+    free = ended.fillna(driven).mean()
+    return bool(horizon < FILLING * free)

@@ -1,0 +1,125 @@
+"""One run of a sweep: what identifies it, and the row that it gives."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import time
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from minisim.errors import MinisimError
+from minisim.junction.geometry import ARM_NAMES
+from minisim.results.trips import Trips
+from minisim.version import __version__
+from scenarios.recipe import Recipe
+from scenarios.statistics import growing
+from scenarios.sweep.keys import RESULTS, results_version
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns that a repetition of the same run measures anew.
+MEASURED = ("cpu_s",)
+
+Row = dict[str, Any]
+
+
+class Outcome(NamedTuple):
+    """What a run left: its row, and where that came from."""
+
+    row: Row
+    provenance: dict[str, str]
+
+
+def identity_of(recipe: Recipe) -> Row:
+    """The columns that tell what was run."""
+    scenario = recipe.scenario
+    demand, intersection = scenario.demand, scenario.intersection
+    recorded = scenario.recorded is not None
+    return {
+        "controller": recipe.name,
+        "scenario": scenario.name,
+        "arms": intersection.n,
+        "side": intersection.side,
+        "profile": scenario.profile.name,
+        "density": scenario.density,
+        "split": "recorded" if recorded else _shares(demand.split, "balanced"),
+        "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
+        "seed": recipe.seed,
+        "horizon_s": scenario.horizon,
+        "warmup_s": scenario.warmup,
+    }
+
+
+def outcome_of(recipe: Recipe) -> Outcome:
+    """Run it; a `MinisimError` becomes part of the row."""
+    began = time.thread_time()
+    try:
+        run = recipe.run()
+        cpu = time.thread_time() - began
+        summary = dict(_flat(run.summary(("queue_growth", *recipe.metrics))))
+    except MinisimError as error:
+        return failed(recipe, error)
+    identity = identity_of(recipe)
+    row = {
+        **(identity | summary | identity),  # columns in this order, the controller's from the label
+        "growing": grows(summary, run.site.intersection.n),
+        "arrivals": _fingerprint(run.columns),
+        "cpu_s": cpu,
+        "version": results_version(),
+        "error": None,
+    }
+    return Outcome(row, _provenance())
+
+
+def failed(recipe: Recipe, error: BaseException) -> Outcome:
+    """The outcome of a run that gave none."""
+    kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+    row = {**identity_of(recipe), "version": results_version(), "error": f"{kind}{error}"}
+    return Outcome(row, _provenance())
+
+
+def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
+    """Whether the queues of the junction or of a lane kept growing.
+
+    Args:
+        row: of a run, or the sums over several.
+        arms: of the junction.
+    """
+    return any(
+        growing(float(row[f"{of}queue_growth"]), int(row[f"{of}trips"]))
+        for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
+    )
+
+
+def _fingerprint(trips: Trips) -> str:
+    """Names the arrivals: rows of common arrivals have the same."""
+    digest = hashlib.sha256()
+    for column in (trips.demand_time, trips.lane, trips.manoeuvre):
+        digest.update(np.ascontiguousarray(column).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _provenance() -> dict[str, str]:
+    return {
+        "minisim": __version__,
+        "results": str(RESULTS),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in summary.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}_")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _shares(shares: Any, equal: str) -> str:
+    return equal if shares is None else ":".join(f"{share:g}" for share in shares)

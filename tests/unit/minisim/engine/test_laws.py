@@ -1,0 +1,54 @@
+"""The laws of a run: how each model inserts, follows and counts a vehicle ahead."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from minisim.control import Unregulated
+from minisim.engine.laws import closeness, follow, insertable
+from minisim.engine.state import Law, build_law
+from minisim.testing import small_scenario
+from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
+
+
+def law(model: str) -> Law:
+    vehicle = CruiseVehicle() if model == "cc" else VehicleType(model=model)
+    site = small_scenario(vehicle=vehicle).site(0)
+    plan = Unregulated().start(site).plan
+    return build_law(site, plan, depart_speed=None, record=None, record_window=(0.0, math.inf))
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_is_inserted_closer_than_the_gap_at_standstill(model: str) -> None:
+    assert insertable(2.4, 14.0, law(model)) < 0.0
+    assert insertable(2.6, 14.0, law(model)) >= 0.0
+
+
+def test_a_law_without_a_rule_of_its_own_inserts_at_any_speed() -> None:
+    assert insertable(2.6, 0.0, law("cc")) == math.inf
+    for model in ("idm", "iidm", "krauss"):
+        assert insertable(2.6, 0.0, law(model)) < 1.0
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+def test_a_vehicle_ahead_counts_more_the_closer_it_is(model: str) -> None:
+    counts = [closeness(10.0, gap, 5.0, law(model)) for gap in (200.0, 50.0, 20.0, 5.0, 0.0)]
+    assert counts == sorted(counts)
+    assert counts[-1] == math.inf
+    wanted = [follow(10.0, 14.0, z, law(model)) for z in counts[:-1]]
+    assert wanted == sorted(wanted, reverse=True)
+    assert wanted[0] > 0.0 > wanted[-1]
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+def test_a_desired_speed_of_zero_is_comfortable_braking(model: str) -> None:
+    assert follow(10.0, 0.0, 0.0, law(model)) == pytest.approx(-4.5)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_table_says_how_a_model_steps_and_where_it_inserts(name: str) -> None:
+    assert law(name).semi_implicit == (name in ("krauss", "cc"))
+    assert law(name).margin == (0.1 if name == "cc" else 0.0)
+    assert list(MODELS)[law(name).model] == name

@@ -1,0 +1,240 @@
+"""The table of metrics, summaries by group, warm-up, and how a run shows itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import minisim
+from dim import Dim
+from dim.humans.mixed import Mixed
+from minisim.control import Unregulated
+from minisim.errors import InputError
+from minisim.results.metrics import (
+    MEANS,
+    METRICS,
+    SAFETY,
+    TABLE,
+    Metric,
+    heading,
+    metric_named,
+    recording,
+)
+from minisim.results.run import Run
+from minisim.testing import small_scenario
+from scenarios import four_way
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    scenario = four_way(250, profile="fair", horizon=300.0)
+    return minisim.simulate(scenario, Mixed(Dim(), 0.4), 3, record="junction")
+
+
+def test_every_metric_can_be_asked_for_and_says_what_it_is(run: Run) -> None:
+    summary = run.summary(metrics=METRICS, by=["lane", "movement", "kind"])
+    for metric in TABLE:
+        assert metric.meaning
+        assert metric.title
+        assert metric.name in summary
+        assert metric.grouped == (metric.name in summary["lanes"]["a"])
+    assert {f"{name}_p95" for name in MEANS} < set(summary["complete"])
+
+
+def test_percentiles_are_numpys_linear_ones(run: Run) -> None:
+    summary = run.summary(["waiting_time_s"])
+    trips = run.columns
+    for form, chosen in ((summary, trips.arrived), (summary["complete"], trips.departed)):
+        values = trips.waiting_time[chosen]
+        for name, share in (("p50", 50), ("p95", 95), ("max", 100)):
+            assert form[f"waiting_time_s_{name}"] == np.percentile(values, share)
+    assert "waiting_time_s_p95" not in run.summary(), "only where it is asked for"
+
+
+@pytest.mark.parametrize("key", ["lanes", "movements", "kinds"])
+def test_groups_make_up_the_whole(run: Run, key: str) -> None:
+    summary = run.summary(by=["movement", "kind"])
+    groups = summary[key].values()
+    for name in ("trips", "unfinished"):
+        assert sum(group[name] for group in groups) == summary[name]
+    total = math.fsum(
+        group["waiting_time_s"] * (group["trips"] - group["unfinished"])
+        for group in groups
+        if group["waiting_time_s"] is not None
+    )
+    assert total / (summary["trips"] - summary["unfinished"]) == pytest.approx(
+        summary["waiting_time_s"]
+    )
+
+
+def test_a_group_is_of_its_trips(run: Run) -> None:
+    group = run.summary(by=["movement"])["movements"]["b3"]
+    trips = run.trips[(run.trips["lane"] == "b") & (run.trips["manoeuvre"] == 3)]
+    assert group["trips"] == len(trips)
+    assert group["travel_time_s"] == pytest.approx(trips["travel_time_s"].mean())
+
+
+def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
+    late = Metric("late", lambda trips: float((trips.depart_delay > 0.0).sum()), needs="trips")
+    speed = Metric("mean_speed", lambda run: float(run.trajectories["speed_mps"].mean()), "m/s")
+    odd = Metric("odd", lambda run: np.where(run.columns.lane == 0, np.nan, 1.0), per="trip")
+    summary = run.summary([late, speed, odd])
+    assert summary["late"] == sum(lane["late"] for lane in summary["lanes"].values())
+    assert summary["mean_speed"] == pytest.approx(run.trajectories["speed_mps"].mean())
+    assert (summary["lanes"]["a"]["odd"], summary["odd"], summary["odd_max"]) == (None, 1.0, 1.0)
+    assert run.summary([Metric("none", lambda run: math.nan)])["none"] is None
+
+
+@pytest.mark.parametrize(
+    ("metric", "message"),
+    [
+        (Metric("m", lambda run: "5"), "metric 'm' must give one finite number or None, got '5'"),
+        (Metric("m", lambda run: math.inf), "metric 'm' must give one finite number"),
+        (Metric("m", lambda run: np.zeros(3)), 'got array.*; per="trip" takes an array'),
+        (
+            Metric("m", lambda run: 1.0, per="trip"),
+            "'m' must give one finite number a trip, an arr",
+        ),
+        (Metric("m", lambda run: run.trips, per="trip"), "metric 'm' must give one finite number"),
+        (
+            Metric("m", lambda run: run.columns.lane / np.zeros(1) + np.inf, per="trip"),
+            "metric 'm' must give one finite number a trip",
+        ),
+        ("min_tcc_s", "unknown metric 'min_tcc_s'.*did you mean 'min_ttc_s'"),
+        (Metric("travel_time_s", len), "'travel_time_s' is there already; give yours another"),
+        (5, "unknown metric 5"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_what_is_no_metric(run: Run, metric: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        run.summary([metric])
+
+
+def test_other_wrong_questions(run: Run) -> None:
+    two = [Metric("m", lambda run: 1), Metric("m", lambda run: 2)]
+    for wrong, message in (
+        ({"metrics": two}, "two metrics are called 'm'"),
+        ({"metrics": "trips"}, "metrics must be a sequence of names and Metrics, got 'trips'"),
+        ({"by": ["lanee"]}, "did you mean 'lane'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            run.summary(**wrong)  # type: ignore[arg-type]
+    for name in ("two words", "", "seed", 3):
+        with pytest.raises(InputError, match="name of a metric must be letters"):
+            Metric(name, len)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="must be a function"):
+        Metric("m", 5)  # type: ignore[arg-type]
+
+
+def test_an_error_in_a_metric_tells_which(run: Run) -> None:
+    with pytest.raises(ZeroDivisionError) as caught:
+        run.summary([Metric("broken", lambda run: 1 / 0)])
+    assert caught.value.__notes__ == ["in metric 'broken'"]
+
+
+def test_safety_needs_trajectories() -> None:
+    run = minisim.simulate(small_scenario(demand_time=20.0), Dim())
+    assert not set(SAFETY) & set(run.summary())
+    with pytest.raises(InputError, match="'min_pet_s' needs trajectories: simulate with record="):
+        run.summary(["min_pet_s"])
+    assert recording(["trips"]) is None
+    assert recording(["trips", "min_pet_s"]) == "junction"
+
+
+def test_safety_is_that_of_the_junction_whatever_was_recorded() -> None:
+    scenario = four_way(300, profile="fair", horizon=120.0)
+    near, everything = (
+        minisim.simulate(scenario, Dim(), 1, record=record) for record in ("junction", "all")
+    )
+    assert len(near.trajectories) < len(everything.trajectories)
+    assert near.safety == everything.safety
+
+
+def test_headings() -> None:
+    assert heading("waiting_time_s") == "waiting [s]"
+    assert heading("complete_waiting_time_s") == "waiting, with unfinished [s]"
+    assert heading("trips") == "trips"
+    assert heading("mine") == "mine"
+    assert metric_named(METRICS["trips"]) is metric_named("trips")
+
+
+# --- warm-up ---------------------------------------------------------------------------------
+
+
+@given(warmup=st.floats(0.0, 119.0))
+def test_trips_demanded_in_the_warmup_do_not_count(warmup: float) -> None:
+    scenario = replace(four_way(300, horizon=120.0), warmup=warmup)
+    run = minisim.simulate(scenario, Dim(), 2)
+    summary, trips = run.summary(), run.trips
+    kept = trips[trips["demand_time_s"] >= warmup]
+    assert summary["trips"] == len(kept) == sum(x["trips"] for x in summary["lanes"].values())
+    assert summary["unfinished"] == kept["arrival_s"].isna().sum()
+    for name in ("waiting_time_s", "depart_delay_s"):
+        mean = kept.loc[kept["arrival_s"].notna(), name].mean()
+        assert summary[name] == (pytest.approx(mean) if mean == mean else None)
+    assert len(trips) == len(run.columns.lane), "the table has them all"
+    assert f"warmup={warmup}" in run.provenance["scenario"]
+    assert summary["warmup_s"] == warmup
+
+
+def test_a_warmup_is_shorter_than_the_run() -> None:
+    for scenario in (four_way(horizon=100.0), small_scenario(demand_time=100.0)):
+        for warmup in (-1.0, 100.0, math.nan, "1"):
+            with pytest.raises(InputError, match="warmup"):
+                replace(scenario, warmup=warmup)  # type: ignore[type-var]
+
+
+# --- how a run shows itself -----------------------------------------------------------------
+
+
+class Tags(HTMLParser):
+    """Checks that every element is closed, and collects the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.cells: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert not attrs, "no colours, no styles"
+        if tag != "br":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.cells.append(data)
+
+
+def test_a_run_in_a_notebook_is_valid_html_with_escaped_names() -> None:
+    scenario = replace(small_scenario(demand_time=60.0), name="<script>a&b\n")
+    run = minisim.simulate(scenario, Unregulated(), on_collision="record")
+    page = Tags()
+    page.feed(run._repr_html_())
+    page.close()
+    assert page.open == []
+    assert page.cells[0].startswith("<script>a&b, unregulated: ")
+    lanes = run.summary()["lanes"]
+    for lane in "abcd":
+        at = page.cells.index(lane)
+        assert page.cells[at + 1] == str(lanes[lane]["trips"])
+
+
+def test_a_repr_is_short_and_has_the_means(run: Run) -> None:
+    lines = repr(run).splitlines()
+    assert len(lines) <= 5
+    assert "four-way, dim-humans-0.4: 250 veh/h/lane, profile fair, seed 3, 300 s" in lines[0]
+    assert f"waiting {run.summary()['waiting_time_s']:.2f} s" in repr(run)
+    odd = replace(run, scenario=replace(small_scenario(), name="a\n" * 500))
+    assert len(repr(odd).splitlines()) <= 5
+    empty = minisim.simulate(small_scenario(density=0), Dim())
+    assert "waiting – s" in repr(empty)

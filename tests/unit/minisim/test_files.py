@@ -1,0 +1,89 @@
+"""Files: writers that never leave half of one, and checks before any work is done."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from minisim.errors import FileError, InputError
+from minisim.files import (
+    check_apart,
+    check_file,
+    check_table,
+    make_folder,
+    markdown_table,
+    replacing,
+    write_table,
+)
+
+
+def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "out.txt"
+    with replacing(path) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+        assert not path.exists()
+        assert temporary.parent == path.parent
+    assert path.read_text(encoding="utf-8") == "new"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_a_symbolic_link_keeps_pointing_to_the_file(tmp_path: Path) -> None:
+    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
+    real.write_text("old", encoding="utf-8")
+    link.symlink_to(real)
+    with replacing(link) as temporary:
+        temporary.write_text("new", encoding="utf-8")
+    assert link.is_symlink()
+    assert real.read_text(encoding="utf-8") == "new"
+
+
+def test_a_table_is_read_back(tmp_path: Path) -> None:
+    frame = pd.DataFrame({"a": [0.1 + 0.2, 2.0], "b": ["x", None]})
+    write_table(frame, tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_bytes() == b"a,b\n0.3,x\n2.0,\n"
+
+
+@pytest.mark.parametrize("use", [check_table, lambda path: write_table(pd.DataFrame(), path)])
+def test_a_table_has_one_of_two_suffixes(use: Any, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"allowed: \.csv, \.parquet; did you mean '\.csv'"):
+        use(tmp_path / "t.cvs")
+
+
+def test_a_markdown_cell_stays_in_its_column() -> None:
+    lines = markdown_table(("name", "n"), [("a|b\nc", "1")]).splitlines()
+    assert lines == ["| name | n |", "| --- | ---: |", r"| a\|b c | 1 |"]
+
+
+def test_a_check_leaves_no_trace(tmp_path: Path) -> None:
+    assert check_file(tmp_path / "new.xml", ".xml", ".csv") == tmp_path / "new.xml"
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_written_is_said_before(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="it is a folder"):
+        check_file(tmp_path)
+    with pytest.raises(FileError, match="there is no folder"):
+        check_file(tmp_path / "none" / "x.csv")
+    with pytest.raises(FileError, match="not an ordinary file"):
+        check_file(os.devnull)
+    with pytest.raises(InputError, match=r"allowed: \.xml"):
+        check_file(tmp_path / "x.csv", ".xml")
+
+
+def test_a_folder_is_made_with_its_parents(tmp_path: Path) -> None:
+    assert stat.S_ISDIR(make_folder(tmp_path / "a" / "b").stat().st_mode)
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="it is a file"):
+        make_folder(tmp_path / "file")
+
+
+def test_two_options_never_name_one_file(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    check_apart({"--a": tmp_path / "real", "--b": tmp_path / "other", "--c": None})
+    with pytest.raises(InputError, match="--a and --b name the same file"):
+        check_apart({"--a": tmp_path / "real", "--b": tmp_path / "link"})

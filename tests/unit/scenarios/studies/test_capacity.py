@@ -1,0 +1,115 @@
+"""Capacity by bisection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from baselines import FixedTime
+from minisim.errors import InputError
+from scenarios import four_way
+from scenarios.recipe import Recipe
+from scenarios.studies.capacity import STUDY, Capacity, CapacityStudy, capacities, grows
+from scenarios.studies.shared.effort import Effort, Search
+from scenarios.studies.shared.points import fair
+from scenarios.studies.shared.study import Find
+from scenarios.sweep.rows import outcome_of
+from tests.builders import capacity_of, synthetic_find
+
+
+def of_dim(arms: int = 4) -> CapacityStudy:
+    return replace(STUDY, points=(fair("dim", arms, 0.0),))
+
+
+def searched(study: CapacityStudy, search: Search, find: Find) -> list[Capacity]:
+    return capacities(study.collect(Effort(search=search), find))
+
+
+@pytest.mark.parametrize("arms", [3, 4, 5, 6])
+def test_bisection_finds_the_capacity_of_the_rows(arms: int) -> None:
+    search = Search(step=10.0, seeds=2)
+    results = of_dim(arms).collect(Effort(search=search), synthetic_find)
+    (capacity,) = capacities(results)
+    # A row grows by more than 2 % of its arrivals from 1/0.98 of its capacity on.
+    assert capacity.interval.mean == pytest.approx(capacity_of("dim", arms) / 0.98, abs=10.0)
+    assert len(results.rows) == of_dim(arms).most_runs(results.effort) == 2 * 7
+
+
+def test_capacity_says_no_more_than_the_search_knows() -> None:
+    def text(*brackets: tuple[float, float]) -> str:
+        return str(Capacity("dim", 4, brackets))
+
+    assert text((390.0, 400.0), (390.0, 400.0)) == "395 ± 5", "equal seeds, rounded by the search"
+    # t(0.975, 1)·s/√2 = 12.706·5 for two values 10 apart, and the 5 of the rounding.
+    assert text((390.0, 400.0), (400.0, 410.0)) == "400 ± 69"
+    assert text((390.0, 400.0)) == "395"
+    assert text((0.0, 200.0), (200.0, 400.0)) == "< 400"
+    assert text((600.0, math.inf), (400.0, 600.0)) == "> 400"
+    assert text((600.0, math.inf), (0.0, 200.0)) == "–"
+    with pytest.raises(InputError, match="the capacity of dim on 4 arms"):
+        _ = Capacity("dim", 4, ((0.0, 200.0),)).interval
+
+
+@pytest.mark.parametrize(("growth", "text"), [(1.0, "< 200"), (0.0, "> 600")])
+def test_capacity_beyond_the_search(growth: float, text: str) -> None:
+    def find(asked: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        row = {"queue_growth": growth * 100.0, "trips": 100, "error": None}
+        return [{**row, "seed": experiment.seed} for experiment in asked]
+
+    (capacity,) = searched(of_dim(), Effort.of(quick=True).search, find)
+    assert str(capacity) == text
+
+
+def test_capacity_of_runs_that_fail_is_missing() -> None:
+    asked: list[int] = []
+
+    def broken(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        asked.append(len(experiments))
+        return [None] * len(experiments)
+
+    assert searched(of_dim(), Search(seeds=2), broken) == []
+    assert asked == [2, 0, 0, 0, 0, 0, 0], "a lost point is not asked for again"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"steps": 100}, "steps must be a power of two, got 100"),
+        ({"steps": 1}, "steps must be an integer of at least 2"),
+        ({"step": 0.0}, r"step \[veh/h\] must be above 0"),
+        ({"seeds": 0}, "seeds must be an integer of at least 1"),
+    ],
+)
+def test_search_refuses(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Search(**wrong)
+
+
+def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
+    """A signal's capacity is its outflow with a standing queue (Webster: s·g/C).
+
+    Measured in two ways that share nothing: bisection for a queue that does not grow, and trips
+    an hour when far more come than leave.
+    """
+    signal = FixedTime(greens=(8.0,) * 4)
+
+    def find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+        return [
+            outcome_of(Recipe(e.scenario, signal, e.seed, label="signal")).row for e in experiments
+        ]
+
+    (capacity,) = searched(of_dim(), Search(step=20.0, steps=32, seeds=3), find)
+    flood = outcome_of(Recipe(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)).row
+    served = (flood["trips"] - flood["unfinished"]) / 4.0
+    # The first 80 s pass before a vehicle has left; growth of 2 % still counts as served.
+    expected = 1.02 * served / (1.0 - 80.0 / 3600.0)
+    assert capacity.interval.mean == pytest.approx(expected, rel=0.05)
+
+
+def test_growth_is_a_share_of_arrivals() -> None:
+    assert not grows({"queue_growth": 10.0, "trips": 1000})
+    assert grows({"queue_growth": 10.1, "trips": 1000})

@@ -1,0 +1,152 @@
+"""The table of controllers, and the ways to name one."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import EntryPoint
+from typing import Any
+
+import pytest
+
+from baselines import FixedTime, V2ICAsRun
+from dim import AsRunDim, Dim, HarmonyMatrix, Monitor, NoisyPerception, Zones
+from minisim.control import Controller
+from minisim.errors import InputError
+from minisim.parameters import parameters
+from scenarios import controllers
+from scenarios.controllers import CONTROLLERS, RIVALS, SAFE, VARIANTS, controller_named, plugins
+
+
+@pytest.mark.parametrize("name", [*CONTROLLERS, *VARIANTS])
+def test_names_are_spellings(name: str) -> None:
+    assert controller_named(name, "fair").name == name
+
+
+def test_the_paper_s_four_come_first_among_the_rivals() -> None:
+    assert RIVALS == (
+        "dim", "dim:gate=harmonious", "fixed-time", "adaptive", "v2ic", "all-way-stop",
+        "reservation", "longest-queue",
+    )  # fmt: skip
+    assert set(RIVALS) < set(SAFE) < set(VARIANTS)
+    assert not any("as-run" in name or name == "unregulated" for name in SAFE)
+
+
+def test_every_parameter_of_ours_is_declared() -> None:
+    for entry in CONTROLLERS.values():
+        assert all(it.parameter.meaning for it in parameters(entry.make))
+        assert entry.make.__doc__
+
+
+@pytest.mark.parametrize(
+    ("spec", "wanted"),
+    [
+        ("dim:gate=harmonious", Dim(gate="harmonious")),
+        ("dim: gate = harmonious , order = lanes", Dim(order="lanes", gate="harmonious")),
+        ("dim:monitor=on", Dim(monitor=Monitor())),
+        ("dim:monitor=ON(patience=3)", Dim(monitor=Monitor(patience=3))),
+        ("dim:monitor=off,matrix=None", Dim()),
+        ("dim:priorities=(1,0,2,3)", Dim(priorities=(1, 0, 2, 3))),
+        ("dim:matrix=paper(4)", Dim(matrix=HarmonyMatrix.paper(4))),
+        ("dim:zones=zones(green=3)", Dim(zones=Zones(green=3))),
+        ("fixed-time:equal_greens=TRUE", FixedTime(equal_greens=True)),
+        ("fixed-time:equal_greens=on,greens=[5,6.5,7,8]",
+         FixedTime(equal_greens=True, greens=(5, 6.5, 7, 8))),
+        ("dim-as-run:names='acbd'", AsRunDim(names="acbd")),
+        ("baselines:FixedTime(amber=3)", FixedTime(amber=3)),
+        ("baselines.signals.fixed_time:FixedTime(5)", FixedTime(5)),
+        ({"name": "dim", "gate": "harmonious"}, Dim(gate="harmonious")),
+        ({"name": "dim", "monitor": "on", "period": "none"}, Dim(monitor=Monitor())),
+        ({"name": "dim:gate=harmonious", "order": "lanes"}, Dim(order="lanes", gate="harmonious")),
+        ({"name": "dim", "perception": {"name": "noisy", "intent_error": 0.15}},
+         Dim(perception=NoisyPerception(0.15))),
+        ({"name": "dim", "perception": "noisy(delay=0.1)"},
+         Dim(perception=NoisyPerception(delay=0.1))),
+        ({"name": "dim", "perception": NoisyPerception(0.1)},
+         Dim(perception=NoisyPerception(0.1))),
+        (Dim(order="lanes"), Dim(order="lanes")),
+    ],
+)  # fmt: skip
+def test_texts_tables_and_recipes_say_the_same(spec: Any, wanted: Controller) -> None:
+    assert controller_named(spec) == wanted
+
+
+def test_the_profile_as_run_means_the_published_rules() -> None:
+    assert controller_named("dim", "as_run") == AsRunDim()
+    assert controller_named({"name": "v2ic"}, "as_run") == V2ICAsRun()
+    assert controller_named("dim:gate=harmonious", "as_run") == Dim(gate="harmonious")
+    assert controller_named("dim", "as_run_signals") == Dim()
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("dum", "unknown controller 'dum'; allowed: dim, .*; did you mean 'dim'"),
+        ("dum:gate=clear", "unknown controller 'dum'.*; did you mean 'dim'"),
+        ("dim:gat=clear", "unknown dim parameter 'gat'.*; did you mean 'gate'"),
+        ("dim:gate=harmonius", "dim: unknown gate 'harmonius'.*; did you mean 'harmonious'"),
+        ("dim:gate=harmonious(k=1)", r"unknown gate harmonious\(k=1\)"),
+        ("dim:period=-1", r"dim: period \[s\] must be above 0, got -1"),
+        ("dim:period=1e999", r"period \[s\] must be above 0 and finite, got inf"),
+        ("dim:monitor=on(patience=100)", r"monitor=on: patience \[s\] must be .* at most 60"),
+        ("dim:monitor=onn", "unknown monitor 'onn'; allowed: on; did you mean 'on'"),
+        ("dim:monitor=3", "monitor must be a Monitor, got 3"),
+        ("dim:perception=noisy(knd=1)", "unknown perception=noisy parameter 'knd'.*mean 'kind'"),
+        ("dim:gate=clear,gate=clear", "dim is given gate twice"),
+        ("dim:gate", "written dim:key=value,key=value, got 'dim:gate'"),
+        ("dim:", "written dim:key=value"),
+        ("dim:gate=", "cannot read 'gate=', the parameters of dim"),
+        ("dim:a=b)(c", "cannot read"),
+        ("dim:gate=1+1", r"cannot read '1 \+ 1' among the parameters of dim"),
+        ("dim:gate=b'x'", "cannot read"),
+        ("dim:**x", "cannot read 'x'"),
+        ("dim:matrix=HarmonyMatrix#12345678", "a value that only Python can give"),
+        ("unregulated:k=1", "unregulated has no parameters, got k"),
+        ({"gate": "clear"}, "needs a name"),
+        ({"name": 3}, "needs a name"),
+        ({"name": "dim", "gate": 3}, "unknown gate 3"),
+        (Dim, "is no controller: it is a class"),
+        (5, "5 is no controller: it has no name and no start"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(spec: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        controller_named(spec)
+    assert "\n" not in str(error.value)
+
+
+class Distribution:
+    name = "minisim-extra"
+
+
+def plugin(monkeypatch: pytest.MonkeyPatch, *points: tuple[str, str]) -> None:
+    """Pretend that a package registers these (name, value)."""
+    registered = [EntryPoint(name, value, "minisim.controllers") for name, value in points]
+    for point in registered:
+        vars(point)["dist"] = Distribution()
+    monkeypatch.setattr(controllers, "entry_points", lambda group: registered)
+    plugins.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def _no_plugins_left() -> Any:
+    yield
+    plugins.cache_clear()
+
+
+def test_installed_packages_add_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    plugin(monkeypatch, ("webster", "baselines:FixedTime"), ("dim", "baselines:FixedTime"))
+    assert controller_named("webster:amber=3") == FixedTime(amber=3)
+    assert controller_named("dim") == Dim(), "ours are not hidden"
+
+
+@pytest.mark.parametrize("value", ["no_such_module:Thing", "baselines:Thing"])
+def test_a_broken_package_is_named_when_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    plugin(monkeypatch, ("extra", value))
+    assert controller_named("dim") == Dim()
+    with pytest.raises(InputError, match="controller extra of package minisim-extra cannot be"):
+        controller_named("extra")
+    with pytest.raises(InputError, match="did you mean 'extra'"):
+        controller_named("extras")
+    assert "no_such_module" not in sys.modules
