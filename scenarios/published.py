@@ -54,7 +54,7 @@ def _way(row: dict[str, str], arms: int, turnarounds: str) -> Way:
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
     return Way(
-        points, float(row["length_m"]), float(row["wait_m"]),
+        points, float(row["length_m"]), float(row["wait_m"]), speed=float(row["speed_mps"]),
         major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
         turns_back=ARM_NAMES[(origin + manoeuvre) % arms] in turnarounds,
@@ -82,4 +82,4 @@ def published_arrivals(split: str, density: int, arms: int, controller: str = "d
     if split != RENAMED:
         return arrivals
     lane = np.array([ARM_NAMES.index(letter) for letter in RENAMED_ARMS]).argsort()[arrivals.lane]
-    return Arrivals(arrivals.time, lane, arrivals.manoeuvre)
+    return Arrivals(arrivals.time, lane, arrivals.manoeuvre, arrivals.speed_factor)

@@ -68,8 +68,7 @@ AS_RUN = Profile(
 #: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
 #: is not given), accel 50, decel 1000, length 4, minGap 2; drivers' speed factors N(1, 0.1), which
 #: SUMO gives whoever has none (0.80 … 1.24 in the published trips); inserted at rest on roads of
-#: 14 m/s. The runs stepped 0.01 s. 0.1 s gives the same within 1 % of the waiting and 0.15 s of the
-#: travel time (fixed-time signal, 150 … 350 veh/h, common seeds).
+#: 14 m/s, with steps of 0.01 s.
 AS_RUN_SIGNALS = Profile(
     name="as_run_signals",
     vehicle=VehicleType(
@@ -83,6 +82,7 @@ AS_RUN_SIGNALS = Profile(
     ),
     speed_limit=14.0,
     depart_speed=0.0,
+    dt=0.01,
 )
 
 #: The profiles of published runs: they go with the junctions of the authors' networks.

@@ -58,6 +58,7 @@ class Way(NamedTuple):
         length: what a vehicle drives on it [m]; simulators round.
         wait: from the entry to the waiting position inside the junction that SUMO gives to some
             far turns [m]; 0 where there is none.
+        speed: limit on it [m/s]; 0 where it follows from the radius, as on an arc.
         major: whether the road that it comes from has priority.
         yields: movements to which it must give way, such as "b2".
         foes: movements that it crosses or joins, as SUMO has them.
@@ -67,6 +68,7 @@ class Way(NamedTuple):
     points: tuple[tuple[float, float], ...]
     length: float
     wait: float = 0.0
+    speed: float = 0.0
     major: bool = False
     yields: tuple[str, ...] = ()
     foes: tuple[str, ...] = ()
@@ -312,7 +314,12 @@ class Intersection:
         return _branch(self, vehicle.width)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
-        """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²]."""
+        """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²].
+
+        A given way may have a limit of its own instead.
+        """
+        if self.ways is not None and (speed := self.ways[self.index(movement)].speed):
+            return speed
         return math.sqrt(lateral * self.path(movement).radius)
 
     @property
