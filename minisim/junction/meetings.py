@@ -240,6 +240,6 @@ def sagittas(intersection: Intersection, length: float) -> Floats:
         turn = math.atan2(ix * oy - iy * ox, ix * ox + iy * oy)
         far = turn < -1e-4 if intersection.side == "left" else turn > 1e-4
         if far:
-            radius = (path.exit - path.entry) / abs(turn)
+            radius = float(_Curve.of(path, intersection).distances[-1]) / abs(turn)
             result[p] = radius - math.sqrt(max(radius * radius - chord * chord / 4.0, 0.0))
     return result
