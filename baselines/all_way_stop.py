@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable
 
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
-from minisim.junction.clearing import clearing_distances
+from minisim.junction.conflicts import clearing_distances
 from minisim.parameters import declared, real, spelled
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
@@ -64,8 +64,10 @@ class AllWayStopSession:
         self._reaction = reaction
         self._dt = site.dt
         self._vehicle = site.vehicle
-        self._manoeuvres = site.intersection.n - 1
-        self._clearing = clearing_distances(site).tolist()  # quicker to look up than an array
+        self._rows = site.intersection.movements.rows
+        self._clearing = clearing_distances(
+            site.intersection, site.vehicle
+        ).tolist()  # quicker to look up than an array
         self._standing: dict[int, float] = {}  # vehicle: since [s]
         self._gone: set[int] = set()
 
@@ -134,4 +136,4 @@ class AllWayStopSession:
         return (math.sqrt(speed * speed + 2.0 * a * distance) - speed) / a
 
     def _index(self, vehicle: Observed) -> int:
-        return vehicle.lane * self._manoeuvres + vehicle.manoeuvre - 1
+        return self._rows[vehicle.lane][vehicle.manoeuvre]

@@ -3,7 +3,7 @@
 Source: Dresner, Stone, JAIR 31 (2008), 591–656. A vehicle asks the manager of the junction for a
 passage. The manager predicts how it would drive, and grants the passage if the space that it needs
 is free at the time. Theirs is a grid of tiles. Ours are the conflict zones of the movements
-(`minisim.junction.zones`): only pairs matter, and for a pair their stretches are exact.
+(`minisim.junction.conflicts`): only pairs matter, and for a pair their stretches are exact.
 
 The protocol
 - The first vehicle of a lane asks, and so does one behind a holder, from `reach` before the
@@ -46,7 +46,8 @@ from minisim.control import (
     stopping_distance,
 )
 from minisim.errors import InputError, instance
-from minisim.junction.zones import conflict_zones
+from minisim.junction.conflicts import conflict_zones
+from minisim.junction.partings import branch
 from minisim.parameters import declared, real, spelled
 from minisim.vehicle import CruiseVehicle
 
@@ -150,11 +151,11 @@ class Manager:
         self._ways = courses(site)
         self._zones: list[dict[int, tuple[float, float]]] = [
             {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
-            for row in conflict_zones(site).tolist()
+            for row in conflict_zones(site.intersection, site.vehicle).tolist()
         ]
         entry = site.intersection.approach_length
-        self._branch = site.intersection.branch(site.vehicle) - entry
-        self._manoeuvres = site.intersection.n - 1
+        self._branch = branch(site.intersection, site.vehicle) - entry
+        self._rows = site.intersection.movements.rows
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int, ahead: Slot | None) -> Slot | None:
@@ -162,7 +163,7 @@ class Manager:
 
         It also drives behind the last other holder to enter the same exit lane.
         """
-        p = seen.lane * self._manoeuvres + seen.manoeuvre - 1
+        p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         lane = NO_LEADER
         if ahead is not None and ahead.ends >= now:

@@ -97,7 +97,7 @@ class ServingList:
         paths = site.intersection.paths
         self.order: list[int] = []
         self.granted: set[int] = set()
-        self._manoeuvres = site.intersection.n - 1
+        self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
         self._acceleration = site.vehicle.acceleration
         self._crossing = [path.exit - path.entry + site.vehicle.length for path in paths]
@@ -121,7 +121,7 @@ class ServingList:
         latest = [0.0] * len(self._foes)  # leaving time of the last of each movement so far [s]
         for vehicle in self.order:
             me = seen[vehicle]
-            p = me.lane * self._manoeuvres + me.manoeuvre - 1
+            p = self._rows[me.lane][me.manoeuvre]
             blocked = max([latest[q] for q in self._foes[p]], default=0.0)
             distance = me.distance + self._crossing[p]
             if vehicle in self.granted:

@@ -179,6 +179,7 @@ class V2ICAsRunSession:
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
         instance("site", site, Site)
         junction = site.intersection
+        self._rows = junction.movements.rows
         if junction.n != 4:
             raise InputError(f"the as-run V2I-C is for 4 arms, the intersection has {junction.n}")
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
@@ -222,5 +223,5 @@ class V2ICAsRunSession:
             driven = self._origin - distance + ROUNDING
             if FIRST <= driven < LEFT:
                 order = (math.floor(demand_time + ROUNDING), lane, vehicle)
-                platoons[vehicle] = Platoon(lane * 3 + manoeuvre - 1, driven, speed, order)
+                platoons[vehicle] = Platoon(self._rows[lane][manoeuvre], driven, speed, order)
         return platoons

@@ -45,7 +45,7 @@ from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, instance
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from minisim.parameters import checked, declared, part, real, spelled, word
 
 #: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky

@@ -18,7 +18,7 @@ import networkx as nx
 
 from dim.harmony import HarmonyMatrix
 from minisim.errors import InputError, choice, instance, integer, items, show
-from minisim.junction.geometry import ARM_NAMES, Movement
+from minisim.junction.movements import ARM_NAMES, Movement
 
 #: "size": the largest clique, among equals the one of the higher-priority lanes (the paper's
 #: words). "lanes": the higher-priority lanes among all maximal cliques (its published runs).

@@ -12,7 +12,7 @@ import io
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import NoReturn
@@ -20,9 +20,10 @@ from typing import NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from minisim.control import CLEARANCE
 from minisim.errors import FileError, InputError, instance, integer, show
-from minisim.junction.geometry import ARM_NAMES, Bools, Intersection, Movement
+from minisim.junction.conflicts import CLEARANCE, conflicts
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.vehicle import VehicleType
 
 #: Arm counts for which the authors published a matrix.
@@ -51,7 +52,7 @@ class HarmonyMatrix:
     def __post_init__(self) -> None:
         n = integer("number of arms", self.n, low=3, high=len(ARM_NAMES))
         object.__setattr__(self, "n", n)
-        values = _checked(self.values, n, self.labels)
+        values = _checked(self.values, movements_of(n))
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
 
@@ -73,7 +74,7 @@ class HarmonyMatrix:
         vehicle = VehicleType() if vehicle is None else vehicle
         instance("vehicle", vehicle, VehicleType)
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        return cls(intersection.n, ~intersection.conflicts(vehicle, clearance))
+        return cls(intersection.n, ~conflicts(intersection, vehicle, clearance))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
@@ -101,8 +102,8 @@ class HarmonyMatrix:
         """The matrix as `from_csv` reads it."""
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(["", *self.labels])
-        for label, row in zip(self.labels, self.values.astype(int).tolist(), strict=True):
+        writer.writerow(["", *self.movements.names])
+        for label, row in zip(self.movements.names, self.values.astype(int).tolist(), strict=True):
             writer.writerow([label, *row])
         return buffer.getvalue()
 
@@ -119,32 +120,14 @@ class HarmonyMatrix:
         finally:
             _remove(part)
 
-    @cached_property
-    def movements(self) -> tuple[Movement, ...]:
+    @property
+    def movements(self) -> Movements:
         """All n(n−1) movements, in the order of rows and columns."""
-        return tuple(Movement(i, j) for i in range(self.n) for j in range(1, self.n))
-
-    @cached_property
-    def labels(self) -> tuple[str, ...]:
-        """Their names: a1, a2, …"""
-        return tuple(str(m) for m in self.movements)
-
-    @cached_property
-    def _index(self) -> dict[Movement | str, int]:
-        index: dict[Movement | str, int] = {m: k for k, m in enumerate(self.movements)}
-        index.update((label, k) for k, label in enumerate(self.labels))
-        return index
+        return movements_of(self.n)
 
     def index(self, movement: Movement | str) -> int:
         """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError`."""
-        try:
-            return self._index[movement]
-        except (KeyError, TypeError):
-            text = show(movement)
-            raise InputError(
-                f"no movement {text} in an intersection of {self.n} arms: a lane a … "
-                f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.n - 1}, such as a1"
-            ) from None
+        return self.movements.number(movement)
 
     def harmony(self, first: Movement | str, second: Movement | str) -> bool:
         """Whether both can be driven at once; raises `InputError` for an unknown movement."""
@@ -199,22 +182,16 @@ def _paper(n: int) -> HarmonyMatrix:
     return _parse(data, name)
 
 
-def _same_lane(n: int) -> Bools:
-    """Whether two movements start in the same lane, shape (m, m)."""
-    lane = np.repeat(np.arange(n), n - 1)
-    return np.asarray(lane[:, None] == lane[None, :])
-
-
-def _checked(values: npt.ArrayLike, n: int, labels: tuple[str, ...]) -> Bools:
+def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
     """A bool copy of `values`, after every check that a harmony matrix must pass."""
-    size = len(labels)
+    size, labels = len(movements), movements.names
     try:
         array = np.asarray(values)
     except ValueError:
         raise InputError("a harmony matrix is square: its rows differ in length") from None
     if array.shape != (size, size):
         raise InputError(
-            f"a harmony matrix of {n} arms is {size} × {size}, "
+            f"a harmony matrix of {movements.n} arms is {size} × {size}, "
             f"got {' × '.join(map(str, array.shape)) or show(values)}"
         )
     if array.dtype.kind not in "biuf":
@@ -227,7 +204,7 @@ def _checked(values: npt.ArrayLike, n: int, labels: tuple[str, ...]) -> Bools:
         _refuse(
             labels, row, column, f"is {here} but the other way round {there}: it must be symmetric"
         )
-    for row, column in _where(result & _same_lane(n)):
+    for row, column in _where(result & ~movements.apart):
         _refuse(labels, row, column, "is 1, but they share a lane: it must be 0")
     return result
 
@@ -244,7 +221,7 @@ def _parse(data: bytes, where: str) -> HarmonyMatrix:
     rows = _table(data, where)
     line, header = rows[0]
     n = _arms(len(header) - 1, f"{where}, line {line}")
-    labels = [f"{ARM_NAMES[i]}{j}" for i in range(n) for j in range(1, n)]
+    labels = movements_of(n).names
     for k, (got, wanted) in enumerate(zip(header[1:], labels, strict=True), start=2):
         if got != wanted:
             raise InputError(f"{where}, line {line}: column {k} is {got!r}, expected {wanted!r}")
@@ -286,14 +263,14 @@ def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
 
 def _arms(columns: int, where: str) -> int:
     for n in range(3, len(ARM_NAMES) + 1):
-        if n * (n - 1) == columns:
+        if len(movements_of(n)) == columns:
             return n
     raise InputError(
         f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"
     )
 
 
-def _row(cells: list[str], label: str, labels: list[str], where: str) -> list[int]:
+def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> list[int]:
     if cells[0] != label:
         raise InputError(
             f"{where}: the row is labelled {cells[0]!r}, but the columns' order asks for {label!r}"

@@ -8,9 +8,9 @@ longer stop:
   that. Two kinds of vehicles may do whatever their position on the fan of their lane's paths still
   allows: one beside every path that it could be on by that reading, and one that was read
   differently at different times.
-- *Where it matters* is the conflict area of the two paths (`minisim.junction.occupancy`). The ego
-  has to be able to stop before that area, however far the other goes, unless it is out of it in
-  good time.
+- *Where it matters* is the forbidden region of the two paths (`minisim.junction.coordination`). The
+  ego has to be able to stop before it, however far the other goes, unless it is out of it in good
+  time.
 - *When it brakes*: as soon as this takes at least comfortable braking, and as hard as it takes.
   Where it is too late to stop, the monitor compares whether going on or braking makes the two
   touch.
@@ -39,7 +39,8 @@ import numpy as np
 from dim.harmony import HarmonyMatrix
 from dim.perception import UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
-from minisim.junction.occupancy import Area, area, passes, showing
+from minisim.junction.coordination import Region, passes, region
+from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
 #: Smallest time between one vehicle leaving a conflict area and another entering it that counts as
@@ -116,9 +117,9 @@ class Watch:
         self._since: dict[int, float] = {}
         self._alone: set[int] = set()
         self._margin = monitor.time_margin
-        self._site, self._n = site, site.intersection.n
+        self._site, self._rows = site, site.intersection.movements.rows
         self._conflict = ~matrix.values
-        self._shows = showing(site, monitor.tolerance)
+        self._shows = showing(site.intersection, monitor.tolerance)
         self._times = np.arange(0.0, monitor.look_ahead, site.dt)
         vehicle = site.vehicle
         self._a, self._b = vehicle.acceleration, vehicle.deceleration
@@ -205,7 +206,7 @@ class Watch:
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
         """How hard the ego must brake for another, whatever that one does [m/s²]; or 0."""
-        mine = ego.lane * (self._n - 1) + ego.manoeuvre - 1
+        mine = self._rows[ego.lane][ego.manoeuvre]
         asked = 0.0
         for theirs in self._possible(other, readings):
             if self._conflict[mine, theirs]:
@@ -214,18 +215,18 @@ class Watch:
 
     def _possible(self, other: Observed, readings: set[int]) -> list[int]:
         """The movements that another may take, by index."""
-        first = other.lane * (self._n - 1)
-        shown = self._shows[first + other.manoeuvre - 1]
-        allowed = [k for k in range(first, first + self._n - 1) if -other.distance < shown[k]]
+        row = self._rows[other.lane]
+        shown = self._shows[row[other.manoeuvre]]
+        allowed = [k for k in row[1:] if -other.distance < shown[k]]
         if len(readings) == 1 and UNKNOWN not in readings:
             (reading,) = readings
-            if first + reading - 1 in allowed:
-                return [first + reading - 1]
+            if row[reading] in allowed:
+                return [row[reading]]
         return allowed
 
     def _asked_by(self, ego: Observed, mine: int, other: Observed, theirs: int) -> float:
-        shared = area(self._site, mine, theirs)
-        mirrored = area(self._site, theirs, mine)
+        shared = region(self._site.intersection, self._site.vehicle, mine, theirs)
+        mirrored = region(self._site.intersection, self._site.vehicle, theirs, mine)
         if shared is None or mirrored is None:
             return 0.0
         x, y = -ego.distance, -other.distance
@@ -245,11 +246,14 @@ class Watch:
 
     def _open(self, mine: int, x: float, other: Observed) -> bool:
         """Whether the ego's way is free as long as the other stands where its body is."""
-        body = other.lane * (self._n - 1) + other.manoeuvre - 1  # a path that it is on
-        return passes(self._site, mine, x, body, -other.distance)
+        body = self._rows[other.lane][other.manoeuvre]  # a path that it is on
+        site = self._site
+        return passes(site.intersection, site.vehicle, mine, x, body, -other.distance)
 
-    def _passes_first(self, ego: Observed, other: Observed, shared: Area, mirrored: Area) -> bool:
-        """Whether the ego, as fast as now, is out of the area in good time before the other."""
+    def _passes_first(
+        self, ego: Observed, other: Observed, shared: Region, mirrored: Region
+    ) -> bool:
+        """Whether the ego, as fast as now, is out of the region in good time before the other."""
         if ego.speed < STANDING:
             return False
         leaves = (shared.ends(-other.distance) + ego.distance) / ego.speed
@@ -258,7 +262,7 @@ class Watch:
         comes = (math.sqrt(v * v + 2.0 * a * ahead) - v) / a
         return leaves + self._margin < comes
 
-    def _braking_for(self, ego: Observed, other: Observed, room: float, shared: Area) -> float:
+    def _braking_for(self, ego: Observed, other: Observed, room: float, shared: Region) -> float:
         v, a, dt = ego.speed, self._a, self._site.dt
         after = v + a * dt
         left = room - (v + after) / 2.0 * dt
@@ -272,7 +276,7 @@ class Watch:
             return 0.0
         return self._b_max
 
-    def _touches(self, ego: Observed, acceleration: float, other: Observed, shared: Area) -> bool:
+    def _touches(self, ego: Observed, acceleration: float, other: Observed, shared: Region) -> bool:
         """Whether the two come too near while the other goes on as it does."""
         t = self._times
         stops = ego.speed / -acceleration if acceleration < 0.0 else math.inf

@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
+from minisim.junction.movements import movements_of
 from minisim.parameters import declared, part, real, whole, word
 
 #: When a vehicle before the junction is committed. "stoppable": it can no longer stop before the
@@ -110,9 +111,9 @@ class Reader:
     def read(self, view: View) -> Percept:
         """Participants and crossing vehicles of a view, ordered by lane and front to back."""
         n, start = self.n, self.zones.yellow_start + ROUNDING
+        bits = movements_of(n).bits
         participants, crossing = [], []
         case = occupied = unknown = 0
-        any_manoeuvre = (1 << n - 1) - 1
         lane_served = -1
         for vehicle in view.vehicles:
             if vehicle.distance > start:
@@ -123,8 +124,7 @@ class Reader:
                 lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
-                bits = any_manoeuvre if manoeuvre == UNKNOWN else 1 << manoeuvre - 1
-                occupied |= bits << lane * (n - 1)
+                occupied |= bits[lane][manoeuvre]
             elif front:
                 participants.append(vehicle.id)
                 case += manoeuvre * n**lane

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from figures import plots, style
-from minisim.junction.geometry import ARM_NAMES, Floats
+from minisim.junction.movements import ARM_NAMES
+from minisim.junction.paths import Floats
 from minisim.results.trajectories import LANE, MANOEUVRE, TIME, VEHICLE, S
 from scenarios.crossval import Result
 from scenarios.crossval.comparison import times

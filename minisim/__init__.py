@@ -20,7 +20,8 @@ from minisim.version import __version__
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
     from minisim.errors import MinisimError
-    from minisim.junction.geometry import Intersection, Movement
+    from minisim.junction.geometry import Intersection
+    from minisim.junction.movements import Movement
     from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
     from minisim.vehicle import VehicleType
@@ -30,7 +31,7 @@ _HOME = {
     "Demand": "minisim.arrivals",
     "Intersection": "minisim.junction.geometry",
     "MinisimError": "minisim.errors",
-    "Movement": "minisim.junction.geometry",
+    "Movement": "minisim.junction.movements",
     "Run": "minisim.results.run",
     "Simulation": "minisim.simulation",
     "VehicleType": "minisim.vehicle",

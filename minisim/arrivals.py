@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, number, numbers, show
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
 

@@ -20,16 +20,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-
 from minisim.errors import InputError, instance, number
-from minisim.junction.geometry import Bools, Intersection, Movement
+from minisim.junction.conflicts import conflicts, entry_room
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Bools, Movement
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
 from minisim.vehicle import VehicleType
-
-#: Room kept between two corridors that may be driven at once [m]: the static buffer of 0.25 m
-#: around each body in Dresner & Stone, JAIR 31 (2008), §3.
-CLEARANCE = 0.5
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
 #: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
@@ -60,7 +56,7 @@ class Site:
             raise InputError(
                 f"demand must be {self.intersection.n} numbers ≥ 0 [veh/h], got {self.demand}"
             )
-        if self.intersection.room(self.vehicle) <= 0.0:
+        if entry_room(self.intersection, self.vehicle) <= 0.0:
             raise InputError(
                 f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
                 f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
@@ -73,10 +69,7 @@ class Site:
 
         Movements of one arm share their lane: they follow each other and are no conflict here.
         """
-        movements = self.intersection.movements
-        origin = np.array([m.origin for m in movements])
-        apart = origin[:, None] != origin[None, :]
-        return np.asarray(self.intersection.conflicts(self.vehicle, CLEARANCE) & apart)
+        return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
 
 
 class Observed(NamedTuple):

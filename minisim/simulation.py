@@ -195,7 +195,7 @@ class Simulation:
             columns=collect_trips(
                 self._vehicles,
                 self._demand_time,
-                self.site.intersection.n,
+                self.site.intersection.movements,
                 self.site.dt,
                 horizon if self._done else self.time,
             ),

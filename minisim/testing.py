@@ -38,7 +38,8 @@ from minisim.errors import (
     integer,
     number,
 )
-from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import declared, part, real, reals, text, word
 from minisim.results.run import Run
 from minisim.simulation import simulate

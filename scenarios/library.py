@@ -14,7 +14,8 @@ from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, numbers, show
-from minisim.junction.geometry import Intersection, Way
+from minisim.junction.geometry import Intersection
+from minisim.junction.paths import Way
 from scenarios.published import PUBLISHED_ARMS, published_ways
 from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_named
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
-from minisim.junction.geometry import ARM_NAMES, Way
+from minisim.junction.movements import ARM_NAMES
+from minisim.junction.paths import Way
 
 #: From 10 August 2023 on, when the runs at 4:1:4:1 were made, the authors' networks call the arms,
 #: clockwise from north, by these letters (`my_network.net.xml` of that time: b+ comes from the

@@ -22,7 +22,8 @@ from typing import Literal
 from minisim.arrivals import Demand
 from minisim.control import Controller
 from minisim.errors import MissingExtraError
-from minisim.junction.geometry import MIN_ANGLE, Intersection, Movement
+from minisim.junction.geometry import MIN_ANGLE, Intersection
+from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
 from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario

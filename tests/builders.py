@@ -28,7 +28,7 @@ from minisim.control import (
     View,
     Wake,
 )
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario

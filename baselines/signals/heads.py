@@ -135,10 +135,13 @@ class Heads:
 
     def __init__(self, site: Site) -> None:
         n = site.intersection.n
-        conflicts = site.conflicts.reshape(n, n - 1, n, n - 1)
+        movements = site.intersection.movements
+        ways = [list(movements.of_lane(lane)) for lane in range(n)]
+        self._rows = movements.rows
         # Nested lists: a plain lookup is much faster than one in a small array.
-        self._crossed = np.any(conflicts, axis=1).tolist()  # lane, then lane and manoeuvre − 1
-        self._exclusive = np.any(conflicts, axis=(1, 3)).tolist()  # lane, then lane
+        crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
+        self._crossed = crossed.tolist()  # lane, then movement
+        self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
         self._deceleration = site.vehicle.deceleration
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * n
@@ -175,7 +178,7 @@ class Heads:
             return False
         return not any(
             (v.distance < 0.0 or v.id in self._let_go)
-            and self._crossed[lane][v.lane][v.manoeuvre - 1]
+            and self._crossed[lane][self._rows[v.lane][v.manoeuvre]]
             for v in view.vehicles
         )
 

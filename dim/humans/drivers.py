@@ -12,20 +12,19 @@ between vehicles that need not stop.
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from minisim.control import CLEARANCE, Observed, Site
+from minisim.control import Observed, Site
 from minisim.errors import InputError, integer, number, numbers
-from minisim.junction.geometry import Bools, Intersection
+from minisim.junction.conflicts import CLEARANCE
+from minisim.junction.movements import Bools
+from minisim.junction.partings import parting
+from minisim.junction.turns import Turn, turns
 from minisim.parameters import Check, checked, declared, real, word
 from minisim.streams import stream
-
-#: Less than this off straight ahead is no turn, and needs no indicator [°].
-STRAIGHT = 30.0
 
 #: What others believe of a human's way. "motion": only what its place and heading show. "signals":
 #: also an indicator that blinks. "silence": also that a vehicle without one goes straight on, which
@@ -34,26 +33,6 @@ TRUSTS = ("motion", "signals", "silence")
 
 #: Bounds of a uniform draw whose normal quantile is taken.
 TAIL = 1e-9
-
-
-class Turn(IntEnum):
-    """Kind of a manoeuvre, alike on both sides of the road: near is left in left-hand traffic."""
-
-    NEAR = 0
-    THROUGH = 1
-    FAR = 2
-
-
-def turns(intersection: Intersection) -> tuple[Turn, ...]:
-    """The kind of every movement, in the order of `Intersection.movements`."""
-    near = 1.0 if intersection.side == "left" else -1.0
-    kinds = []
-    for path in intersection.paths:
-        (ax, ay), (bx, by) = path.heading_in.tolist(), path.heading_out.tolist()
-        left = math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
-        straight = abs(left) < STRAIGHT
-        kinds.append(Turn.THROUGH if straight else Turn.NEAR if left * near > 0 else Turn.FAR)
-    return tuple(kinds)
 
 
 def _several(count: int, each: str, high: float) -> Check:
@@ -173,21 +152,21 @@ class Readings:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self._drivers = drivers
-        self.manoeuvres = site.intersection.n - 1
-        self._parting = parting(site.intersection, CLEARANCE)
+        self._rows = site.intersection.movements.rows
+        self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:
         """Of its true movement."""
-        return vehicle.lane * self.manoeuvres + vehicle.manoeuvre - 1
+        return self._rows[vehicle.lane][vehicle.manoeuvre]
 
     def possible(self, vehicle: Observed, trust: str) -> list[int]:
         """Movements, by index, that a vehicle may take for all that others see.
 
         Vehicles that follow DIM announce every turn, so that none means straight on.
         """
-        first, movement = vehicle.lane * self.manoeuvres, self.index(vehicle)
+        movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
-        alike = [q for q in range(first, first + self.manoeuvres) if inside <= parts[q]]
+        alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
         driver = self._drivers[vehicle.id]
         turn = self.turns[movement]
         if driver.human:
@@ -197,23 +176,3 @@ class Readings:
             turn = shown
         meant = [q for q in alike if self.turns[q] is turn]
         return meant or alike  # motion belies silence, or the lane has no way straight on
-
-
-def parting(intersection: Intersection, apart: float) -> list[list[float]]:
-    """How far past the entry two movements of a lane are first `apart` [m], by movement index.
-
-    Infinite for a movement and itself, and where they never are so far apart; minus infinity for
-    movements of different lanes.
-    """
-    paths = intersection.paths
-    result = np.full((len(paths), len(paths)), -math.inf)
-    for p, path in enumerate(paths):
-        driven = np.arange(0.0, path.exit - path.entry + 10.0, 0.1)
-        places = path.position(path.entry + driven)
-        for q, other in enumerate(paths):
-            if path.movement.origin == other.movement.origin:
-                gaps = np.linalg.norm(places - other.position(other.entry + driven), axis=-1)
-                far = np.flatnonzero(gaps > apart)
-                result[p, q] = driven[far[0]] if len(far) else math.inf
-    rows: list[list[float]] = result.tolist()
-    return rows

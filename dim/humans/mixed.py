@@ -32,8 +32,8 @@ from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
 from dim.perception import ROUNDING, UNKNOWN, Perception, See
 from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.errors import choice, instance, number
-from minisim.junction.clearing import clearing_distances
-from minisim.junction.geometry import Bools
+from minisim.junction.conflicts import clearing_distances
+from minisim.junction.movements import Bools, Movements
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
 STANDING = 0.1
@@ -148,7 +148,7 @@ class _Cautious:
 def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
     """What a view, and what a vehicle has seen of it, are taken for."""
     drivers = Drivers(mixed.humans, mixed.share, site.seed)
-    readings, per_lane = Readings(mixed.humans, site, drivers), site.intersection.n - 1
+    readings, movements = Readings(mixed.humans, site, drivers), site.intersection.movements
     start = mixed.dim.zones.yellow_start + ROUNDING
     latest: list[View] = []  # what was seen last, and what it was taken for
 
@@ -159,7 +159,7 @@ def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
                 for v in view.vehicles
                 if v.distance <= start and drivers[v.id].human
             }
-            taken = tuple(_taken(seen, ways, drivers, start, per_lane))
+            taken = tuple(_taken(seen, ways, drivers, start, movements))
             latest[:] = [seen, View(seen.time, taken)]
         return latest[1]
 
@@ -167,7 +167,11 @@ def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
 
 
 def _taken(
-    view: View, ways: Mapping[int, list[int]], drivers: Drivers, start: float, per_lane: int
+    view: View,
+    ways: Mapping[int, list[int]],
+    drivers: Drivers,
+    start: float,
+    movements: Movements,
 ) -> Iterable[Observed]:
     """The vehicles of a view as DIM takes them.
 
@@ -181,7 +185,7 @@ def _taken(
             lane = vehicle.lane
         if vehicle.distance <= start and drivers[vehicle.id].human:
             possible = ways.get(vehicle.id, ())
-            manoeuvre = possible[0] % per_lane + 1 if len(possible) == 1 else UNKNOWN
+            manoeuvre = movements[possible[0]].manoeuvre if len(possible) == 1 else UNKNOWN
             vehicle = vehicle._replace(manoeuvre=manoeuvre)
             if first:
                 vehicle = vehicle._replace(distance=0.0, speed=1.0)
@@ -199,7 +203,7 @@ class _Humans:
         humans, zones = mixed.humans, mixed.dim.zones
         self._humans, self._drivers = humans, drivers
         self._readings = Readings(humans, site, drivers)
-        self._clearing = clearing_distances(site).tolist()
+        self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
         self._line = zones.hold_distance + LINE
         self._yellow = zones.yellow_start + ROUNDING
         self._dt = site.dt

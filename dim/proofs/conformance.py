@@ -125,7 +125,7 @@ class CheckedSession:
         if phase != COMMITTED:
             self._take(view, Event("commit", lane, manoeuvre))
         self._take(view, Event("enter", lane, manoeuvre))
-        return 1 << lane * (self.protocol.matrix.n - 1) + manoeuvre - 1
+        return self.protocol.matrix.movements.bits[lane][manoeuvre]
 
     def _take(self, view: View, event: Event) -> None:
         for possible, after in self.protocol.successors(self.state):

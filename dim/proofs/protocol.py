@@ -21,7 +21,7 @@ from dim.agent import GATES
 from dim.decision import ORDERS, DecisionTable, decision_table
 from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from minisim.parameters import declared, part, word
 
 #: Which lane comes first where cliques tie. "fixed": the lanes' own order. "rotating": the lane
@@ -159,16 +159,17 @@ class Protocol:
         and the gate "harmonious" keeps out those that conflict with a crossing one. Of those that
         are left only the best clique goes.
         """
-        n = self.matrix.n
+        n, movements = self.matrix.n, self.matrix.movements
+        rows, bits = movements.rows, movements.bits
         occupied = state.inside
         for lane, front in enumerate(state.fronts):
             if front is not None and front.phase == COMMITTED:
-                occupied |= self._bit(lane, front.manoeuvre)
+                occupied |= bits[lane][front.manoeuvre]
         frozen = bool(occupied) and self.gate == "clear"
         case = 0
         for lane, front in enumerate(state.fronts):
             if front is not None and front.phase != COMMITTED:
-                foes = self._foes[lane * (n - 1) + front.manoeuvre - 1]
+                foes = self._foes[rows[lane][front.manoeuvre]]
                 case += 0 if foes & occupied else front.manoeuvre * n**lane
         chosen = 0 if frozen else self._table(state).lanes(case)
         fronts = tuple(
@@ -198,15 +199,12 @@ class Protocol:
     def _enter(self, state: State, lane: int, manoeuvre: int) -> State:
         after = self._put(state, lane, None)
         return after._replace(
-            inside=state.inside | self._bit(lane, manoeuvre),
+            inside=state.inside | self.matrix.movements.bits[lane][manoeuvre],
             came=tuple(other for other in state.came if other != lane),
         )
 
     def _put(self, state: State, lane: int, front: Front | None) -> State:
         return state._replace(fronts=(*state.fronts[:lane], front, *state.fronts[lane + 1 :]))
-
-    def _bit(self, lane: int, manoeuvre: int) -> int:
-        return 1 << lane * (self.matrix.n - 1) + manoeuvre - 1
 
     @cached_property
     def _foes(self) -> tuple[int, ...]:

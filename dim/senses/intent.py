@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 from minisim.control import Site
+from minisim.junction.turns import Turn, lane_turns, straightest
 from minisim.streams import Draws
 
 #: How a shown intent is misread. "missed": a turn's signal is not seen, so the turn is taken for
@@ -21,9 +22,6 @@ KINDS = ("missed", "symmetric")
 #: Probabilities of an error that are worth comparing, from none to that of a missing turn signal.
 #: Published classifiers of manoeuvres err with about 0.15, see `dim.senses.noise.CLASSIFIER`.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
-
-#: Two ways whose bearings are this close to each other are equally straight [degrees].
-SAME_ANGLE = 1e-6
 
 #: What a draw is for.
 _SIGNAL, _READ, _SURE, _MISTAKEN = range(4)
@@ -55,13 +53,10 @@ class Lane:
         cls, site: Site, lane: int, error: float, kind: str, unsignalled: tuple[float, float]
     ) -> Lane:
         """The lane of a site; `unsignalled` is the share of turns to the near and the far side."""
-        straight = straight_manoeuvre(site.intersection.bearings, lane)
+        straight = straightest(site.intersection, lane)
         near, far = unsignalled
-        left, right = (near, far) if site.intersection.side == "left" else (far, near)
-        silent = tuple(
-            0.0 if m == straight else left if m < straight else right
-            for m in range(1, site.intersection.n)
-        )
+        share = {Turn.NEAR: near, Turn.THROUGH: 0.0, Turn.FAR: far}
+        silent = tuple(share[turn] for turn in lane_turns(site.intersection, lane))
         table = confusion(straight, silent, error, kind)
         return cls(straight, silent, error, kind, doubts(table))
 
@@ -89,20 +84,6 @@ class Lane:
             return self.straight
         others = [m for m in range(1, len(self.silent) + 1) if m != shown]
         return others[int(chance / self.error * len(others))]
-
-
-def straight_manoeuvre(bearings: tuple[float, ...], lane: int) -> int:
-    """The manoeuvre that leaves straightest, and so without a signal.
-
-    Where two are equally straight, as on three arms 120° apart, it is the one on the left.
-    """
-    n = len(bearings)
-
-    def turn(manoeuvre: int) -> float:
-        there = bearings[(lane + manoeuvre) % n]
-        return abs((there - bearings[lane]) % 360.0 - 180.0)
-
-    return min(range(1, n), key=lambda m: (round(turn(m) / SAME_ANGLE), m))
 
 
 def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str) -> Table:

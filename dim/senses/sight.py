@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from minisim.control import Observed, Site
-from minisim.junction.geometry import Path
+from minisim.junction.paths import locate
 
 Point = tuple[float, float]
 
@@ -32,17 +32,21 @@ class Bodies:
     """
 
     def __init__(self, site: Site) -> None:
-        self._ways = [_Way(path) for path in site.intersection.paths]
-        self._manoeuvres = site.intersection.n - 1
+        self._rows = site.intersection.movements.rows
+        self._ways = [
+            (path.points.tolist(), (*path.heading_in.tolist(), *path.heading_out.tolist()),
+             path.crossing)
+            for path in site.intersection.paths
+        ]  # fmt: skip
         self._length = site.vehicle.length
         self.half_length = site.vehicle.length / 2.0
         self.half_width = site.vehicle.width / 2.0
 
     def body(self, vehicle: Observed) -> Body:
         """A vehicle's body: the chord of its way between its bumpers (as `Path.pose`)."""
-        way = self._ways[vehicle.lane * self._manoeuvres + vehicle.manoeuvre - 1]
-        x, y = way.point(-vehicle.distance)
-        rear_x, rear_y = way.point(-vehicle.distance - self._length)
+        way = self._ways[self._rows[vehicle.lane][vehicle.manoeuvre]]
+        x, y = locate(*way, -vehicle.distance)
+        rear_x, rear_y = locate(*way, -vehicle.distance - self._length)
         norm = math.hypot(x - rear_x, y - rear_y)
         ux, uy = (x - rear_x) / norm, (y - rear_y) / norm
         return Body(x - ux * self.half_length, y - uy * self.half_length, ux, uy)
@@ -85,26 +89,3 @@ class Bodies:
             enter, leave = sorted(((-half - at) / step, (half - at) / step))
             first, last = max(first, enter), min(last, leave)
         return first <= last
-
-
-class _Way:
-    """A path in plain floats, by distance past the junction entry."""
-
-    def __init__(self, path: Path) -> None:
-        self._points: list[Point] = [(x, y) for x, y in path.points.tolist()]
-        self._length = path.exit - path.entry
-        self._step = self._length / (len(self._points) - 1)
-        self._in: Point = tuple(path.heading_in.tolist())
-        self._out: Point = tuple(path.heading_out.tolist())
-
-    def point(self, past: float) -> Point:
-        if past <= 0.0:
-            (x, y), (ux, uy) = self._points[0], self._in
-            return x + past * ux, y + past * uy
-        if past >= self._length:
-            (x, y), (ux, uy) = self._points[-1], self._out
-            return x + (past - self._length) * ux, y + (past - self._length) * uy
-        k = min(int(past / self._step), len(self._points) - 2)
-        w = past / self._step - k
-        (x, y), (next_x, next_y) = self._points[k : k + 2]
-        return x + w * (next_x - x), y + w * (next_y - y)

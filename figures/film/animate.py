@@ -25,7 +25,8 @@ from figures.film.frames import Frames
 from figures.junction import drawing
 from minisim.errors import number
 from minisim.files import replacing
-from minisim.junction.geometry import Floats, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.paths import Floats
 from minisim.results.run import Run
 
 #: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.

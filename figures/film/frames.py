@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,7 +9,8 @@ from dim import Mixed
 from figures.junction import drawing
 from minisim.engine.kernel import WAITING_SPEED
 from minisim.errors import InputError
-from minisim.junction.geometry import Floats, Intersection, Movement
+from minisim.junction.paths import Floats
+from minisim.junction.turns import indicator
 from minisim.results.run import Run
 from minisim.results.trajectories import movement_index
 
@@ -41,9 +40,9 @@ class Frames:
         self.angle, self.s = frame["angle_deg"].to_numpy(), frame["s_m"].to_numpy()
         self.speed = frame["speed_mps"].to_numpy()
         self.path = movement_index(frame, site)
-        self.lane = self.path // (self.n - 1)
+        self.lane = site.intersection.movements.origins[self.path]
         paths = site.intersection.paths
-        self.turn = np.array([_turn(site.intersection, p.movement) for p in paths])
+        self.turn = np.array([indicator(path) for path in paths])
         self.exit = np.array([p.exit for p in paths])
         self.entry = paths[0].entry
         clear = self.exit[self.path] + site.vehicle.length
@@ -151,11 +150,3 @@ def _human(run: Run) -> npt.NDArray[np.bool_]:
     if isinstance(run.controller, Mixed):
         return run.controller.human(run.seed, count)
     return np.zeros(count, dtype=bool)
-
-
-def _turn(intersection: Intersection, movement: Movement) -> int:
-    """Which indicator a movement sets: −1 left, 1 right, 0 none (less than 30° off straight)."""
-    path = intersection.path(movement)
-    (ax, ay), (bx, by) = path.heading_in, path.heading_out
-    turn = math.degrees(math.atan2(ay * bx - ax * by, ax * bx + ay * by))
-    return 0 if abs(turn) < 30.0 else int(math.copysign(1, turn))

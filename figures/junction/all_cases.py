@@ -15,7 +15,9 @@ from dim import explain
 from dim.decision import Movements
 from dim.proofs.verification import Analysis
 from figures import style
-from minisim.junction.geometry import ARM_NAMES, Floats, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
+from minisim.junction.paths import Floats
 
 #: One colour for each clique that ties; with more cliques they come again, dashed.
 CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)

@@ -13,7 +13,9 @@ from dim import Explanation
 from figures import style
 from figures.junction import drawing
 from minisim.control import Plan, Site
-from minisim.junction.geometry import ARM_NAMES, Floats, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
+from minisim.junction.paths import Floats
 
 #: Metres of approach lane shown before the junction.
 APPROACH = 17.0

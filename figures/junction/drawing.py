@@ -16,7 +16,8 @@ from matplotlib.path import Path as Outline
 
 from figures import style
 from minisim.control import Plan
-from minisim.junction.geometry import Arm, Floats, Intersection, Path
+from minisim.junction.geometry import Arm, Intersection
+from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
 #: Points of the kerb between two arms.

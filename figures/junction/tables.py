@@ -60,5 +60,5 @@ def harmony_table(arms: int) -> Table:
     )
     return Table(
         f"Harmony matrix of the {arms}-way junction: 1 harmony, 0 conflict",
-        ("", *paper.labels), rows, notes=(said,),
+        ("", *paper.movements.names), rows, notes=(said,),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.studies.fairness import LANE_WAIT, PRIORITIES, lane_waits
 from scenarios.studies.shared.archive import Archive, missing_note
 

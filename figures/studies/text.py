@@ -20,7 +20,7 @@ from figures.studies.shared.paper_values import (
 )
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.paper import SERIES, SPLITS
 from scenarios.published import PUBLISHED_ARMS
 from scenarios.studies.shared.archive import Archive, missing_note

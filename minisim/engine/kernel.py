@@ -317,7 +317,7 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen = observed[count]
             seen["id"] = me["id"]
             seen["lane"] = lane
-            seen["manoeuvre"] = me["path"] % (len(lanes) - 1) + 1
+            seen["manoeuvre"] = me["manoeuvre"]
             seen["distance"] = distance
             seen["speed"] = me["v"]
             seen["length"] = law.length

@@ -16,7 +16,8 @@ import numpy.typing as npt
 from minisim.arrivals import Arrivals
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
 from minisim.errors import InputError
-from minisim.junction.geometry import Path
+from minisim.junction.partings import branch
+from minisim.junction.paths import Path
 from minisim.streams import stream
 from minisim.vehicle import MODELS
 
@@ -35,6 +36,7 @@ VEHICLE = np.dtype(
     [
         ("id", np.int64),  # row of the trip table
         ("lane", np.int64),
+        ("manoeuvre", np.int64),
         ("path", np.int64),  # index of the movement
         ("demand_tick", np.int64),
         ("factor", np.float64),  # the driver's factor on the speed limit
@@ -103,7 +105,7 @@ class Road(NamedTuple):
         headings: (p, 4): unit vectors in (x, y) and out (x, y).
         section_start: (p, k) [m], infinite past the last section.
         section_speed: (p, k) limit from there on [m/s].
-        branch: (p, p) [m], see `Intersection.branch`.
+        branch: (p, p) [m], see `minisim.junction.partings.branch`.
         marks: (j,) `s` of the wake-up marks, ascending, the last one infinite [m].
     """
 
@@ -161,7 +163,7 @@ def build_road(site: Site, plan: Plan) -> Road:
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
         section_speed=speed,
-        branch=np.array(intersection.branch(site.vehicle)),
+        branch=np.array(branch(intersection, site.vehicle)),
         marks=np.array([*marks, np.inf]),
     )
 
@@ -248,12 +250,13 @@ def time_of(tick: int, dt: float) -> float:
 
 def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     """All vehicles of an arrival table, sorted by (lane, demand time), none on the road yet."""
-    n = site.intersection.n
+    index_of = site.intersection.movements.index_of
     order = np.lexsort((arrivals.time, arrivals.lane))
     vehicles = np.zeros(len(order), VEHICLE)
     vehicles["id"] = order
     vehicles["lane"] = arrivals.lane[order]
-    vehicles["path"] = arrivals.lane[order] * (n - 1) + arrivals.manoeuvre[order] - 1
+    vehicles["manoeuvre"] = arrivals.manoeuvre[order]
+    vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
     factors = arrivals.speed_factor
     vehicles["factor"] = (_speed_factors(site, len(order)) if factors is None else factors)[order]

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 
 from minisim.engine.state import DRIVING, Floats, Law, Records, Road
-from minisim.jit import njit
+from minisim.jit import njit, njit_inline
+from minisim.junction.paths import locate
 
 #: Bodies this close may touch within rounding [m]; the exact check follows in pymunk.
 TOUCH_MARGIN = 0.02
+
+#: Where the front of a vehicle is, compiled.
+place = njit_inline(locate)
 
 
 @njit
@@ -32,8 +36,9 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
             if count == len(bodies):
                 return True
             inside |= s >= law.entry
-            x, y = locate(shape, headings, p, s, law.entry, ends[p, 0])
-            x_rear, y_rear = locate(shape, headings, p, s - law.length, law.entry, ends[p, 0])
+            past, crossing = s - law.entry, ends[p, 0] - law.entry
+            x, y = place(shape[p], headings[p], crossing, past)
+            x_rear, y_rear = place(shape[p], headings[p], crossing, past - law.length)
             along = math.hypot(x - x_rear, y - y_rear)
             ux, uy = (x - x_rear) / along, (y - y_rear) / along
             bodies[count, 0] = x - ux * law.length / 2.0
@@ -77,24 +82,3 @@ def rectangles_meet(
     if abs(dx * ux + dy * uy) > along or abs(dy * ux - dx * uy) > across:
         return False
     return abs(dx * wx + dy * wy) <= along and abs(dy * wx - dx * wy) <= across
-
-
-@njit
-def locate(
-    shape: Floats, headings: Floats, p: int, s: float, entry: float, leave: float
-) -> tuple[float, float]:
-    """x, y at `s` on path p; `minisim.junction.geometry.Path.position` for one point."""
-    last = shape.shape[1] - 1
-    if s <= entry:
-        d = s - entry
-        return shape[p, 0, 0] + d * headings[p, 0], shape[p, 0, 1] + d * headings[p, 1]
-    if s >= leave:
-        d = s - leave
-        return shape[p, last, 0] + d * headings[p, 2], shape[p, last, 1] + d * headings[p, 3]
-    t = (s - entry) / (leave - entry) * last
-    k = int(t)
-    w = t - k
-    return (
-        shape[p, k, 0] + w * (shape[p, k + 1, 0] - shape[p, k, 0]),
-        shape[p, k, 1] + w * (shape[p, k + 1, 1] - shape[p, k, 1]),
-    )

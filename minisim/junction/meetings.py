@@ -18,9 +18,10 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from minisim.junction.geometry import Intersection, Path
+from minisim.junction.geometry import Intersection
+from minisim.junction.paths import Floats, Path, distances_along
+from minisim.junction.turns import Turn, turns
 
-Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 #: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
@@ -28,6 +29,9 @@ DIVERGED = 2.5
 
 #: Ways that cross at a smaller angle count as crossing at one of this sine.
 LEAST_SINE = 0.2
+
+#: Ways that bend by less than this are straight [°].
+BENT = math.degrees(1e-4)
 
 
 class Meeting(IntEnum):
@@ -140,17 +144,15 @@ class _Curve(NamedTuple):
     @classmethod
     def of(cls, path: Path, intersection: Intersection) -> _Curve:
         """The given curve where there is one, else the arc."""
-        length = path.exit - path.entry
         if intersection.ways is None:
-            return cls(path.points, length)
+            return cls(path.points, path.crossing)
         way = intersection.ways[intersection.index(path.movement)]
-        return cls(np.asarray(way.points, dtype=float), length, way.wait)
+        return cls(np.asarray(way.points, dtype=float), path.crossing, way.wait)
 
     @property
     def distances(self) -> Floats:
         """Of the points along the polyline [m]."""
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return distances_along(self.points)
 
     @property
     def line(self) -> shapely.LineString:
@@ -235,11 +237,9 @@ def sagittas(intersection: Intersection, length: float) -> Floats:
     """
     chord = length + 2.0
     result = np.zeros(len(intersection.paths))
-    for p, path in enumerate(intersection.paths):
-        (ix, iy), (ox, oy) = path.heading_in.tolist(), path.heading_out.tolist()
-        turn = math.atan2(ix * oy - iy * ox, ix * ox + iy * oy)
-        far = turn < -1e-4 if intersection.side == "left" else turn > 1e-4
-        if far:
-            radius = float(_Curve.of(path, intersection).distances[-1]) / abs(turn)
+    for p, turn in enumerate(turns(intersection, BENT)):
+        if turn is Turn.FAR:
+            path = intersection.paths[p]
+            radius = float(_Curve.of(path, intersection).distances[-1]) / abs(path.turn)
             result[p] = radius - math.sqrt(max(radius * radius - chord * chord / 4.0, 0.0))
     return result

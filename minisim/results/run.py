@@ -224,12 +224,14 @@ class Run:
             s = trace["s"][chosen]
             front[chosen] = paths[p].position(s)
             heading[chosen] = paths[p].pose(s, self.site.vehicle.length)[1]
-        manoeuvres = self.site.intersection.n - 1
+        movements = self.site.intersection.movements
         columns = (
             np.round(trace["tick"] * self.site.dt, 6),
             vehicle,
-            pd.Categorical.from_codes(path_of // manoeuvres, pd.Index([arm.name for arm in arms])),
-            path_of % manoeuvres + 1,
+            pd.Categorical.from_codes(
+                movements.origins[path_of], pd.Index([arm.name for arm in arms])
+            ),
+            movements.manoeuvres[path_of],
             trace["s"],
             front[:, 0],
             front[:, 1],

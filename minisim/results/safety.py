@@ -15,16 +15,17 @@ site. They look at bodies on their paths:
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
 from minisim.control import Site
 from minisim.errors import instance
-from minisim.junction.geometry import Bools, Floats, Intersection, Path
+from minisim.junction.conflicts import Areas, conflict_areas
+from minisim.junction.movements import Bools
+from minisim.junction.partings import branch
+from minisim.junction.paths import Floats
 from minisim.results.metrics import PETS
 from minisim.results.trajectories import (
     ACCELERATION,
@@ -36,16 +37,12 @@ from minisim.results.trajectories import (
     check_trajectories,
     movement_index,
 )
-from minisim.vehicle import VehicleType
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Ints = npt.NDArray[np.int64]
 
-#: Step along a path at which bodies are tested against a corridor [m], and how many of these
-#: steps the first, coarse search takes at once.
-AREA_STEP, COARSE = 0.1, 5
 #: Longer than any path [m]: keeps the vehicles apart in one ascending array.
 _FAR = 1e6
 
@@ -60,17 +57,6 @@ class Rows(NamedTuple):
     s: Floats
     v: Floats
     goes: Bools
-
-
-class Areas(NamedTuple):
-    """Conflict areas of every two movements, shape (m, m) each [m], NaN where there is none.
-
-    While its front bumper is at `s` in (enter[p, q], leave[p, q]), a body on path p reaches into
-    what bodies on path q sweep inside the junction.
-    """
-
-    enter: Floats
-    leave: Floats
 
 
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
@@ -141,58 +127,6 @@ def crossings(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     return _frame(_crossings(_rows(frame, site), site))
 
 
-def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
-    """Where on its path a vehicle is in the way of another movement."""
-    return _conflict_areas(intersection, vehicle.length, vehicle.width)
-
-
-@lru_cache(maxsize=64)
-def _conflict_areas(intersection: Intersection, length: float, width: float) -> Areas:
-    vehicle = VehicleType(length=length, width=width)
-    paths = intersection.paths
-    overlap = intersection.separation(vehicle) <= 0.0
-    swept = [_inside(path, vehicle) for path in paths]
-    shapely.prepare(swept)
-    enter, leave = (np.full(overlap.shape, np.nan) for _ in range(2))
-    for p, path in enumerate(paths):
-        s = np.arange(path.entry, path.exit + length, AREA_STEP)
-        bodies = np.asarray(shapely.polygons(path.bodies(s, vehicle)))
-        for q in np.flatnonzero(overlap[p]).tolist():
-            if paths[q].movement.origin == path.movement.origin:
-                continue
-            touched = _touched(swept[q], bodies)
-            if touched is not None:
-                enter[p, q], leave[p, q] = s[touched[0]], s[touched[1]]
-    both = np.isfinite(enter) & np.isfinite(enter.T)
-    for array in (enter, leave):
-        array[~both] = np.nan
-        array.setflags(write=False)
-    return Areas(enter, leave)
-
-
-def _touched(area: shapely.Geometry, bodies: npt.NDArray[Any]) -> tuple[int, int] | None:
-    """Indices of the first and last body, in order along a path, that reach into the area."""
-    coarse = np.flatnonzero(shapely.intersects(area, bodies[::COARSE])) * COARSE
-    if not len(coarse):
-        return None
-    first, last = int(coarse[0]), int(coarse[-1])
-    near = np.r_[max(first - COARSE, 0) : first + 1, last : min(last + COARSE, len(bodies))]
-    hits = near[shapely.intersects(area, bodies[near])]
-    return int(hits[0]), int(hits[-1])
-
-
-def _inside(path: Path, vehicle: VehicleType) -> shapely.Geometry:
-    """The corridor up to the exit line; on the exit lane, vehicles follow each other."""
-    heading = path.heading_out
-    across = np.array([-heading[1], heading[0]])
-    start, far = path.points[-1], 1000.0
-    beyond = shapely.polygons(
-        [start + far * (i * across + k * heading) for i, k in ((1, 0), (1, 1), (-1, 1), (-1, 0))]
-    )
-    inside: shapely.Geometry = shapely.difference(path.corridor(vehicle), beyond)
-    return inside
-
-
 def _rows(frame: pd.DataFrame, site: Site) -> Rows:
     instance("site", site, Site)
     check_trajectories(frame)
@@ -235,18 +169,17 @@ def _following(rows: Rows, site: Site) -> dict[str, npt.NDArray[Any]]:
 
 def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Row pairs of follower and the nearest one ahead in its lane that is in its way; gaps [m]."""
-    n = site.intersection.n
-    branch = site.intersection.branch(site.vehicle)
-    lane = rows.movement // (n - 1)
+    parts = branch(site.intersection, site.vehicle)
+    lane = site.intersection.movements.origins[rows.movement]
     order = np.lexsort((-rows.s, lane, rows.step))
-    group = (rows.step * n + lane)[order]
+    group = (rows.step * site.intersection.n + lane)[order]
     rear = rows.s - site.vehicle.length
     followers, leaders = [], []
     pending, back = np.arange(len(order)), 1
     while len(pending := pending[pending >= back]):
         pending = pending[group[pending - back] == group[pending]]
         follower, leader = order[pending], order[pending - back]
-        in_way = rear[leader] < branch[rows.movement[leader], rows.movement[follower]]
+        in_way = rear[leader] < parts[rows.movement[leader], rows.movement[follower]]
         followers.append(follower[in_way])
         leaders.append(leader[in_way])
         pending, back = pending[~in_way], back + 1
@@ -261,8 +194,8 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     left, for two bodies side by side are no followers yet.
     """
     paths = site.intersection.paths
-    origin = np.array([path.movement.origin for path in paths])[rows.movement]
-    exit_arm = np.array([path.exit_arm for path in paths])[rows.movement]
+    movements = site.intersection.movements
+    origin, exit_arm = movements.origins[rows.movement], movements.exits[rows.movement]
     ends = np.array([(path.entry, path.exit) for path in paths])[rows.movement]
     inside = np.flatnonzero(rows.s >= ends[:, 0])
     past = rows.s - ends[:, 1]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from minisim.errors import InputError, choice, items
-from minisim.junction.geometry import ARM_NAMES, Movement
+from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.results.metrics import MEANS, METRICS, PHASES, SPREAD, USUAL, Metric, asked_metrics
 from minisim.results.trips import Floats, Ints, Trips
 

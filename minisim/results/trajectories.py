@@ -12,7 +12,8 @@ import numpy.typing as npt
 from minisim.control import Site
 from minisim.errors import InputError, instance
 from minisim.files import replacing, write_table
-from minisim.junction.geometry import ARM_NAMES, Floats, Movement
+from minisim.junction.movements import ARM_NAMES, Movement
+from minisim.junction.paths import Floats
 from minisim.results.summary import TRIP_COLUMNS
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
             f"manoeuvre {manoeuvre[outside][0]} does not exist with {n} arms (1 … {n - 1})"
         )
     lane = indices[codes] if len(frame) else np.empty(0, dtype=np.int64)
-    return np.asarray(lane * (n - 1) + manoeuvre - 1, dtype=np.int64)
+    return np.asarray(site.intersection.movements.index_of[lane, manoeuvre])
 
 
 def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:

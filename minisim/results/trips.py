@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.engine.state import ARRIVED, WAITING, Records
+from minisim.junction.movements import Movements
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -56,7 +57,9 @@ class Trips(NamedTuple):
 TRIP_ARRAYS: Final = Trips._fields[:-2]
 
 
-def collect_trips(vehicles: Records, demand_time: Floats, n: int, dt: float, end: float) -> Trips:
+def collect_trips(
+    vehicles: Records, demand_time: Floats, movements: Movements, dt: float, end: float
+) -> Trips:
     """Build the trips of a run that has reached `end` [s] from its vehicle array."""
     order = np.argsort(vehicles["id"], kind="stable")
     rows = vehicles[order]
@@ -64,7 +67,6 @@ def collect_trips(vehicles: Records, demand_time: Floats, n: int, dt: float, end
     arrived = rows["status"] == ARRIVED
     depart = np.where(departed, rows["depart_tick"] * dt, np.nan)
     arrival = np.where(arrived, rows["arrival_tick"] * dt, np.nan)
-    manoeuvre = rows["path"] % (n - 1) + 1
     travel = np.where(arrived, arrival, end) - depart
     return Trips(
         end=end,
@@ -72,8 +74,8 @@ def collect_trips(vehicles: Records, demand_time: Floats, n: int, dt: float, end
         depart=depart,
         arrival=arrival,
         lane=rows["lane"].copy(),
-        manoeuvre=manoeuvre,
-        exit_lane=(rows["lane"] + manoeuvre) % n,
+        manoeuvre=rows["manoeuvre"].copy(),
+        exit_lane=movements.exits[rows["path"]],
         waiting_time=rows["waiting_ticks"] * dt,
         travel_time=np.where(departed, travel, 0.0),
         time_loss=rows["lost_ticks"] * dt,

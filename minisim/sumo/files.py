@@ -12,7 +12,7 @@ from minisim.arrivals import Arrivals
 from minisim.control import Site
 from minisim.engine.state import Records
 from minisim.errors import SumoError
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.trips import Trips
 from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
@@ -135,7 +135,7 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
         arrival=np.where(arrived, arrival, np.nan),
         lane=arrivals.lane.copy(),
         manoeuvre=arrivals.manoeuvre.copy(),
-        exit_lane=(arrivals.lane + arrivals.manoeuvre) % job.lanes,
+        exit_lane=job.movements.exits[job.movements.index_of[arrivals.lane, arrivals.manoeuvre]],
         waiting_time=np.where(departed, waiting, 0.0),
         travel_time=travel,
         time_loss=np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float),

@@ -8,7 +8,7 @@ from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
 from minisim.engine.kernel import Motion
 from minisim.engine.state import Law, Records, Road
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movements
 from minisim.sumo.network import Network
 
 
@@ -45,7 +45,7 @@ class Job(NamedTuple):
     network: Network
     vehicles: Records
     lanes: int
-    movements: tuple[Movement, ...]
+    movements: Movements
     horizon: int
     stop_on_collision: bool
     teleport: bool

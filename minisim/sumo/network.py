@@ -22,7 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from minisim.errors import FileError, SumoError
-from minisim.junction.geometry import ARM_NAMES, Intersection
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.trajectories import lane_names
 
 NODES, EDGES, CONNECTIONS = "minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"

@@ -14,9 +14,11 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
 from minisim.engine import laws
 from minisim.engine.state import STOP_MARGIN, Law, Records
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movements
 from minisim.sumo.messages import Job
 
 #: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
@@ -233,16 +235,7 @@ def near(v: float, distance: float, law: Law) -> bool:
     return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
 
 
-def _crossing(path: int, movements: tuple[Movement, ...]) -> frozenset[int]:
+def _crossing(path: int, movements: Movements) -> frozenset[int]:
     """The paths that share neither lane nor exit with this one."""
-    n = max(m.origin for m in movements) + 1
-
-    def exit_of(movement: Movement) -> int:
-        return (movement.origin + movement.manoeuvre) % n
-
-    mine = movements[path]
-    return frozenset(
-        q
-        for q, other in enumerate(movements)
-        if other.origin != mine.origin and exit_of(other) != exit_of(mine)
-    )
+    crossed = movements.apart[path] & (movements.exits != movements.exits[path])
+    return frozenset(np.flatnonzero(crossed).tolist())

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
-from minisim.control import CLEARANCE
 from minisim.errors import InputError
+from minisim.junction.conflicts import CLEARANCE
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import (
     AsJson,
@@ -46,7 +46,7 @@ def harmony(
         "scenario": what.name,
         "side": side,
         "clearance_m": clearance,
-        "movements": list(matrix.labels),
+        "movements": list(matrix.movements.names),
         "harmony": matrix.values.astype(int).tolist(),
     }
     title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")

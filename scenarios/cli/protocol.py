@@ -9,7 +9,7 @@ import typer
 
 from minisim.errors import InputError
 from minisim.files import check_file
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import (
     AsJson,

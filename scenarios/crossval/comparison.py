@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from minisim.errors import InputError
-from minisim.junction.geometry import ARM_NAMES, Bools, Floats, Movement
+from minisim.junction.movements import ARM_NAMES, Bools, Movement
+from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS, METRICS
 from minisim.results.trajectories import TIME, VEHICLE, S
 from minisim.results.trips import Trips

@@ -8,7 +8,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from minisim.errors import InputError, numbers
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from scenarios.paper import DENSITIES
 from scenarios.studies.shared.points import fair_grid
 from scenarios.studies.shared.study import Study

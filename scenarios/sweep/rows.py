@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from minisim.errors import MinisimError
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.trips import Trips
 from minisim.version import __version__
 from scenarios.recipe import Recipe

@@ -16,7 +16,7 @@ import minisim
 from dim import Dim
 from minisim.control import Controller
 from minisim.errors import InputError
-from minisim.junction.geometry import ARM_NAMES, Movement
+from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
 from scenarios.recipe import Recipe

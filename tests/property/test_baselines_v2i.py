@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import minisim
 from baselines import V2IC, Reservation
-from minisim.control import CLEARANCE, Controller, Site
+from minisim.control import Controller, Site
+from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
 from minisim.junction.geometry import Intersection
-from minisim.junction.zones import conflict_zones
 from minisim.vehicle import VehicleType
 from scenarios.scenario import FAIR, Profile, Scenario
 from scenarios.strategies import demands, floats, intersections, vehicles
@@ -28,7 +28,7 @@ def emptying(draw: st.DrawFn, max_density: float = 700.0) -> Scenario:
     """A random junction with random cars, whose demand ends long before the run does."""
     intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 200.0])))
     vehicle = draw(vehicles())
-    if intersection.room(vehicle) <= 0.0:
+    if entry_room(intersection, vehicle) <= 0.0:
         vehicle = FAIR.vehicle
     demand = draw(demands(intersection.n, max_density))
     return Scenario(
@@ -69,7 +69,7 @@ def test_out_of_their_zones_no_two_bodies_touch(
     intersection: Intersection, vehicle: VehicleType, data: st.DataObject
 ) -> None:
     """Brute force: bodies of two movements in conflict, anywhere while not both are in zones."""
-    if intersection.room(vehicle) <= 0.0:
+    if entry_room(intersection, vehicle) <= 0.0:
         vehicle = FAIR.vehicle
     site = Site(
         intersection=intersection,
@@ -77,7 +77,7 @@ def test_out_of_their_zones_no_two_bodies_touch(
         speed_limit=14.0,
         demand=(0.0,) * intersection.n,
     )
-    zones = conflict_zones(site)
+    zones = conflict_zones(intersection, vehicle)
     conflicts = np.argwhere(site.conflicts)
     assert np.array_equal(np.isfinite(zones[..., 0]), site.conflicts)
     for p, q in data.draw(st.permutations(conflicts.tolist()))[:8]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dim import DecisionTable, HarmonyMatrix, decide, explain
 from dim.decision import ORDERS
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 
 
 @st.composite

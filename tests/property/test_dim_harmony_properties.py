@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dim import HarmonyMatrix
-from minisim.junction.geometry import Intersection, Movement
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios.strategies import intersections, vehicles
 

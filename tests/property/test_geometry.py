@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 
 from minisim.control import Site
 from minisim.errors import InputError
-from minisim.junction.geometry import MIN_PATH_RADIUS, Intersection, Movement
+from minisim.junction.conflicts import conflicts, corridor, entry_room
+from minisim.junction.geometry import MIN_PATH_RADIUS, Intersection
+from minisim.junction.movements import Movement
+from minisim.junction.partings import branch
 from minisim.vehicle import VehicleType
 from scenarios.strategies import bearings, floats, intersections, vehicles
 from tests.builders import share
@@ -49,7 +52,7 @@ def test_corridor_contains_every_body(
     path = data.draw(st.sampled_from(intersection.paths))
     s = data.draw(floats(path.entry, path.exit + vehicle.length))
     body = shapely.polygons(path.bodies(s, vehicle))
-    assert shapely.contains(shapely.buffer(path.corridor(vehicle), 0.008), body)
+    assert shapely.contains(shapely.buffer(corridor(path, vehicle), 0.008), body)
 
 
 @share(0.5)
@@ -63,16 +66,16 @@ def test_nobody_touches_a_vehicle_held_at_another_entry(
     the inner side cuts of the corner, 2/27·L²/r for a tangent arc of radius r (the offset of the
     chord at the tangent point, largest when a third of the body is past it).
     """
-    room = intersection.room(vehicle)
+    room = entry_room(intersection, vehicle)
     fronts = intersection.approach_length - np.array([0.0, 3.0])
     held = [
         shapely.polygons(intersection.path(Movement(arm, 1)).bodies(fronts, vehicle))
         for arm in range(intersection.n)
     ]
     for path in intersection.paths:
-        corridor = path.corridor(vehicle)
+        swept = corridor(path, vehicle)
         for arm in set(range(intersection.n)) - {path.movement.origin}:
-            assert shapely.distance(corridor, held[arm]).min() >= room - 1e-9
+            assert shapely.distance(swept, held[arm]).min() >= room - 1e-9
     tightest = min(path.radius for path in intersection.paths)
     cut = 2.0 / 27.0 * vehicle.length**2 / tightest
     assert room >= intersection.lane_width - vehicle.width - cut - 0.1
@@ -102,7 +105,7 @@ def test_a_vehicle_that_does_not_fit_the_lanes_is_refused(
     vehicle = VehicleType(length=length, width=width)
     if width >= lane_width:
         assert not fits(intersection, vehicle)
-    assert fits(intersection, vehicle) == (intersection.room(vehicle) > 0.0)
+    assert fits(intersection, vehicle) == (entry_room(intersection, vehicle) > 0.0)
 
 
 @share(0.5)
@@ -114,9 +117,9 @@ def test_past_the_branch_nobody_on_the_other_path_is_in_the_way(
     origin = data.draw(st.integers(0, intersection.n - 1))
     turns = st.permutations(range(1, intersection.n))
     first, second = (Movement(origin, j) for j in data.draw(turns)[:2])
-    branch = intersection.branch(vehicle)[intersection.index(first), intersection.index(second)]
+    leaves = branch(intersection, vehicle)[intersection.index(first), intersection.index(second)]
     path, other = intersection.path(first), intersection.path(second)
-    rear = branch + np.linspace(0.0, 15.0, 20)
+    rear = leaves + np.linspace(0.0, 15.0, 20)
     ahead = shapely.polygons(path.bodies(rear + vehicle.length, vehicle))
     behind = shapely.polygons(
         other.bodies(np.linspace(other.entry, other.exit + 30.0, 90), vehicle)
@@ -129,9 +132,9 @@ def test_past_the_branch_nobody_on_the_other_path_is_in_the_way(
 def test_conflicts_grow_with_clearance_and_hold_wherever_paths_merge(
     intersection: Intersection, vehicle: VehicleType, one: float, other: float
 ) -> None:
-    narrow, wide = (intersection.conflicts(vehicle, c) for c in sorted((one, other)))
+    narrow, wide = (conflicts(intersection, vehicle, c) for c in sorted((one, other)))
     assert not (narrow & ~wide).any()
-    exits = np.array([intersection.exit_arm(m) for m in intersection.movements])
+    exits = intersection.movements.exits
     assert narrow[exits[:, None] == exits[None, :]].all()
 
 

@@ -24,8 +24,9 @@ import shapely
 from hypothesis import given, settings
 
 from dim import HarmonyMatrix
-from minisim.control import CLEARANCE
-from minisim.junction.geometry import ARM_NAMES, Intersection, Movement
+from minisim.junction.conflicts import CLEARANCE, separation
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.sumo import host, network
 from minisim.vehicle import VehicleType
 from scenarios.strategies import intersections
@@ -99,11 +100,11 @@ def classes(intersection: Intersection, oracle: Oracle) -> Iterator[tuple[str, s
     """The class of every two movements of different arms, and the pair."""
     vehicle = VehicleType()
     harmony = HarmonyMatrix.from_geometry(intersection, vehicle)
-    separation = intersection.separation(vehicle)
+    apart_by = separation(intersection, vehicle)
     for a, b in itertools.combinations(intersection.movements, 2):
         if a.origin == b.origin:
             continue
-        apart = float(separation[intersection.index(a), intersection.index(b)])
+        apart = float(apart_by[intersection.index(a), intersection.index(b)])
         ours = [shapely.LineString(intersection.path(m).points) for m in (a, b)]
         merge = intersection.exit_arm(a) == intersection.exit_arm(b)
         match harmony[a, b], oracle.are_foes(a, b):

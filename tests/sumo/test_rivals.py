@@ -27,7 +27,8 @@ import pytest
 import minisim
 from baselines import Actuated, Adaptive, AllWayStop, FixedTime, all_way_stop
 from minisim.control import Controller, Site
-from minisim.junction.geometry import ARM_NAMES, Floats
+from minisim.junction.movements import ARM_NAMES
+from minisim.junction.paths import Floats
 from minisim.sumo.host import sumo_home
 from minisim.sumo.network import run_tool, tag, write_xml
 from scenarios import four_way

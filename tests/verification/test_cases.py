@@ -18,7 +18,7 @@ from dim.proofs.verification import (
     preferred,
 )
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios import regular
 
 #: Cases by arms: n^n − 1 (the paper's 255 for 4).

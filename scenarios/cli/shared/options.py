@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from minisim.errors import InputError
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals as ArrivalTable

@@ -11,9 +11,9 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.control import CLEARANCE
 from minisim.files import check_file
-from minisim.junction.geometry import ARM_NAMES
+from minisim.junction.conflicts import CLEARANCE
+from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared.options import build_scenario
 from scenarios.cli.shared.terminal import show, show_json
 

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
 
 import minisim
 from baselines import AllWayStop
-from minisim.control import CLEARANCE, Command, Observed, Plan, Session, Site, View, Wake
+from minisim.control import Command, Observed, Plan, Session, Site, View, Wake
 from minisim.errors import InputError
-from minisim.junction.clearing import clearing_distances
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios.library import four_way
 from tests.builders import drained, replayed, seen, show
 
@@ -138,46 +136,6 @@ def test_a_younger_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
     assert show(session, 9.5, a, b) == []
     assert show(session, 10.0, a, b) == ["Go 1"]
     assert show(session, 10.5, seen(1, 0, 2, -0.5, 1.0), b) == []
-
-
-# When a way is clear.
-
-
-def test_a_vehicle_is_in_the_way_until_its_body_has_left_it() -> None:
-    """Against a search of its own, far finer, with every pair of movements."""
-    clearing = clearing_distances(SITE)
-    paths = SITE.intersection.paths
-    assert np.array_equal(clearing > -np.inf, SITE.conflicts)
-    checked = 0
-    for p, q in np.argwhere(np.isfinite(clearing)).tolist():
-        corridor = paths[p].corridor(SITE.vehicle)
-        last = paths[q].exit - paths[q].entry + SITE.vehicle.length
-        after = np.arange(clearing[p, q], last, 0.02)
-        bodies = shapely.polygons(paths[q].bodies(paths[q].entry + after, SITE.vehicle))
-        assert shapely.distance(corridor, bodies).min() > CLEARANCE - 0.01
-        before = paths[q].bodies(paths[q].entry + clearing[p, q] - 0.3, SITE.vehicle)
-        assert shapely.distance(corridor, shapely.polygons(before)) < CLEARANCE + 0.01
-        checked += 1
-    assert checked > 20
-
-
-def test_who_leaves_by_the_same_arm_is_in_the_way_until_it_is_out() -> None:
-    clearing, intersection = clearing_distances(SITE), SITE.intersection
-    for p, path in enumerate(intersection.paths):
-        for q, other in enumerate(intersection.paths):
-            if path.exit_arm == other.exit_arm and path.movement.origin != other.movement.origin:
-                assert np.isinf(clearing[p, q])
-
-
-def test_straight_ways_are_clear_where_the_drawing_says() -> None:
-    # Left-hand, lanes of 3.2 m, entries 7.2 m from the centre. a2 drives south on x = 1.6, b2
-    # west on y = -1.6: it has left a2's way when its rear is at x = 1.6 - 0.9 - 0.5, so its front
-    # has driven 7.2 - 0.2 + 5.0 = 12.0 m.
-    clearing, index = clearing_distances(SITE), SITE.intersection.index
-    a2, b2, d2 = (index(Movement(lane, 2)) for lane in (0, 1, 3))
-    assert clearing[a2, b2] == pytest.approx(12.0, abs=0.26)
-    # d2 drives east on y = 1.6 and has to get 3.2 m farther.
-    assert clearing[a2, d2] == pytest.approx(15.2, abs=0.26)
 
 
 # On the road.

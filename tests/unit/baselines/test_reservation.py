@@ -14,7 +14,7 @@ from baselines.prediction import Following, Leader, courses, predict
 from baselines.reservation import Manager, ReservationSession
 from minisim.control import Go, Hold, Observed, Unregulated, View, Wake
 from minisim.errors import InputError
-from minisim.junction.zones import conflict_zones
+from minisim.junction.partings import branch
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
 from scenarios.scenario import Profile
@@ -66,7 +66,7 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
     assert leader is not None
     assert np.allclose(leader[0], first["s"][: len(leader[0])] - ENTRY, atol=1e-6)
 
-    until = float(site.intersection.branch(site.vehicle)[1, manoeuvre - 1]) - ENTRY
+    until = float(branch(site.intersection, site.vehicle)[1, manoeuvre - 1]) - ENTRY
     follower = predict(
         motion, lane_ways[manoeuvre - 1], second["s"][0] - ENTRY, second["v"][0],
         lane=Leader(leader[0], leader[1], until),
@@ -80,35 +80,6 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
 def test_who_does_not_get_through_is_not_predicted() -> None:
     motion, way = Following.of(SITE), courses(SITE)[0]
     assert predict(motion, way, -400.0, 14.0, horizon=5.0) is None
-
-
-# --- zones ------------------------------------------------------------------------------------
-
-
-def test_zones_of_two_straight_paths() -> None:
-    """Perpendicular corridors of width w, c apart: body within w/2 + c of the other's centre line.
-
-    a2 drives south 1.6 m east of the centre, b2 west 1.6 m south of it: they cross
-    7.2 + 1.6 = 8.8 m past the entry of a2, 7.2 − 1.6 = 5.6 m past that of b2.
-    """
-    zones = conflict_zones(SITE)
-    half, length = SITE.vehicle.width / 2.0 + 0.5, SITE.vehicle.length
-    for p, q, centre in ((1, 4, 8.8), (4, 1, 5.6)):
-        first, last = zones[p, q]
-        assert centre - half - 1.0 <= first <= centre - half
-        assert centre + half + length <= last <= centre + half + length + 1.0
-
-
-def test_zones_of_merging_paths_end_where_the_rear_has_left() -> None:
-    junction = SITE.intersection
-    b1, a2 = index(1, 1), index(0, 2)  # both leave to the south
-    for p, q in ((b1, a2), (a2, b1)):
-        crossing = junction.paths[p].exit - junction.paths[p].entry
-        assert conflict_zones(SITE)[p, q, 1] == pytest.approx(crossing + SITE.vehicle.length)
-
-
-def test_no_zones_without_conflict() -> None:
-    assert np.array_equal(np.isfinite(conflict_zones(SITE)[..., 0]), SITE.conflicts)
 
 
 # --- the protocol -----------------------------------------------------------------------------

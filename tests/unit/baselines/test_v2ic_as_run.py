@@ -12,7 +12,7 @@ from baselines import V2ICAsRun
 from baselines.v2ic_as_run import AsRunList, Platoon, right_hand_conflicts
 from dim import HarmonyMatrix
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios import AS_RUN, five_way, four_way
 from scenarios.controllers import controller_named
 from scenarios.paper import Cell, controller_of, reference_value, replay

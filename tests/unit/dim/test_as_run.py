@@ -21,7 +21,7 @@ from dim.as_run import (
 from dim.harmony import HarmonyMatrix
 from minisim.control import Advise, Observed, Plan, View, Wake
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios import four_way, regular
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS

@@ -18,7 +18,7 @@ import dim
 from dim import DecisionTable, HarmonyMatrix, decide, explain
 from dim.decision import ORDERS, decision_table, lane_ranks
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 
 Clique = tuple[Movement, ...]
 

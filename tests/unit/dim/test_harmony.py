@@ -12,7 +12,8 @@ import pytest
 
 from dim import HarmonyMatrix
 from minisim.errors import FileError, InputError
-from minisim.junction.geometry import Intersection, Movement
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios import PAPER, five_way, four_way
 from scenarios.library import MAKERS
@@ -45,7 +46,7 @@ def four() -> list[list[int]]:
 def test_geometry_gives_the_papers_matrix_entry_by_entry(n: int, vehicle: VehicleType) -> None:
     ours = HarmonyMatrix.from_geometry(MAKERS[n]().intersection, vehicle)
     theirs = HarmonyMatrix.paper(n)
-    assert ours.labels == theirs.labels
+    assert ours.movements == theirs.movements
     for a in ours.movements:
         for b in ours.movements:
             assert ours[a, b] == theirs[a, b], (str(a), str(b))
@@ -57,7 +58,7 @@ def test_the_paper_matrix_of_four_arms_is_the_printed_table() -> None:
     matrix = HarmonyMatrix.paper(4)
     for line in PAPER_TABLE.strip().splitlines():
         label, *entries = line.split()
-        for other, entry in zip(matrix.labels, entries, strict=True):
+        for other, entry in zip(matrix.movements.names, entries, strict=True):
             assert matrix[label, other] == (entry == "1"), (label, other)
 
 

@@ -16,14 +16,16 @@ from dim.monitor import ROOM, Watch
 from dim.perception import UNKNOWN, See
 from minisim.control import Brake, Go, Observed, Site, View, Wake
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
-from minisim.junction.occupancy import STEP, area, passes, showing
+from minisim.junction.coordination import STEP, passes, region
+from minisim.junction.movements import Movement
+from minisim.junction.partings import showing
 from minisim.results.run import Run
 from scenarios import Scenario, four_way
 from tests.builders import digest, drained, replayed
 
 SCENARIO = four_way(250, profile="fair", arm_length=150.0)
 SITE = SCENARIO.site(0)
+PLACE = SITE.intersection, SITE.vehicle
 MATRIX = HarmonyMatrix.from_geometry(SITE.intersection, SITE.vehicle)
 SIGHT = 8.0
 
@@ -66,7 +68,7 @@ def braking(
 
 def test_a_reading_holds_as_long_as_motion_does_not_contradict_it() -> None:
     """a3 is read as a2, in harmony with c2, until it is 0.3 m beside that path."""
-    shows = showing(SITE, 0.3)[2, 1]
+    shows = showing(SITE.intersection, 0.3)[2, 1]
     for past in (0.0, 1.0, shows - 0.01, shows + 0.01, 4.0):
         true = view(car(1, "a3", past, 6.0), car(2, "c2", past, 6.0))
         told = braking(watch(), true, {2: read_as(true, a=2)})
@@ -111,7 +113,7 @@ def test_whoever_can_stop_before_the_junction_is_nobodys_danger() -> None:
 def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
     """v²/2d before the conflict area, and not at all while less than b will do."""
     a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
-    shared = area(SITE, a2, b2)
+    shared = region(*PLACE, a2, b2)
     assert shared is not None
     room, v, b = shared.room(0.0, 3.0), 5.0, SITE.vehicle.deceleration
     for left in np.arange(1.75, room, STEP).tolist():
@@ -136,7 +138,7 @@ def test_it_brakes_no_harder_than_told() -> None:
 def test_whoever_is_out_in_good_time_goes_on() -> None:
     """Leaving at its speed, the other coming at full acceleration: the margin is between."""
     a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
-    shared, mirrored = area(SITE, a2, b2), area(SITE, b2, a2)
+    shared, mirrored = region(*PLACE, a2, b2), region(*PLACE, b2, a2)
     assert shared is not None
     assert mirrored is not None
     x, v, y, w, a = 14.0, 9.0, -2.2, 4.6, SITE.vehicle.acceleration
@@ -153,7 +155,7 @@ def test_whoever_is_out_in_good_time_goes_on() -> None:
 def test_it_brakes_when_one_more_step_would_take_more_than_comfort(v: float) -> None:
     """That step at full acceleration, then v²/2b, and `ROOM`."""
     a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
-    shared = area(SITE, a2, b2)
+    shared = region(*PLACE, a2, b2)
     assert shared is not None
     a, b, dt = SITE.vehicle.acceleration, SITE.vehicle.deceleration, SITE.dt
     after = v + a * dt
@@ -185,7 +187,7 @@ def test_whoever_still_can_stops_before_the_junction() -> None:
 def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None:
     """Brake as hard as possible, unless only going on touches nobody; all positions."""
     a2, b2 = MATRIX.index("a2"), MATRIX.index("b2")
-    shared, mirrored = area(SITE, a2, b2), area(SITE, b2, a2)
+    shared, mirrored = region(*PLACE, a2, b2), region(*PLACE, b2, a2)
     assert shared is not None
     assert mirrored is not None
     a, most = SITE.vehicle.acceleration, SITE.vehicle.max_deceleration
@@ -209,7 +211,7 @@ def test_too_late_to_stop_it_does_what_does_not_touch(look_ahead: float) -> None
 
 def test_whoever_stands_right_before_the_area_stays_there() -> None:
     """No division by the room that is left: none."""
-    shared = area(SITE, MATRIX.index("a2"), MATRIX.index("b2"))
+    shared = region(*PLACE, MATRIX.index("a2"), MATRIX.index("b2"))
     assert shared is not None
     ego = car(1, "a2", shared.room(0.0, 3.0) - ROOM, 0.0)
     assert shared.room(-ego.distance, 3.0) == ROOM
@@ -255,7 +257,7 @@ def conflicting() -> list[tuple[int, int]]:
 @pytest.mark.parametrize(("p", "q"), conflicting())
 def test_of_two_that_stand_one_goes_on_wherever_they_stand(p: int, q: int) -> None:
     """All positions: one whose way is free goes on, the other no further than it can stop."""
-    shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+    shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
     assert shared is not None
     assert mirrored is not None
     one, other = str(MATRIX.movements[p]), str(MATRIX.movements[q])
@@ -263,7 +265,7 @@ def test_of_two_that_stand_one_goes_on_wherever_they_stand(p: int, q: int) -> No
     for x, y in itertools.product(range(0, rows, 3), range(0, columns, 3)):
         s, t = (x + 0.5) * STEP, (y + 0.5) * STEP
         told = braking(watch(), view(car(1, one, s, 0.0), car(2, other, t, 0.0)))
-        free = {1: passes(SITE, p, s, q, t), 2: passes(SITE, q, t, p, s)}
+        free = {1: passes(*PLACE, p, s, q, t), 2: passes(*PLACE, q, t, p, s)}
         room = {1: shared.room(s, t), 2: mirrored.room(t, s)}
         go = {1, 2} - set(told)
         assert go or not any(free.values()), (s, t)

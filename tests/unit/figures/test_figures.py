@@ -27,6 +27,7 @@ from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from minisim.control import Plan, Unregulated
 from minisim.errors import FileError, InputError
+from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
 from minisim.vehicle import VehicleType
@@ -64,7 +65,7 @@ def test_every_body_stays_on_the_asphalt(intersection: Intersection) -> None:
     vehicle = VehicleType()
     for path in intersection.paths:
         # A long body cuts the tightest corners by a few centimetres.
-        assert asphalt.buffer(0.2).covers(path.corridor(vehicle))
+        assert asphalt.buffer(0.2).covers(corridor(path, vehicle))
 
 
 @pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))

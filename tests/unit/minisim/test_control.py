@@ -21,7 +21,8 @@ from minisim.control import (
     stopping_distance,
 )
 from minisim.errors import InputError
-from minisim.junction.geometry import Intersection, Movement
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 
 FOUR = Intersection((0.0, 90.0, 180.0, 270.0))

@@ -13,7 +13,7 @@ from dim.as_run import winner
 from dim.harmony import HarmonyMatrix
 from minisim.control import Controller
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios.paper import (
     BASELINE_GRID,
     GREENS,

@@ -11,22 +11,16 @@ import numpy as np
 import pytest
 
 from dim import Humans
-from dim.humans.drivers import TRUSTS, Drivers, Readings, Turn, parting, turns
+from dim.humans.drivers import TRUSTS, Drivers, Readings
 from minisim.control import Observed, Site
 from minisim.errors import InputError
+from minisim.junction.turns import Turn
 from minisim.streams import stream
 from scenarios import four_way, three_way
 
 NEAR, THROUGH, FAR = Turn
 SITE = four_way(profile="fair").site()
 MANY = 20_000
-
-
-def test_turns_mirror_with_the_side_of_the_road() -> None:
-    """Clockwise: left, straight, right. In left-hand traffic left is near."""
-    assert turns(SITE.intersection) == (NEAR, THROUGH, FAR) * 4
-    assert turns(four_way(side="right").intersection) == (FAR, THROUGH, NEAR) * 4
-    assert turns(three_way().intersection) == (NEAR, FAR) * 3
 
 
 def test_the_defaults_are_the_manual_s() -> None:
@@ -128,22 +122,6 @@ def test_motion_shows_the_way_in_the_end_and_never_excludes_it_before(
             assert manoeuvre - 1 in ways
         if distance < -8.0:
             assert ways == [manoeuvre - 1]
-
-
-@pytest.mark.parametrize("apart", [0.3, 1.0, 2.0])
-def test_ways_part_where_the_arc_has_left_the_straight_line(apart: float) -> None:
-    """After s an arc of radius r is at r(1 − cos(s/r)), r·sin(s/r): to the tenth of a metre."""
-    parts = parting(SITE.intersection, apart)
-    for turn in (0, 2):
-        r = SITE.intersection.paths[turn].radius
-        s = np.arange(0.0, 10.0, 1e-4)
-        gaps = np.hypot(r * (1.0 - np.cos(s / r)), s - r * np.sin(s / r))
-        first = float(s[np.argmax(gaps > apart)])
-        for found in (parts[turn][1], parts[1][turn]):
-            assert first - 1e-3 <= found <= first + 0.1 + 1e-3
-    assert [parts[way][way] for way in range(12)] == [math.inf] * 12
-    assert parts[0][3:] == parts[4][:3] + parts[4][6:] == [-math.inf] * 9
-    assert parting(SITE.intersection, 1e3)[0][:3] == [math.inf] * 3  # never so far
 
 
 def test_vehicles_of_dim_always_tell() -> None:

@@ -16,7 +16,7 @@ from dim import Dim, Humans, Mixed, NoisyPerception
 from dim.agent import GATES
 from minisim.control import Command, Go, Hold, Observed, Session, View, Wake
 from minisim.errors import InputError
-from minisim.junction.geometry import Movement
+from minisim.junction.movements import Movement
 from scenarios import four_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import outcome_of

@@ -15,13 +15,10 @@ from dim.senses.intent import (
     confusion,
     doubts,
     leftover_error,
-    straight_manoeuvre,
 )
 from dim.senses.noise import UNSIGNALLED
-from minisim.junction.geometry import Intersection
 from minisim.streams import Draws
 from minisim.testing import small_scenario
-from scenarios.strategies import bearings
 
 DRAWS = Draws(1, "perception")
 COUNT = 4000
@@ -36,31 +33,6 @@ def lane(error: float, kind: str, unsignalled: tuple[float, float] = (0.0, 0.0))
 def close(count: int, share: float, of: int = COUNT) -> bool:
     """Whether a binomial count is within `Z` standard deviations."""
     return abs(count - share * of) <= Z * math.sqrt(of * share * (1.0 - share)) + 1e-9
-
-
-@pytest.mark.parametrize(
-    ("angles", "expected"),
-    [
-        ((0, 90, 180, 270), (2, 2, 2, 2)),
-        ((0, 90, 270), (1, 1, 2)),  # a T: both ways from its stem are turns
-        ((0, 120, 240), (1, 1, 1)),  # equally straight: the left one
-        ((0, 72, 144, 216, 288), (2, 2, 2, 2, 2)),
-    ],
-)
-def test_the_manoeuvre_that_needs_no_signal(angles: tuple[float, ...], expected: object) -> None:
-    found = tuple(straight_manoeuvre(angles, k) for k in range(len(angles)))
-    assert found == expected
-
-
-@given(bearings())
-def test_nothing_is_straighter_than_straight(angles: tuple[float, ...]) -> None:
-    junction = Intersection(angles)
-    for arm in range(junction.n):
-        turns = [
-            abs((angles[(arm + m) % junction.n] - angles[arm]) % 360.0 - 180.0)
-            for m in range(1, junction.n)
-        ]
-        assert turns[straight_manoeuvre(angles, arm) - 1] <= min(turns) + 1e-5
 
 
 def test_a_missed_signal_is_a_turn_taken_for_straight_on() -> None:

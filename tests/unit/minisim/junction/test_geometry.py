@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -10,7 +9,9 @@ import pytest
 import shapely
 
 from minisim.errors import InputError
-from minisim.junction.geometry import ARM_NAMES, Intersection, Movement, Path
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES, Movement
+from minisim.junction.paths import Path
 from minisim.vehicle import VehicleType
 
 CAR = VehicleType()
@@ -159,104 +160,6 @@ def test_mirrored_bearings_and_the_other_side_give_the_mirror_image() -> None:
         twin = right.path(Movement(n - 1 - i, n - j))
         assert twin.exit == pytest.approx(path.exit)
         np.testing.assert_allclose(twin.points * [-1.0, 1.0], path.points, atol=1e-9)
-
-
-def test_turning_the_whole_junction_changes_nothing_but_the_view() -> None:
-    turned = Intersection(tuple(b + 20.0 for b in ODD))
-    np.testing.assert_allclose(turned.separation(CAR), Intersection(ODD).separation(CAR), atol=1e-9)
-
-
-# --- corridors ---------------------------------------------------------------------------------
-
-
-def test_corridor_of_a_straight_movement_is_a_rectangle() -> None:
-    path = Intersection(SQUARE).path(Movement(0, 2))
-    corridor = path.corridor(CAR)
-    # From the rear at the entry's front to the front when the rear leaves: 14.4 + 2 · 5 m.
-    assert shapely.area(corridor) == pytest.approx((14.4 + 2 * 5.0) * 1.8)
-    assert shapely.bounds(corridor) == pytest.approx((1.6 - 0.9, -12.2, 1.6 + 0.9, 12.2))
-
-
-def test_opposite_straight_corridors_are_a_lane_minus_a_body_apart() -> None:
-    four = Intersection(SQUARE)
-    separation = four.separation(CAR)
-    a2, c2 = four.index(Movement(0, 2)), four.index(Movement(2, 2))
-    assert separation[a2, c2] == pytest.approx(3.2 - 1.8)
-    assert four.conflicts(CAR, 1.39)[a2, c2] == np.False_
-    assert four.conflicts(CAR, 1.41)[a2, c2] == np.True_
-
-
-def test_separation_is_symmetric_and_zero_within_an_arm(square: Intersection) -> None:
-    separation = square.separation(CAR)
-    np.testing.assert_array_equal(separation, separation.T)
-    for p, q in itertools.product(range(12), repeat=2):
-        if p // 3 == q // 3:
-            assert separation[p, q] == 0.0
-
-
-def test_crossing_movements_conflict(square: Intersection) -> None:
-    conflict = square.conflicts(CAR, 0.5)
-
-    def meet(p: str, q: str) -> bool:
-        return bool(conflict[square.index(square.parse(p)), square.index(square.parse(q))])
-
-    assert meet("a2", "b2")
-    assert meet("a2", "d2")
-    assert not meet("a2", "c2")
-    near, far = ("1", "3") if square.side == "left" else ("3", "1")
-    assert not meet(f"a{near}", f"c{near}")  # opposite turns to the near side
-    assert meet(f"a{far}", "c2")  # across the opposite traffic
-
-
-@pytest.mark.parametrize(("origin", "exit_arm"), list(itertools.permutations(range(4), 2)))
-def test_movements_that_share_an_exit_conflict(
-    square: Intersection, origin: int, exit_arm: int
-) -> None:
-    conflict = square.conflicts(CAR, 0.0)
-    bound_there = [m for m in square.movements if square.exit_arm(m) == exit_arm]
-    mine = Movement(origin, (exit_arm - origin) % 4)
-    assert mine in bound_there
-    assert all(conflict[square.index(mine), square.index(m)] for m in bound_there)
-
-
-def test_room_beside_a_held_vehicle(square: Intersection) -> None:
-    """Straight traffic passes at a lane minus a body; who turns in cuts the corner a little."""
-    assert 1.0 < square.room(CAR) < 3.2 - 1.8
-    bus = VehicleType(length=12.0, width=2.5)
-    assert square.room(bus) == 0.0
-
-
-# --- branches ----------------------------------------------------------------------------------
-
-
-def test_branch_lies_in_the_junction_and_only_between_movements_of_one_arm(
-    square: Intersection,
-) -> None:
-    branch = square.branch(CAR)
-    for p, q in itertools.product(range(12), repeat=2):
-        if p == q:
-            assert branch[p, q] == math.inf
-        elif p // 3 != q // 3:
-            assert branch[p, q] == 0.0
-        else:
-            assert square.paths[p].entry < branch[p, q] < square.paths[p].exit + 1.0
-
-
-def test_branch_from_a_straight_path_is_where_the_arc_is_left_behind() -> None:
-    """The rear bumper must be 1.8 + 0.5 m from the arc of radius 5.6 m: 1 − cos, in closed form.
-
-    Seen from the arc's path q the straight path p leaves the circle: at x past the entry it is
-    √(R² + x²) − R away.
-    """
-    four = Intersection(SQUARE)
-    left, straight = four.index(Movement(0, 1)), four.index(Movement(0, 2))
-    x = math.sqrt((5.6 + 2.3) ** 2 - 5.6**2)
-    assert four.branch(CAR)[straight, left] == pytest.approx(four.approach_length + x, abs=0.3)
-    angle = math.acos(1.0 - 2.3 / 5.6)
-    along_arc = 5.6 * angle
-    assert four.branch(CAR)[left, straight] == pytest.approx(
-        four.approach_length + along_arc, abs=0.3
-    )
 
 
 # --- speeds, names, errors ---------------------------------------------------------------------

@@ -17,9 +17,9 @@ import minisim
 from baselines import FixedTime
 from minisim.control import Unregulated
 from minisim.errors import InputError
+from minisim.junction.conflicts import conflict_areas
+from minisim.junction.partings import branch
 from minisim.results.safety import (
-    AREA_STEP,
-    conflict_areas,
     crossings,
     encroachments,
     following,
@@ -118,11 +118,11 @@ def test_a_leader_that_has_turned_off_is_none() -> None:
     # a1 turns left; a2 goes straight on. Once the rear of a1 is past their branch, a2 is free.
     a1, a2 = SITE.intersection.parse("a1"), SITE.intersection.parse("a2")
     index = SITE.intersection.index
-    branch = SITE.intersection.branch(SITE.vehicle)[index(a1), index(a2)] - ENTRY
+    parts = branch(SITE.intersection, SITE.vehicle)[index(a1), index(a2)] - ENTRY
     follower = at(2, "a2", -3.0, 8.0)
 
-    still = frame_of(at(1, "a1", branch + 5.0 - 0.1, 4.0), follower)
-    gone = frame_of(at(1, "a1", branch + 5.0 + 0.1, 4.0), follower)
+    still = frame_of(at(1, "a1", parts + 5.0 - 0.1, 4.0), follower)
+    gone = frame_of(at(1, "a1", parts + 5.0 + 0.1, 4.0), follower)
     assert len(following(still, SITE)) == 1
     assert len(following(gone, SITE)) == 0
 
@@ -164,40 +164,6 @@ def test_past_the_junction_each_still_follows_only_once() -> None:
 
 
 # Conflict areas and PET.
-
-
-def test_the_conflict_area_of_two_straight_movements() -> None:
-    """a2 drives south at x = 1.6 ± 0.9; b2 drives west at y = −1.6 ± 0.9."""
-    areas = conflict_areas(SITE.intersection, SITE.vehicle)
-    index = SITE.intersection.index
-    a2, b2 = (index(SITE.intersection.parse(m)) for m in ("a2", "b2"))
-
-    # a2's front reaches y = −0.7 after 7.2 + 0.7 m; its rear leaves y = −2.5 after 7.2 + 2.5 + 5.
-    assert areas.enter[a2, b2] - ENTRY == pytest.approx(7.9, abs=AREA_STEP)
-    assert areas.leave[a2, b2] - ENTRY == pytest.approx(14.7, abs=AREA_STEP)
-    # b2's front reaches x = 2.5 after 7.2 − 2.5 m; its rear leaves x = 0.7 after 7.2 − 0.7 + 5.
-    assert areas.enter[b2, a2] - ENTRY == pytest.approx(4.7, abs=AREA_STEP)
-    assert areas.leave[b2, a2] - ENTRY == pytest.approx(11.5, abs=AREA_STEP)
-
-
-def test_conflict_areas_of_merging_movements_end_at_the_exit_line() -> None:
-    areas = conflict_areas(SITE.intersection, SITE.vehicle)
-    index = SITE.intersection.index
-    a1, d2 = (index(SITE.intersection.parse(m)) for m in ("a1", "d2"))
-    for p, q in ((a1, d2), (d2, a1)):
-        clear = SITE.intersection.paths[p].exit + SITE.vehicle.length
-        assert areas.leave[p, q] == pytest.approx(clear, abs=2 * AREA_STEP)
-
-
-def test_movements_that_never_meet_have_no_conflict_area() -> None:
-    areas = conflict_areas(SITE.intersection, SITE.vehicle)
-    conflicts = SITE.conflicts
-    assert np.isnan(areas.enter[~conflicts]).all()
-    assert (np.isnan(areas.enter) == np.isnan(areas.enter.T)).all()
-    assert (np.isnan(areas.enter) == np.isnan(areas.leave)).all()
-    inside = np.isfinite(areas.enter)
-    assert inside.sum() > 20
-    assert (areas.leave[inside] > areas.enter[inside]).all()
 
 
 @pytest.mark.parametrize(("headway", "pet"), [(3.0, 2.0), (1.5, 0.5), (0.8, -0.2)])

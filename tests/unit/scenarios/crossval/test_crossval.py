@@ -23,7 +23,7 @@ from dim import AsRunDim, Dim
 from figures import save
 from figures.crossval import DODGE, crossval_figures
 from minisim.errors import InputError, SumoError
-from minisim.junction.geometry import Floats
+from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
 from minisim.results.run import Run
 from minisim.results.trips import Trips

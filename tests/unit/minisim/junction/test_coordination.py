@@ -1,4 +1,4 @@
-"""Conflict areas against the bodies themselves, and when a turn shows against the arc's formula."""
+"""Forbidden regions against the bodies themselves."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import pytest
 import shapely
 
 from dim import HarmonyMatrix
-from minisim.control import CLEARANCE, Site
-from minisim.junction.occupancy import CLOSE, STEP, Area, area, passes, showing
+from minisim.control import Site
+from minisim.junction.conflicts import CLEARANCE
+from minisim.junction.coordination import CLOSE, STEP, Region, passes, region
 from scenarios import four_way, three_way
 
 SITES = [three_way().site(0), four_way(profile="fair").site(0)]
 SITE = SITES[1]
+PLACE = SITE.intersection, SITE.vehicle
 
 
 def pairs(site: Site) -> list[tuple[int, int]]:
@@ -29,19 +31,22 @@ def pairs(site: Site) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("site", SITES, ids=["3", "4"])
-def test_movements_in_harmony_have_no_conflict_area_and_all_others_have(site: Site) -> None:
+def test_movements_in_harmony_have_no_forbidden_region_and_all_others_have(site: Site) -> None:
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     for p, q in pairs(site):
-        assert (area(site, p, q) is None) == matrix.values[p, q], (p, q)
+        assert (region(site.intersection, site.vehicle, p, q) is None) == matrix.values[p, q], (
+            p,
+            q,
+        )
 
 
-def test_outside_its_area_bodies_keep_their_distance() -> None:
+def test_outside_its_region_bodies_keep_their_distance() -> None:
     """The grid promises it for every position, not only for its points."""
     random = np.random.default_rng(1)
     paths, vehicle = SITE.intersection.paths, SITE.vehicle
     tested = 0
     for p, q in pairs(SITE)[::5]:
-        shared = area(SITE, p, q)
+        shared = region(*PLACE, p, q)
         if shared is None:
             continue
         x = random.uniform(0.0, (shared.close.shape[0] - 1) * STEP, 300)
@@ -61,7 +66,7 @@ def test_outside_its_area_bodies_keep_their_distance() -> None:
 def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
     """And `ever` what is so at this or a later position of the second."""
     p, q = 1, 4  # a2, b2
-    shared = area(SITE, p, q)
+    shared = region(*PLACE, p, q)
     assert shared is not None
     bodies = []
     for way, count in zip((p, q), shared.close.shape, strict=True):
@@ -78,7 +83,7 @@ def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
 
 def test_an_area_is_the_others_mirrored() -> None:
     for p, q in pairs(SITE):
-        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
         if shared is not None:
             assert mirrored is not None
             assert (shared.close == mirrored.close.T).all()
@@ -87,7 +92,7 @@ def test_an_area_is_the_others_mirrored() -> None:
 def test_whoever_has_stopped_in_time_is_in_nobodys_way() -> None:
     """However far the other goes: that is what `room` is."""
     for p, q in pairs(SITE):
-        shared, mirrored = area(SITE, p, q), area(SITE, q, p)
+        shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
         if shared is None or mirrored is None:
             continue
         for x in np.arange(0.0, shared.close.shape[0] * STEP, STEP):
@@ -98,7 +103,7 @@ def test_whoever_has_stopped_in_time_is_in_nobodys_way() -> None:
 
 def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
     a2, b2 = 1, 4
-    shared = area(SITE, a2, b2)
+    shared = region(*PLACE, a2, b2)
     assert shared is not None
     assert shared.room(-3.0, -50.0) == pytest.approx(shared.room(0.0, 0.0) + 3.0)
     assert shared.room(100.0, 0.0) == math.inf
@@ -107,7 +112,7 @@ def test_before_the_entry_is_the_entry_and_beyond_the_end_is_free() -> None:
 
 
 #: Five positions of the first vehicle, three of the second.
-BY_HAND = Area(
+BY_HAND = Region(
     close=np.array([[0, 0, 0], [0, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
     ever=np.array([[0, 0, 0], [1, 1, 0], [1, 1, 0], [0, 0, 0], [1, 0, 0]], dtype=bool),
 )
@@ -153,24 +158,12 @@ def test_when_bodies_touch_by_hand() -> None:
     assert not BY_HAND.touches(there[:2], then[:2])
 
 
-@pytest.mark.parametrize("tolerance", [0.1, 0.3, 0.6])
-def test_a_turn_shows_where_the_arc_has_left_the_straight_lane(tolerance: float) -> None:
-    """Beside a straight line an arc of radius r is r(1 − cos(s/r)) after s."""
-    shows = showing(SITE, tolerance)
-    for turn in (0, 2):
-        radius = SITE.intersection.paths[turn].radius
-        expected = radius * math.acos(1.0 - tolerance / radius)
-        assert shows[turn, 1] == pytest.approx(expected, abs=0.06)
-    assert shows[0, 0] == math.inf
-    assert (shows[:3, 3:] == 0.0).all()
-
-
 def test_who_has_a_decimetre_gets_past_who_has_none_does_not() -> None:
     """Where two once stood in each other's way for ever: 13 cm for one, a touch for the other."""
     names = [str(movement) for movement in SITE.intersection.movements]
     a2, b3 = names.index("a2"), names.index("b3")
-    assert passes(SITE, b3, 4.94, a2, 3.56)
-    assert not passes(SITE, a2, 3.56, b3, 4.94)
-    shared = area(SITE, b3, a2)
+    assert passes(*PLACE, b3, 4.94, a2, 3.56)
+    assert not passes(*PLACE, a2, 3.56, b3, 4.94)
+    shared = region(*PLACE, b3, a2)
     assert shared is not None
     assert shared.way(4.94, 3.56) < math.inf, "the grid alone does not show it"

@@ -1,0 +1,168 @@
+"""Paths through a junction, and bodies on them.
+
+`s` is how far a vehicle's front bumper has come on its path [m], from the start of its road.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from minisim.junction.movements import Movement
+from minisim.vehicle import VehicleType
+
+Floats = npt.NDArray[np.float64]
+
+#: Segments of the polyline of an arc; the chord error at radius 5.6 m is 4 mm.
+ARC_SEGMENTS = 32
+
+
+class Size(NamedTuple):
+    """What geometry needs to know of a vehicle [m]."""
+
+    length: float
+    width: float
+
+
+class Way(NamedTuple):
+    """A given curve through the junction.
+
+    Attributes:
+        points: x, y of its polyline from entry to exit [m].
+        length: what a vehicle drives on it [m]; simulators round.
+        wait: from the entry to the waiting position inside the junction that SUMO gives to some
+            far turns [m]; 0 where there is none.
+        speed: limit on it [m/s]; 0 where it follows from the radius, as on an arc.
+        major: whether the road that it comes from has priority.
+        yields: movements to which it must give way, such as "b2".
+        foes: movements that it crosses or joins, as SUMO has them.
+        turns_back: whether the road that it leaves by leads back at its far end.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    length: float
+    wait: float = 0.0
+    speed: float = 0.0
+    major: bool = False
+    yields: tuple[str, ...] = ()
+    foes: tuple[str, ...] = ()
+    turns_back: bool = False
+
+    def resampled(self, count: int) -> Floats:
+        """`count` points at equal distances along it, shape (count, 2)."""
+        points = np.asarray(self.points, dtype=float)
+        at = distances_along(points)
+        wanted = np.linspace(0.0, at[-1], count)
+        return np.stack([np.interp(wanted, at, points[:, k]) for k in (0, 1)], axis=-1)
+
+
+def distances_along(points: Floats) -> Floats:
+    """How far along a polyline each of its points is [m], shape (points,)."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The whole way of one movement: approach lane, arc, exit lane.
+
+    Attributes:
+        movement: what this is the path of.
+        exit_arm: index of the arm it leaves by.
+        entry, exit: `s` of the junction's entry and exit [m].
+        length: `s` at the end of the exit lane [m].
+        radius: of the arc [m]; infinite when straight.
+        points: (ARC_SEGMENTS + 1, 2) polyline from entry to exit, equally spaced [m].
+        heading_in, heading_out: unit vectors on the approach and exit lane, shape (2,).
+    """
+
+    movement: Movement
+    exit_arm: int
+    entry: float
+    exit: float
+    length: float
+    radius: float
+    points: Floats
+    heading_in: Floats
+    heading_out: Floats
+
+    @property
+    def crossing(self) -> float:
+        """From the junction's entry to its exit [m]."""
+        return self.exit - self.entry
+
+    @property
+    def turn(self) -> float:
+        """By how much it turns in the junction [rad], positive to the left, in (−π, π]."""
+        (ax, ay), (bx, by) = self.heading_in.tolist(), self.heading_out.tolist()
+        return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+
+    def position(self, s: npt.ArrayLike) -> Floats:
+        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See `locate` too."""
+        s = np.asarray(s, dtype=float)
+        step = self.crossing / ARC_SEGMENTS
+        t = np.clip((s - self.entry) / step, 0.0, ARC_SEGMENTS)
+        k = np.minimum(t.astype(int), ARC_SEGMENTS - 1)
+        w = (t - k)[..., None]
+        inside = self.points[k] * (1.0 - w) + self.points[k + 1] * w
+        before = np.minimum(s - self.entry, 0.0)[..., None] * self.heading_in
+        after = np.maximum(s - self.exit, 0.0)[..., None] * self.heading_out
+        return np.asarray(inside + before + after)
+
+    def pose(self, s: npt.ArrayLike, length: float) -> tuple[Floats, Floats]:
+        """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
+
+        Both bumpers' middles lie on the path, so the body is the chord between them.
+        """
+        front = self.position(s)
+        rear = self.position(np.asarray(s, dtype=float) - length)
+        along = front - rear
+        heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
+        return front - heading * (length / 2.0), heading
+
+    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType | Size) -> Floats:
+        """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
+        centre, heading = self.pose(s, vehicle.length)
+        along = heading * (vehicle.length / 2.0)
+        across = np.stack([-heading[..., 1], heading[..., 0]], axis=-1) * (vehicle.width / 2.0)
+        corners = [along + across, along - across, -along - across, -along + across]
+        return np.stack([centre + corner for corner in corners], axis=-2)
+
+    @property
+    def line(self) -> shapely.LineString:
+        """The centre line as a shapely polyline, from road entry to road end."""
+        ends = self.position([0.0, self.length])
+        return shapely.LineString(np.vstack([ends[:1], self.points, ends[1:]]))
+
+
+def locate(
+    points: Sequence[Sequence[float]], headings: Sequence[float], crossing: float, past: float
+) -> tuple[float, float]:
+    """`Path.position` of one point, in plain floats.
+
+    It takes lists and arrays alike, so that the kernel can compile it and plain Python can call it
+    millions of times.
+
+    Args:
+        points: of the polyline from entry to exit, equally spaced [m].
+        headings: unit vectors on the approach (x, y) and exit lane (x, y).
+        crossing: length from entry to exit [m].
+        past: distance past the junction entry [m].
+    """
+    last = len(points) - 1
+    if past <= 0.0:
+        return points[0][0] + past * headings[0], points[0][1] + past * headings[1]
+    if past >= crossing:
+        over = past - crossing
+        return points[last][0] + over * headings[2], points[last][1] + over * headings[3]
+    t = past / crossing * last
+    k = min(int(t), last - 1)
+    w = t - k
+    x, y = points[k][0], points[k][1]
+    return x + w * (points[k + 1][0] - x), y + w * (points[k + 1][1] - y)

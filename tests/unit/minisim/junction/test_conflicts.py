@@ -1,0 +1,197 @@
+"""Corridors, zones, clearing distances and areas against closed forms and finer searches."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import shapely
+
+from minisim.junction.conflicts import (
+    AREA_STEP,
+    CLEARANCE,
+    clearing_distances,
+    conflict_areas,
+    conflict_zones,
+    conflicts,
+    corridor,
+    entry_room,
+    separation,
+)
+from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Movement
+from minisim.vehicle import VehicleType
+from scenarios import four_way
+
+CAR = VehicleType()
+SQUARE = (0.0, 90.0, 180.0, 270.0)
+ODD = (10.0, 80.0, 190.5, 260.0, 300.0)
+SITE = four_way(100, profile="fair").site(1)
+JUNCTION = SITE.intersection
+ENTRY = JUNCTION.approach_length
+
+
+@pytest.fixture(scope="module", params=["left", "right"])
+def square(request: pytest.FixtureRequest) -> Intersection:
+    return Intersection(SQUARE, side=request.param)
+
+
+def test_turning_the_whole_junction_changes_nothing_but_the_view() -> None:
+    turned = Intersection(tuple(b + 20.0 for b in ODD))
+    np.testing.assert_allclose(
+        separation(turned, CAR), separation(Intersection(ODD), CAR), atol=1e-9
+    )
+
+
+def test_corridor_of_a_straight_movement_is_a_rectangle() -> None:
+    swept = corridor(Intersection(SQUARE).path(Movement(0, 2)), CAR)
+    # From the rear at the entry's front to the front when the rear leaves: 14.4 + 2 · 5 m.
+    assert shapely.area(swept) == pytest.approx((14.4 + 2 * 5.0) * 1.8)
+    assert shapely.bounds(swept) == pytest.approx((1.6 - 0.9, -12.2, 1.6 + 0.9, 12.2))
+
+
+def test_opposite_straight_corridors_are_a_lane_minus_a_body_apart() -> None:
+    four = Intersection(SQUARE)
+    apart = separation(four, CAR)
+    a2, c2 = four.index(Movement(0, 2)), four.index(Movement(2, 2))
+    assert apart[a2, c2] == pytest.approx(3.2 - 1.8)
+    assert conflicts(four, CAR, 1.39)[a2, c2] == np.False_
+    assert conflicts(four, CAR, 1.41)[a2, c2] == np.True_
+
+
+def test_separation_is_symmetric_and_zero_within_an_arm(square: Intersection) -> None:
+    apart = separation(square, CAR)
+    np.testing.assert_array_equal(apart, apart.T)
+    for p, q in itertools.product(range(12), repeat=2):
+        if p // 3 == q // 3:
+            assert apart[p, q] == 0.0
+
+
+def test_crossing_movements_conflict(square: Intersection) -> None:
+    conflict = conflicts(square, CAR, 0.5)
+
+    def meet(p: str, q: str) -> bool:
+        return bool(conflict[square.index(p), square.index(q)])
+
+    assert meet("a2", "b2")
+    assert meet("a2", "d2")
+    assert not meet("a2", "c2")
+    near, far = ("1", "3") if square.side == "left" else ("3", "1")
+    assert not meet(f"a{near}", f"c{near}")  # opposite turns to the near side
+    assert meet(f"a{far}", "c2")  # across the opposite traffic
+
+
+@pytest.mark.parametrize(("origin", "exit_arm"), list(itertools.permutations(range(4), 2)))
+def test_movements_that_share_an_exit_conflict(
+    square: Intersection, origin: int, exit_arm: int
+) -> None:
+    conflict = conflicts(square, CAR, 0.0)
+    bound_there = [m for m in square.movements if square.exit_arm(m) == exit_arm]
+    mine = Movement(origin, (exit_arm - origin) % 4)
+    assert mine in bound_there
+    assert all(conflict[square.index(mine), square.index(m)] for m in bound_there)
+
+
+def test_room_beside_a_held_vehicle(square: Intersection) -> None:
+    """Straight traffic passes at a lane minus a body; one that turns in cuts the corner a bit."""
+    assert 1.0 < entry_room(square, CAR) < 3.2 - 1.8
+    bus = VehicleType(length=12.0, width=2.5)
+    assert entry_room(square, bus) == 0.0
+
+
+def test_zones_of_two_straight_paths() -> None:
+    """Perpendicular corridors of width w, c apart: body within w/2 + c of the other's centre line.
+
+    a2 drives south 1.6 m east of the centre, b2 west 1.6 m south of it: they cross
+    7.2 + 1.6 = 8.8 m past the entry of a2, 7.2 − 1.6 = 5.6 m past that of b2.
+    """
+    zones = conflict_zones(JUNCTION, SITE.vehicle)
+    half, length = SITE.vehicle.width / 2.0 + 0.5, SITE.vehicle.length
+    for p, q, centre in ((1, 4, 8.8), (4, 1, 5.6)):
+        first, last = zones[p, q]
+        assert centre - half - 1.0 <= first <= centre - half
+        assert centre + half + length <= last <= centre + half + length + 1.0
+
+
+def test_zones_of_merging_paths_end_where_the_rear_has_left() -> None:
+    b1, a2 = JUNCTION.index("b1"), JUNCTION.index("a2")  # both leave to the south
+    for p, q in ((b1, a2), (a2, b1)):
+        crossing = JUNCTION.paths[p].crossing
+        assert conflict_zones(JUNCTION, SITE.vehicle)[p, q, 1] == pytest.approx(
+            crossing + SITE.vehicle.length
+        )
+
+
+def test_no_zones_without_conflict() -> None:
+    assert np.array_equal(
+        np.isfinite(conflict_zones(JUNCTION, SITE.vehicle)[..., 0]), SITE.conflicts
+    )
+
+
+def test_a_vehicle_is_in_the_way_until_its_body_has_left_it() -> None:
+    """Against a search of its own, far finer, with every pair of movements."""
+    clearing = clearing_distances(JUNCTION, SITE.vehicle)
+    paths = JUNCTION.paths
+    assert np.array_equal(clearing > -np.inf, SITE.conflicts)
+    checked = 0
+    for p, q in np.argwhere(np.isfinite(clearing)).tolist():
+        swept = corridor(paths[p], SITE.vehicle)
+        last = paths[q].crossing + SITE.vehicle.length
+        after = np.arange(clearing[p, q], last, 0.02)
+        bodies = shapely.polygons(paths[q].bodies(paths[q].entry + after, SITE.vehicle))
+        assert shapely.distance(swept, bodies).min() > CLEARANCE - 0.01
+        before = paths[q].bodies(paths[q].entry + clearing[p, q] - 0.3, SITE.vehicle)
+        assert shapely.distance(swept, shapely.polygons(before)) < CLEARANCE + 0.01
+        checked += 1
+    assert checked > 20
+
+
+def test_a_vehicle_that_leaves_by_the_same_arm_is_in_the_way_until_it_is_out() -> None:
+    clearing, intersection = clearing_distances(JUNCTION, SITE.vehicle), JUNCTION
+    for p, path in enumerate(intersection.paths):
+        for q, other in enumerate(intersection.paths):
+            if path.exit_arm == other.exit_arm and path.movement.origin != other.movement.origin:
+                assert np.isinf(clearing[p, q])
+
+
+def test_straight_ways_are_clear_where_the_drawing_says() -> None:
+    # Left-hand, lanes of 3.2 m, entries 7.2 m from the centre. a2 drives south on x = 1.6, b2
+    # west on y = -1.6: it has left a2's way when its rear is at x = 1.6 - 0.9 - 0.5, so its front
+    # has driven 7.2 - 0.2 + 5.0 = 12.0 m.
+    clearing, index = clearing_distances(JUNCTION, SITE.vehicle), JUNCTION.index
+    a2, b2, d2 = (index(Movement(lane, 2)) for lane in (0, 1, 3))
+    assert clearing[a2, b2] == pytest.approx(12.0, abs=0.26)
+    # d2 drives east on y = 1.6 and has to get 3.2 m farther.
+    assert clearing[a2, d2] == pytest.approx(15.2, abs=0.26)
+
+
+def test_the_conflict_area_of_two_straight_movements() -> None:
+    """a2 drives south at x = 1.6 ± 0.9; b2 drives west at y = −1.6 ± 0.9."""
+    areas = conflict_areas(JUNCTION, SITE.vehicle)
+    a2, b2 = map(JUNCTION.index, ("a2", "b2"))
+
+    # a2's front reaches y = −0.7 after 7.2 + 0.7 m; its rear leaves y = −2.5 after 7.2 + 2.5 + 5.
+    assert areas.enter[a2, b2] - ENTRY == pytest.approx(7.9, abs=AREA_STEP)
+    assert areas.leave[a2, b2] - ENTRY == pytest.approx(14.7, abs=AREA_STEP)
+    # b2's front reaches x = 2.5 after 7.2 − 2.5 m; its rear leaves x = 0.7 after 7.2 − 0.7 + 5.
+    assert areas.enter[b2, a2] - ENTRY == pytest.approx(4.7, abs=AREA_STEP)
+    assert areas.leave[b2, a2] - ENTRY == pytest.approx(11.5, abs=AREA_STEP)
+
+
+def test_conflict_areas_of_merging_movements_end_at_the_exit_line() -> None:
+    areas = conflict_areas(JUNCTION, SITE.vehicle)
+    a1, d2 = map(JUNCTION.index, ("a1", "d2"))
+    for p, q in ((a1, d2), (d2, a1)):
+        clear = JUNCTION.paths[p].exit + SITE.vehicle.length
+        assert areas.leave[p, q] == pytest.approx(clear, abs=2 * AREA_STEP)
+
+
+def test_movements_that_never_meet_have_no_conflict_area() -> None:
+    areas = conflict_areas(JUNCTION, SITE.vehicle)
+    assert np.isnan(areas.enter[~SITE.conflicts]).all()
+    assert (np.isnan(areas.enter) == np.isnan(areas.enter.T)).all()
+    assert (np.isnan(areas.enter) == np.isnan(areas.leave)).all()
+    inside = np.isfinite(areas.enter)
+    assert inside.sum() > 20
+    assert (areas.leave[inside] > areas.enter[inside]).all()
