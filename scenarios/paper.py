@@ -17,13 +17,14 @@ from baselines import Actuated, Adaptive, FixedTime
 from dim import AsRunDim
 from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
+from minisim.vehicle import CruiseVehicle
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.published import (
     PUBLISHED_ARMS,
     RENAMED,
     RENAMED_ARMS,
-    RENAMED_TURNAROUNDS,
+    TURNAROUNDS,
     published_arrivals,
     published_ways,
 )
@@ -161,16 +162,22 @@ def replay(
     controller: str = "dim",
     *,
     profile: str | Profile | None = None,
+    sumo: str = "1.18",
 ) -> Scenario:
     """A cell of the grid with the arrivals of its published run.
 
-    With `controller_of` the same cell and collisions recorded, the trips of DIM are those of SUMO
-    on the same arrivals, vehicle by vehicle. Vehicles of one second and lane are inserted in the
-    order of their manoeuvres: which of them was first is not on record. Nor are the drivers' speed
-    factors in the signals' runs, and whoever was still on the road at the end.
+    With `controller_of` the same cell and collisions answered by "teleport", the trips of DIM are
+    those of SUMO 1.18 on the same arrivals, vehicle by vehicle. Vehicles that were still on the
+    road at the end of a published run are not on record.
+
+    Args:
+        split, density, arms, controller: see `Cell`.
+        profile: None is that of the published run.
+        sumo: the version of SUMO to be compared with. The published runs were made with 1.18; the
+            host of minisim is 1.28, whose radar sees less, and builds no turnarounds.
 
     Raises:
-        InputError: no such cell, or an unknown profile.
+        InputError: no such cell, or an unknown profile or version.
     """
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled=False)
@@ -180,10 +187,17 @@ def replay(
         profile=profile or _profile(cell, ran),
         recorded=published_arrivals(*cell),
     )
-    if cell.split != RENAMED or made.intersection.ways is None:
+    vehicle, junction = made.profile.vehicle, made.intersection
+    if not isinstance(vehicle, CruiseVehicle) or junction.ways is None:
         return made
-    ways = published_ways(cell.arms, RENAMED_TURNAROUNDS)
-    return replace(made, intersection=replace(made.intersection, ways=ways))
+    signals = cell.controller == "fts"  # its network has none
+    turnarounds = "" if sumo != "1.18" or signals else TURNAROUNDS[split]
+    ways = published_ways(cell.arms, turnarounds if cell.arms == 4 else "")
+    return replace(
+        made,
+        intersection=replace(junction, ways=ways),
+        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo)),
+    )
 
 
 def controller_of(

@@ -25,9 +25,8 @@ RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 PUBLISHED_ARMS = (3, 4, 5)
 
 
-#: Arms at whose far end the road leads back, in the authors' networks of 4 arms: in the first one,
-#: and in that of the runs at 4:1:4:1.
-TURNAROUNDS, RENAMED_TURNAROUNDS = "bc", "abcd"
+#: Arms at whose far end the road leads back, in the authors' networks of 4 arms, by split.
+TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
 
 
 @lru_cache
@@ -45,7 +44,7 @@ def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
     file = resources.files("scenarios") / "data" / "ways" / f"{arms}way.csv"
     if turnarounds is None:
-        turnarounds = TURNAROUNDS if arms == 4 else ""
+        turnarounds = TURNAROUNDS["balanced"] if arms == 4 else ""
     with file.open(encoding="utf-8") as text:
         return tuple(_way(row, arms, turnarounds) for row in csv.DictReader(text))
 

@@ -39,6 +39,9 @@ TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 #: order of vehicles that came in the same second decides more [s].
 TRAVEL_350: Final = 3.0
 
+#: The version of SUMO that is the other host, among those that minisim can drive like.
+HOST_VERSION: Final = "1.28"
+
 #: Horizon of the published runs [s].
 HOUR: Final = 3600.0
 
@@ -178,7 +181,10 @@ def replayed_cases(
     ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
     arms = [JUNCTIONS[name] for name in names] or list(MAKERS)
     cases = [
-        Case(replace(replay(*cell, profile=profile), horizon=horizon), ran[cell.controller], cell)
+        Case(
+            replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
+            ran[cell.controller], cell,
+        )
         for cell in (*GRID, *BASELINE_GRID)
         if cell.controller in ran
         and cell.arms in arms

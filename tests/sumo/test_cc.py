@@ -83,12 +83,12 @@ def test_ways_that_are_not_netconverts_are_refused() -> None:
 
 @pytest.mark.parametrize("cell", [Cell("balanced", 350, 4), Cell("balanced", 150, 3)], ids=str)
 def test_the_beginning_of_a_replay_is_minisims(cell: Cell) -> None:
-    ours, theirs = both(until(replay(*cell), 240.0), AsRunDim())
+    ours, theirs = both(until(replay(*cell, sumo="1.28"), 240.0), AsRunDim())
     ended = ours.columns.arrived & theirs.columns.arrived
     assert ended.sum() > 10
     assert (ours.columns.arrived == theirs.columns.arrived).mean() > 0.99
-    for metric in ("travel_time_s", "waiting_time_s"):
-        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
+    for column in ("travel_time", "waiting_time"):
+        apart = np.abs(getattr(ours.columns, column) - getattr(theirs.columns, column))[ended]
         assert (apart <= 0.1 + 1e-9).all()
 
 
@@ -108,11 +108,11 @@ SHARES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", SHARES, ids=str)
 def test_replays_are_minisims_trip_by_trip(cell: Cell) -> None:
-    ours, theirs = both(replay(*cell), controller_of(*cell))
+    ours, theirs = both(replay(*cell, sumo="1.28"), controller_of(*cell))
     ended = ours.columns.arrived & theirs.columns.arrived
     close = np.ones(ended.sum(), bool)
-    for metric in ("travel_time_s", "waiting_time_s"):
-        apart = np.abs(ours.columns.metric(metric) - theirs.columns.metric(metric))[ended]
+    for column in ("travel_time", "waiting_time"):
+        apart = np.abs(getattr(ours.columns, column) - getattr(theirs.columns, column))[ended]
         close &= apart <= 0.1 + 1e-9
     assert close.mean() >= SHARES[cell]
     assert (ours.columns.arrived == theirs.columns.arrived).mean() >= 0.99
@@ -131,7 +131,7 @@ def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: C
 
 
 def test_the_same_replay_gives_the_same_trips_twice() -> None:
-    scenario = until(replay("balanced", 150, 4), 100.0)
+    scenario = until(replay("balanced", 150, 4, sumo="1.28"), 100.0)
     first, second = (
         simulate(scenario, AsRunDim(), on_collision="record", record=kind)
         for kind in (None, "junction")
@@ -177,7 +177,7 @@ def test_teleporting_is_sumos_default(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_teleport_takes_who_runs_into_another_off_the_road() -> None:
     """4:3:2:1 at 350: in SUMO 1.28 b2 of 2606 s runs into a3 of 2611 s, at 2649.93 s."""
-    scenario = until(replay("4:3:2:1", 350, 4), 2660.0)
+    scenario = until(replay("4:3:2:1", 350, 4, sumo="1.28"), 2660.0)
     run = simulate(scenario, AsRunDim(), on_collision="teleport")
     (collision,) = run.collisions
     assert collision.time == pytest.approx(2649.93)
