@@ -453,6 +453,7 @@ def room(
     in_the_way = (
         behind < law.length
         and not waiting
+        and (cruise.crossing_foes or driven < end)
         and (
             (not past and to_crossing > 0.0)
             or (kind == JOIN and to_crossing > behind - law.length)
