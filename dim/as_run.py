@@ -297,8 +297,9 @@ class AsRunSession:
     def decide(self, view: View) -> Iterable[Command]:
         """One round of the rules, repeated in the next step until nothing changes any more."""
         rules = self.rules
-        before = (list(rules.serving), list(rules.action), rules.chosen)
+        before = (list(rules.action), rules.chosen)
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
+        lost = any(vehicle not in cars for vehicle in rules.serving)
         speeds = rules.step(cars)
         speeds.update((v, rules.exit_speed) for v, car in cars.items() if car.driven >= FOLLOWED)
         told = {v: speed for v, speed in speeds.items() if v in cars}
@@ -306,7 +307,7 @@ class AsRunSession:
             Advise(v, speed) for v, speed in told.items() if self._desired.get(v) != speed
         ]
         self._desired = {v: speed for v, speed in self._desired.items() if v in cars} | told
-        if before != (rules.serving, rules.action, rules.chosen):
+        if lost or before != (rules.action, rules.chosen):
             commands.append(Wake(view.time + self._dt))
         return commands
 

@@ -65,16 +65,16 @@ class Arrivals:
         )
         columns = {"time": time, "lane": lane, "manoeuvre": manoeuvre}
         if self.speed_factor is not None:
-            columns["speed_factor"] = _column("speed_factor", self.speed_factor, np.float64)
+            factors = _column("speed_factor", self.speed_factor, np.float64)
+            if len(factors) and not LEAST_FACTOR <= factors.min() <= factors.max() <= MOST_FACTOR:
+                raise InputError(f"a speed_factor must be {LEAST_FACTOR:g} … {MOST_FACTOR:g}")
+            columns["speed_factor"] = factors
         if any(len(column) != len(time) for column in columns.values()):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if len(time) and (not np.isfinite(time).all() or time.min() < 0):
             raise InputError("demand times must be finite and not negative")
         if len(time) and time.max() > MAX_TIME:
             raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
-        factors = columns.get("speed_factor", np.ones(0))
-        if not ((factors >= LEAST_FACTOR) & (factors <= MOST_FACTOR)).all():
-            raise InputError(f"a speed_factor must be {LEAST_FACTOR:g} … {MOST_FACTOR:g}")
         order = np.lexsort((lane, time))
         for name, column in columns.items():
             sorted_column = column[order]

@@ -44,10 +44,10 @@ PAPER = Profile(
 FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
-#: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel` is a slip of
-#: the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed limits
-#: ignored, step 0.01 s. `deceleration` is for controllers and hold lines, which the authors' DIM
-#: has none of: the strongest braking that the cruise control itself asks for.
+#: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel`
+#: is a slip of the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed
+#: limits ignored, step 0.01 s, in SUMO 1.18. `deceleration` is for controllers and hold lines,
+#: which the authors' DIM has none of: the strongest braking that the cruise control asks for.
 AS_RUN = Profile(
     name="as_run",
     vehicle=CruiseVehicle(

@@ -269,9 +269,7 @@ def look(
 
 
 @njit
-def teleport(
-    vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int
-) -> bool:
+def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int) -> bool:
     """Take a vehicle off the road that has run into the one ahead on its exit; whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
@@ -356,7 +354,7 @@ def meet(
             if kind == NOWHERE:
                 continue
             gap, to_crossing, in_the_way = room(vehicles, ends, law, cruise, i, part, j, k)
-            if gap == math.inf or not (in_the_way or before(vehicles, ends, cruise, i, j, kind)):
+            if gap == math.inf or not (in_the_way or before(vehicles, cruise, i, j, kind)):
                 continue
             a = follow(v, gap, other["v"], cruise) if gap >= 0.0 else seen
             if kind == WAIT:
@@ -408,7 +406,7 @@ def radar(
                 stops = gap + braking_distance(other["v"], law.b_max, law.dt)
                 if stops >= shortest:
                     continue
-                if s >= law.entry and not before(vehicles, ends, cruise, i, j, kind):
+                if s >= law.entry and not before(vehicles, cruise, i, j, kind):
                     continue
                 shortest = stops
                 if gap < 0.0 and not cruise.crossing_foes:
@@ -455,8 +453,7 @@ def room(
         and not waiting
         and (cruise.crossing_foes or driven < end)
         and (
-            (not past and to_crossing > 0.0)
-            or (kind == JOIN and to_crossing > behind - law.length)
+            (not past and to_crossing > 0.0) or (kind == JOIN and to_crossing > behind - law.length)
         )
     )
     if to_crossing < -law.margin and not in_the_way:
@@ -473,7 +470,7 @@ def room(
 
 
 @njit_inline
-def before(vehicles: Records, ends: Floats, cruise: Cruise, i: int, j: int, kind: int) -> bool:
+def before(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool:
     """Whether j was in the junction before i, which is inside; if both at once, the faster one.
 
     What counts as being in it, is for the way that must yield to have passed its waiting position.

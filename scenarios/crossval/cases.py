@@ -183,7 +183,8 @@ def replayed_cases(
     cases = [
         Case(
             replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
-            ran[cell.controller], cell,
+            ran[cell.controller],
+            cell,
         )
         for cell in (*GRID, *BASELINE_GRID)
         if cell.controller in ran

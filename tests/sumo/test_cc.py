@@ -27,7 +27,6 @@ from scenarios.scenario import AS_RUN, FAIR, Scenario
 from tests.builders import Fixed, as_run, replayed
 
 
-
 def hosted(scenario: Scenario) -> Scenario:
     """With the vehicle of the SUMO that is installed, not of the published runs."""
     vehicle = replace(AS_RUN.vehicle, sumo="1.28")

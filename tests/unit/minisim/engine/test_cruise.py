@@ -343,6 +343,7 @@ def test_an_overlap_with_one_inside_counts_as_bumper_to_bumper() -> None:
 
 def test_inside_the_one_that_must_yield_counts_from_its_waiting_position() -> None:
     """a3 entered first, but c2, to which it must give way, came before it passed its position."""
+
     def against(a3_at: float) -> list[float]:
         return chosen((0, 3, a3_at, 5.0, 0.0, 10), (2, 2, 494.0, 5.0, 0.0, 20), sumo="1.18")
 

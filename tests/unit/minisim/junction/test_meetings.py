@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from minisim.junction.geometry import Intersection
@@ -60,7 +59,8 @@ def test_rights_of_way_are_those_of_the_networks() -> None:
 
 def test_on_arcs_nothing_must_yield_and_the_same_ways_meet() -> None:
     rights = right_of_way(Intersection((0.0, 90.0, 180.0, 270.0)))
-    assert not rights.yields.any() and not rights.major.any()
+    assert not rights.yields.any()
+    assert not rights.major.any()
     given = right_of_way(four_way(profile="as_run").intersection).foes
     # netconvert's default draws opposite far turns through each other
     assert int((rights.foes != given).sum()) == 4
