@@ -3,7 +3,7 @@
 The rule is SUMO's for junctions of type `allway_stop` (`MSLink`, and `jmAllwayStopWait`), with one
 difference. SUMO's vehicles set off as soon as a conflicting one has entered the junction, and brake
 for it there, hard at times (SUMO issues 15434, 15728). Ours wait until it has left their way, so
-no two can collide whatever it does there.
+two vehicles cannot collide whatever it does there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 #: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
 STANDING = 0.1
@@ -30,21 +30,17 @@ class AllWayStop:
     The first vehicle of each lane queues from the moment when it stands at the line; equal times
     go by arm. A vehicle goes as soon as it has stood for `reaction`, no conflicting vehicle has
     stood for longer, and every conflicting vehicle that was let go has left its way. So vehicles
-    that do not conflict go together, and may overtake in the queue. But none is passed over for
-    ever, since a waiting vehicle keeps every later conflicting one back.
-
+    that do not conflict go together, and may overtake in the queue. Each gets its turn, since a
+    waiting vehicle keeps back every later one that conflicts with it.
     """
+
+    name = Name("all-way-stop")
 
     # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
     # safety measures (device SSM, MDRAC).
     reaction: float = real(
         "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
     )
-
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `all-way-stop:reaction=0`."""
-        return spelled("all-way-stop", self)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""
@@ -54,9 +50,8 @@ class AllWayStop:
 class AllWayStopSession:
     """Since when each vehicle stands, and which were let go.
 
-    It is called when a vehicle comes to the line, when the junction gets clear, and when it asks
-    for that: at the earliest time at which a vehicle at the line can stand, has stood long enough,
-    or can find its way free.
+    It is called when a vehicle comes to the line, when the junction clears, and at the earliest
+    time at which a vehicle at the line can stand, has stood long enough, or can find its way free.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
@@ -65,9 +60,8 @@ class AllWayStopSession:
         self._dt = site.dt
         self._vehicle = site.vehicle
         self._rows = site.intersection.movements.rows
-        self._clearing = clearing_distances(
-            site.intersection, site.vehicle
-        ).tolist()  # quicker to look up than an array
+        # A list is quicker to look up than an array.
+        self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
         self._standing: dict[int, float] = {}  # vehicle: since [s]
         self._gone: set[int] = set()
 
@@ -78,7 +72,12 @@ class AllWayStopSession:
         heads = self._heads(view)
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= STANDING}
-        looks = [self._stop_time(v, view.time) for v in heads if v.id not in self._standing]
+        # A moving head can stand as soon as comfortable braking has stopped it.
+        looks = [
+            view.time + (v.speed - STANDING) / self._vehicle.deceleration
+            for v in heads
+            if v.id not in self._standing
+        ]
         queue = [v for v in heads if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))
         waiting: list[Observed] = []
@@ -105,21 +104,13 @@ class AllWayStopSession:
                 heads.setdefault(vehicle.lane, vehicle)
         return [vehicle for vehicle in heads.values() if vehicle.distance <= LINE]
 
-    def _stop_time(self, vehicle: Observed, now: float) -> float:
-        """The earliest time at which a held vehicle can stand, braking comfortably [s]."""
-        return now + (vehicle.speed - STANDING) / self._vehicle.deceleration
-
     def _free_time(
-        self,
-        vehicle: Observed,
-        waiting: Iterable[Observed],
-        crossing: Iterable[Observed],
-        now: float,
+        self, vehicle: Observed, waiting: list[Observed], crossing: list[Observed], now: float
     ) -> float:
         """The earliest time at which a vehicle may go; infinite if another wake-up decides it [s].
 
-        That is now, if no conflicting vehicle has stood for longer or is in the way. One in the way
-        leaves it no sooner than at full acceleration.
+        That is now, if no conflicting vehicle has stood for longer or is in the way. A vehicle in
+        the way leaves it at full acceleration at the earliest.
         """
         clearing = self._clearing[self._index(vehicle)]
         if any(clearing[self._index(other)] > 0.0 for other in waiting):
@@ -128,12 +119,9 @@ class AllWayStopSession:
         for other in crossing:
             room = clearing[self._index(other)] + other.distance
             if room > 0.0:
-                free = max(free, now + self._driving_time(other.speed, room))
+                a, speed = self._vehicle.acceleration, other.speed
+                free = max(free, now + (math.sqrt(speed * speed + 2.0 * a * room) - speed) / a)
         return free
-
-    def _driving_time(self, speed: float, distance: float) -> float:
-        a = self._vehicle.acceleration
-        return (math.sqrt(speed * speed + 2.0 * a * distance) - speed) / a
 
     def _index(self, vehicle: Observed) -> int:
         return self._rows[vehicle.lane][vehicle.manoeuvre]

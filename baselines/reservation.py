@@ -8,22 +8,21 @@ is free at the time. Theirs is a grid of tiles. Ours are the conflict zones of t
 The protocol
 - The first vehicle of a lane asks, and so does one behind a holder, from `reach` before the
   junction on. Its passage is predicted at full acceleration up to the limits
-  (`baselines.prediction`), behind the vehicle ahead in its lane and behind the last to enter
-  its exit lane before it.
+  (`baselines.prediction`), behind the vehicle ahead in its lane and behind the last vehicle that
+  enters its exit lane before it.
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Into one exit lane holders go in the order of
   their grants, so a later grant never slows down an earlier one.
-- A refused vehicle drives up to its stop line, slowing down as late as is comfortable. It is
-  considered again every `period`, in the order of first requests.
+- A refused vehicle drives up to its stop line and slows down as late as is comfortable. Every
+  `period` it is considered again, in the order of first requests.
 
-Safety does not rest on far predictions. Every `period` the manager compares holders with what was
-predicted. For one that differs it predicts anew, from what it sees. A holder that no longer fits
-among all others, with a new prediction, loses its reservation if it can still stop; so does a
-vehicle that follows it. So when a vehicle becomes unable to stop, its passage fits those of all
-others that cannot stop, and those that can yield to it. What remains is the error of a prediction
-over a vehicle's last few seconds before its zones, from a state that is at most a period old.
-`buffer` is there for that error. In minisim it is small: up to 0.15 m beyond the point of no return
-(4 arms, 350 veh/h/lane), from leaders further ahead than the two that a prediction looks at.
+Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
+their predictions. It predicts anew where they differ. A holder whose new passage no longer fits
+loses its reservation if it can still stop, and so does a vehicle that follows it. So when a vehicle
+becomes unable to stop, its passage fits those of all others that cannot stop, and the rest yield.
+What remains is the error of a prediction over the last few seconds before the zones, from a state
+that is at most a period old. `buffer` covers it. In minisim it is small: up to 0.15 m beyond the
+point of no return (4 arms, 350 veh/h/lane), from leaders beyond the two that a prediction has.
 """
 
 from __future__ import annotations
@@ -31,6 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 from baselines.prediction import NO_LEADER, Floats, Following, Leader, courses, predict
 from minisim.control import (
@@ -45,10 +45,10 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance
+from minisim.errors import InputError
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 from minisim.vehicle import CruiseVehicle
 
 #: Smaller differences from the prediction do not count [m], [m/s].
@@ -62,11 +62,13 @@ BEYOND = 60.0
 class Reservation:
     """Space-time reservation, first come first served, for vehicles that follow the IDM."""
 
+    name = Name("reservation")
+
     # Asking earlier keeps room for vehicles far away from those that are near: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
     reach: float | None = real(
-        "how far before the junction vehicles ask; none is as late as they can without slowing "
-        "down for a refusal: the stopping distance at the limit, and a period's way", "m",
+        "how far before the junction vehicles ask; none is the stopping distance at the limit and "
+        "a period's way: as late as possible without slowing down for a refusal", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
     # 0.25 s on either side, as at the edge tiles of the AIM4 simulator.
@@ -78,11 +80,6 @@ class Reservation:
         "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
     )
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `reservation:buffer=1`."""
-        return spelled("reservation", self)
-
     def start(self, site: Site) -> ReservationSession:
         """Begin a run; raises `InputError` for vehicles whose motion is not predicted."""
         return ReservationSession(self, site)
@@ -90,26 +87,15 @@ class Reservation:
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """A reservation: how a vehicle will cross.
-
-    Attributes:
-        vehicle: its id.
-        lane: its approach lane.
-        movement: index of its movement.
-        start: when the prediction was made [steps].
-        s, v: position past the entry [m] and speed [m/s], one a step from `start` on.
-        enters: when its front is in the junction [steps].
-        zones: of each movement in conflict, the last step before and the first step past the
-            conflict zone.
-    """
+    """A reservation: how a vehicle will cross."""
 
     vehicle: int
-    lane: int
-    movement: int
-    start: int
-    s: Floats
-    v: Floats
-    enters: int
+    movement: int  #: its index
+    start: int  #: when the prediction was made [steps]
+    s: Floats  #: positions past the entry [m], one a step from `start` on
+    v: Floats  #: speeds [m/s]
+    enters: int  #: when its front is in the junction [steps]
+    #: Of each movement in conflict, the last step before and the first step past the conflict zone.
     zones: dict[int, tuple[int, int]]
 
     @property
@@ -118,7 +104,7 @@ class Slot:
         return self.start + len(self.s) - 1
 
     def leader(self, now: int, until: float = math.inf, shift: float = 0.0) -> Leader:
-        """What a follower sees of it from `now` [steps] on."""
+        """What a follower meets from `now` [steps] on."""
         return Leader(self.s[now - self.start :], self.v[now - self.start :], until, shift)
 
     def expects(self, seen: Observed, now: int) -> bool:
@@ -131,16 +117,11 @@ class Slot:
 class Manager:
     """Which vehicles hold which reservation, and which are possible; times in steps of the host.
 
-    Args:
-        site: of the run.
-        buffer: see `Reservation` [s].
-
     Attributes:
         slots: the reservations by vehicle, in the order of their grants.
     """
 
     def __init__(self, site: Site, buffer: float) -> None:
-        instance("site", site, Site)
         if isinstance(site.vehicle, CruiseVehicle):
             raise InputError(
                 "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
@@ -159,7 +140,7 @@ class Manager:
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int, ahead: Slot | None) -> Slot | None:
-        """The passage of a vehicle behind `ahead` in its lane; None where none is in sight.
+        """The passage of a vehicle behind `ahead` in its lane; None if none can be predicted.
 
         It also drives behind the last other holder to enter the same exit lane.
         """
@@ -181,7 +162,7 @@ class Manager:
             return None
         s, v = motion
         return Slot(
-            seen.id, seen.lane, p, now, s, v,
+            seen.id, p, now, s, v,
             enters=now + int(s.searchsorted(0.0)),
             zones={
                 q: (
@@ -195,47 +176,34 @@ class Manager:
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage is compatible with every other reservation.
 
-        Args:
-            slot: the passage.
-            last: whether it must come after those that share its exit lane.
+        Where it must be the `last`, it comes after those that share its exit lane.
         """
         exit_arm = self._ways[slot.movement].exit_arm
         for other in self.slots.values():
             if other.vehicle == slot.vehicle or other.movement not in slot.zones:
                 continue
             merges = self._ways[other.movement].exit_arm == exit_arm
-            if self._before_other(other, slot, merges):
-                continue
-            if (last and merges) or not self._before_other(slot, other, merges):
+            before = not (last and merges) and self._clears(slot, other, merges)
+            if not before and not self._clears(other, slot, merges):
                 return False
         return True
 
-    def _before_other(self, first: Slot, second: Slot, merges: bool) -> bool:
-        """Whether `first` is through before `second` comes, and enters a common exit lane first."""
+    def _clears(self, first: Slot, second: Slot, merges: bool) -> bool:
+        """Whether `first` has passed when `second` comes, and enters a common exit lane first."""
         through = first.zones[second.movement][1] + self._buffer <= second.zones[first.movement][0]
         return through and (not merges or first.enters < second.enters)
 
     def _before(self, exit_arm: int, seen: Observed) -> Slot | None:
-        """The last holder to enter an exit lane before a vehicle, or of all where it holds none."""
+        """The last holder to enter an exit lane, before the vehicle itself if it holds a slot."""
         own = self.slots.get(seen.id)
         latest = math.inf if own is None else own.enters
-        rivals = [
-            slot
-            for slot in self.slots.values()
-            if self._ways[slot.movement].exit_arm == exit_arm
-            and slot.vehicle != seen.id
-            and slot.enters < latest
-        ]
+        slots = [s for s in self.slots.values() if s.vehicle != seen.id and s.enters < latest]
+        rivals = [s for s in slots if self._ways[s.movement].exit_arm == exit_arm]
         return max(rivals, key=lambda slot: slot.enters, default=None)
 
 
 class ReservationSession:
-    """One run: keeps reservations true to what is seen, and serves requests.
-
-    Attributes:
-        manager: holds the reservations.
-        plan: a wake-up where vehicles begin to ask; later ones are asked for.
-    """
+    """One run: keeps reservations true to what is seen, and serves requests."""
 
     def __init__(self, controller: Reservation, site: Site) -> None:
         self.manager = Manager(site, controller.buffer)
@@ -255,7 +223,11 @@ class ReservationSession:
         manager = self.manager
         seen = {vehicle.id: vehicle for vehicle in view.vehicles}
         manager.slots = {v: slot for v, slot in manager.slots.items() if slot.ends >= now}
-        ahead = dict(self._followers(view))
+        ahead = {
+            vehicle.id: before.id if before is not None and before.lane == vehicle.lane else None
+            for before, vehicle in pairwise((None, *view.vehicles))
+            if vehicle is not None
+        }
         commands: list[Command] = [Hold(v) for v in self._revoke(seen, ahead, now)]
         for vehicle in seen:
             if vehicle not in manager.slots:
@@ -266,21 +238,13 @@ class ReservationSession:
             commands.append(Wake(view.time + self._period))
         return commands
 
-    def _followers(self, view: View) -> Iterator[tuple[int, int | None]]:
-        """Each vehicle's id with that of the one ahead of it in its lane."""
-        lane, ahead = -1, None
-        for vehicle in view.vehicles:
-            ahead = ahead if vehicle.lane == lane else None
-            yield vehicle.id, ahead
-            lane, ahead = vehicle.lane, vehicle.id
-
     def _revoke(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
     ) -> Iterator[int]:
         """Renew what differs from its prediction; the ids of vehicles that lose their reservation.
 
-        Vehicles that cannot stop come first. They keep theirs in any case, and if one of them no
-        longer fits, every reservation of a vehicle that can stop is checked again.
+        Vehicles that cannot stop come first and keep their reservation in any case. If one of them
+        no longer fits, every reservation of a vehicle that can stop is checked again.
         """
         slots = self.manager.slots
         stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}

@@ -1,19 +1,19 @@
 """V2I-C: a serving list at the roadside advises every vehicle when to reach its stop line.
 
 Source: Li, Liu, PLOS ONE 15(7), 2020, e0235644, and the authors' own code. A unit at the junction
-lists the vehicles in its range in the order in which they came. It knows when each will have left
-the junction. A vehicle in conflict with some ahead of it in the list is told to arrive when the
-last of those leaves. Where we differ, we differ for safety's sake:
+lists the vehicles in its range in the order of arrival, and estimates when each will have left. A
+vehicle that conflicts with some ahead of it in the list is told to arrive when the last of them
+leaves. We differ from the source for safety:
 
-- distances are those to the true stop line, and a vehicle has left when its rear bumper is out of
-  the junction; the conflicts are those of the geometry, merging included;
+- distances are to the true stop line, and a vehicle has left when its rear bumper is out of the
+  junction; the conflicts are those of the geometry, merging included;
 - a speed is advice: the vehicle accelerates and brakes as its car following does, never above the
   limit, and stops at its line unless the unit has let it go;
-- the right of way is given only when every conflicting vehicle ahead in the list *has* left, even
-  when the time until then is estimated to be 0. It is never taken back. A conflicting vehicle that
-  comes later waits in the same way, so two vehicles in conflict never hold it at once;
-- leaving times are capped (`leaving_time`), because distance over speed explodes at low speed, and
-  a crawling vehicle would stop those behind it in the list far from the junction.
+- a vehicle gets the right of way only when every conflicting vehicle ahead in the list *has* left,
+  even if the estimated time until then is 0, and never loses it. Later vehicles wait in the same
+  way, so two vehicles in conflict never hold it at once;
+- leaving times are capped (`leaving_time`): distance over speed explodes at low speed, and a
+  crawling vehicle would stop those behind it in the list far from the junction.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ import math
 from collections.abc import Iterable
 
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
-from minisim.errors import instance
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 #: Added to speeds that divide, as in the authors' code [m/s].
 CRAWL = 1e-5
@@ -32,6 +31,8 @@ CRAWL = 1e-5
 @declared
 class V2IC:
     """V2I-C, the controller of Li and Liu: a roadside unit with a serving list advises speeds."""
+
+    name = Name("v2ic")
 
     # 200 m in the authors' code.
     reach: float = real(
@@ -44,11 +45,6 @@ class V2IC:
         "time between two pieces of advice while any vehicle waits", "s",
         low=0.01, high=10, default=1.0,
     )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `v2ic:reach=100`."""
-        return spelled("v2ic", self)
 
     def start(self, site: Site) -> V2ICSession:
         """Begin a run."""
@@ -82,28 +78,37 @@ def advised_speed(distance: float, speed: float, time: float, limit: float) -> f
     return min(max(2.0 * distance / time - speed, 0.0), limit)
 
 
-class ServingList:
-    """The vehicles to serve, in order of registration, and what follows from that.
+class V2ICSession:
+    """One run: the serving list, and what follows from it.
 
-    Args:
-        site: of the run.
+    It is called where vehicles register and where they have left; in between only while any waits.
 
     Attributes:
         order: ids of the registered vehicles, in order of registration.
         granted: ids of the vehicles with the right of way.
     """
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, controller: V2IC, site: Site) -> None:
+        self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
         paths = site.intersection.paths
         self.order: list[int] = []
         self.granted: set[int] = set()
+        self._period = controller.period
         self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
         self._acceleration = site.vehicle.acceleration
         self._crossing = [path.exit - path.entry + site.vehicle.length for path in paths]
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
 
-    def register(self, seen: dict[int, Observed]) -> None:
+    def decide(self, view: View) -> Iterable[Command]:
+        """Update the list and serve it."""
+        seen = {vehicle.id: vehicle for vehicle in view.vehicles}
+        self._register(seen)
+        yield from self._serve(seen)
+        if len(self.granted) < len(self.order):
+            yield Wake(view.time + self._period)
+
+    def _register(self, seen: dict[int, Observed]) -> None:
         """Drop vehicles that have left, append new ones, nearest first."""
         self.order = [vehicle for vehicle in self.order if vehicle in seen]
         known = set(self.order)
@@ -112,12 +117,8 @@ class ServingList:
         new.sort(key=lambda vehicle: (vehicle.distance, vehicle.lane))
         self.order += [vehicle.id for vehicle in new]
 
-    def serve(self, seen: dict[int, Observed]) -> Iterable[Command]:
-        """One round through the list: the right of way for the free, advice for the rest.
-
-        Args:
-            seen: the registered vehicles by id.
-        """
+    def _serve(self, seen: dict[int, Observed]) -> Iterable[Command]:
+        """One round through the list: the right of way for the free, advice for the rest."""
         latest = [0.0] * len(self._foes)  # leaving time of the last of each movement so far [s]
         for vehicle in self.order:
             me = seen[vehicle]
@@ -139,33 +140,8 @@ class ServingList:
     def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
         """Time until a vehicle has left, `distance` ahead at its present speed [s].
 
-        It is no more than `blocked` (until it can be let go) and a start from rest at this place,
-        and never 0, for a listed vehicle has not left.
+        It is at most `blocked`, the time until it can be let go, and a start from rest at this
+        place. It is never 0, since a listed vehicle has not left.
         """
         from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)
-
-
-class V2ICSession:
-    """One run: the serving list at work.
-
-    Attributes:
-        serving: the list.
-        plan: a wake-up where vehicles register and where they have left; in between only while
-            any waits.
-    """
-
-    def __init__(self, controller: V2IC, site: Site) -> None:
-        instance("site", site, Site)
-        self.serving = ServingList(site)
-        self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
-        self._period = controller.period
-
-    def decide(self, view: View) -> Iterable[Command]:
-        """Update the list and serve it."""
-        seen = {vehicle.id: vehicle for vehicle in view.vehicles}
-        self.serving.register(seen)
-        commands = list(self.serving.serve(seen))
-        if len(self.serving.granted) < len(self.serving.order):
-            commands.append(Wake(view.time + self._period))
-        return commands

@@ -1,18 +1,17 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
 `baselines.v2ic` is the intended controller. This module holds what the comparison in the paper ran
-instead, quirk by quirk, and no other module knows of them:
+instead, quirk by quirk. No other module knows these quirks:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
-   junction begins at 488.7 m; so the "stop line" is 108.7 m before the junction, and vehicles
+   junction begins at 488.7 m. So the "stop line" is 108.7 m before the junction, and vehicles
    leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
 2. *right-hand conflicts*: the conflicts are those of right-hand traffic, the network is
    left-hand: of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
-3. *no stop line*: vehicles never stop for one; they are advised speeds, and a vehicle that cannot
-   keep out of the way drives on;
+3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
 4. *free for a moment is free*: at its release a vehicle is expected to leave after (v_des − v)/a,
-   though the speed is cut to 20 m/s. That is 1.3 s instead of 11 s, for one step, for the vehicles
-   behind it in the list;
+   though the speed is cut to 20 m/s: for one step 1.3 s instead of 11 s, for the vehicles behind
+   it in the list;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
    so vehicles leave at 20 m/s;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
@@ -32,9 +31,9 @@ import shapely
 
 from baselines.v2ic import CRAWL
 from minisim.control import Advise, Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance
+from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
@@ -47,16 +46,12 @@ NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks no vehicle [s]
 
 #: Distance driven at which a vehicle leaves the list [m].
 LEFT = REFERENCE + PLATOON + STOP_LINE
-
 #: Distances driven between which a vehicle registers [m].
 FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
-
 #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
 INSERTION = 0.1
-
 #: Room for rounding where a mark and a distance are compared [m].
 ROUNDING = 1e-9
-
 #: A junction radius at which opposite far turns do not meet, as on the junction of several lanes
 #: that the conflicts were written for [m].
 WIDE = 20.0
@@ -66,16 +61,13 @@ WIDE = 20.0
 class V2ICAsRun:
     """V2I-C as the authors of the paper ran it, for 4 arms; it may collide."""
 
+    name = Name("v2ic-as-run")
+
     approach_speed: float = real(
         "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "
         "vehicle's own) in the others", "m/s",
         above=0, high=100, default=16.6,
     )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `v2ic-as-run:approach_speed=14`."""
-        return spelled("v2ic-as-run", self)
 
     def start(self, site: Site) -> V2ICAsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""
@@ -86,7 +78,7 @@ class V2ICAsRun:
 def right_hand_conflicts() -> tuple[frozenset[int], ...]:
     """For each movement of a wide 4-arm junction with right-hand traffic, those that it meets.
 
-    Movements are numbered as `Intersection.movements` does. Only centre lines count.
+    Movements are numbered as in `Intersection.movements`. Only centre lines count.
     """
     junction = Intersection((0.0, 90.0, 180.0, 270.0), side="right", junction_radius=WIDE)
     ways = [shapely.LineString(path.points) for path in junction.paths]
@@ -101,26 +93,20 @@ def right_hand_conflicts() -> tuple[frozenset[int], ...]:
 
 
 class Platoon(NamedTuple):
-    """What the rules know of one vehicle at one moment.
+    """What the rules know of one vehicle at one moment."""
 
-    Attributes:
-        movement: index of its movement.
-        driven: distance since insertion [m].
-        speed: [m/s].
-        order: sorts vehicles that register in the same step, as the authors' driver spawned them.
-    """
-
-    movement: int
-    driven: float
-    speed: float
-    order: tuple[float, ...] = ()
+    movement: int  #: its index
+    driven: float  #: distance since insertion [m]
+    speed: float  #: [m/s]
+    #: Sorts vehicles that register in the same step, as the authors' driver spawned them.
+    order: tuple[float, ...]
 
 
 class AsRunList:
     """The authors' loop body: the serving list, and the desired speeds that follow from it.
 
     Attributes:
-        order: ids in the serving list, in order of registration.
+        order: ids of the listed vehicles, in order of registration.
         granted: ids of the vehicles that were released ("priority 0").
     """
 
@@ -170,14 +156,11 @@ class AsRunList:
 class V2ICAsRunSession:
     """One run: reads the host's views, and commands what changes.
 
-    Attributes:
-        rules: the authors' loop body.
-        plan: what the host has to provide: a wake-up at insertion, where vehicles register, and
-            where they leave the list; in between at every step while any waits.
+    It is called at insertion, where vehicles register, and where they leave the list; in between
+    at every step while any waits.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
-        instance("site", site, Site)
         junction = site.intersection
         self._rows = junction.movements.rows
         if junction.n != 4:

@@ -6,14 +6,14 @@ from dim.decision import DecisionTable
 from dim.perception import COMMITS, Percept
 from minisim.parameters import declared, part, word
 
-#: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious": a
-#: participant in harmony with all of them (ours); behind a vehicle of its own lane it just follows.
+#: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious" (ours): a
+#: participant in harmony with all of them, except that it just follows those of its own lane.
 GATES = ("clear", "harmonious")
 
 
 @declared
 class Rules:
-    """The public rules: all vehicles hold the same ones, and nothing else in common."""
+    """The public rules: all that the vehicles have in common."""
 
     table: DecisionTable = part("the decision of every case", DecisionTable)
     gate: str = word(
@@ -48,15 +48,15 @@ class Agent:
         - A crossing vehicle keeps going. By the paper's commit rule it also goes when it rolled
           past half of the green zone after losing its right of way ("it is granted the right of
           way by others"). By the stoppable rule such a vehicle is stopping, and waits.
-        - A vehicle that is not yet the first of its lane, or that the gate holds out, does what it
+        - A vehicle that is not yet the first of its lane, or that the gate keeps out, does what it
           did before.
-        - Any other goes exactly if it belongs to the clique. Where it does not know another's
-          intent, it goes exactly if it belongs to the clique of every possible case. So all that go
+        - Any other vehicle goes if and only if it belongs to the clique. Where it does not know
+          another's intent, it must belong to the clique of every possible case. So all that go
           belong to the clique of the true case, however little each of them knows.
 
         Args:
             percept: what it sees.
-            table: for the lane priorities now in force, where these change; by default the rules'.
+            table: for the present lane priorities, where these change; by default the rules'.
         """
         rules = self.rules
         table = rules.table if table is None else table

@@ -1,9 +1,8 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
 The paper describes one algorithm; the runs behind its figures followed another. This module holds
-what these runs did, so that they can be replayed vehicle by vehicle. It holds all of it: no other
-module knows of these rules. What is intended and what is a slip cannot be told from outside, so
-each is a named quirk here:
+all of what those runs did, so that they can be replayed vehicle by vehicle. An outsider cannot tell
+what was intended and what was a slip, so each difference is a quirk with a name:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
    road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
@@ -27,17 +26,16 @@ each is a named quirk here:
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
     error at that vehicle, and nothing is decided in it.
 
-Times, lengths and speeds are those of the authors' driver (see `BOUND`, `RED` and the constants).
-Everything happens at the end of a step and takes effect in the next.
+All numbers are those of the authors' driver. Everything happens at the end of a step and takes
+effect in the next.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
-from itertools import takewhile
-from typing import Any
+from itertools import combinations, takewhile
+from typing import Any, NamedTuple
 
 import networkx as nx
 
@@ -48,8 +46,8 @@ from minisim.errors import InputError, instance
 from minisim.junction.movements import Movement
 from minisim.parameters import checked, declared, part, real, spelled, word
 
-#: Where the rules take the junction to begin, by number of arms: distance driven [m]. The quirky
-#: numbers are the authors' (`JUNC_BOUND` of their three drivers).
+#: Where the junction begins for the rules, by number of arms: distance driven [m]. The numbers are
+#: the authors' (`JUNC_BOUND` of their three drivers).
 BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
 
 #: Length of the red zone before the yellow one, by number of arms [m].
@@ -60,12 +58,12 @@ GREEN = 2.0  #: of the stretch before the bound from which a vehicle goes regard
 FREED = 506.0  #: distance driven at which a place in the action list is given back [m]
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
-#: Distance driven from which on a vehicle is told 20 m/s for good [m]. The authors have no such
-#: limit, but in the three runs where it was looked up no vehicle is told anything after 531 m. A
-#: host need not show us vehicles for longer.
+#: Distance driven at which a vehicle is told 20 m/s for good [m], so that a host need not show it
+#: for longer. The authors have no such limit, but in the three runs that we checked no vehicle is
+#: told anything after 531 m.
 FOLLOWED = 600.0
 
-#: A vehicle stays in view a little longer, so that it is still there when it has passed that [m].
+#: How much longer a vehicle stays in view, so that it is there when it has passed that [m].
 SEEN_BEYOND = 10.0
 
 RED_SPEED = 10.0  #: desired in the red zone [m/s]
@@ -129,25 +127,16 @@ class AsRunDim:
             raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
         if len(self.names) < n:
             raise InputError(f"names must be {n} letters, one an arm, got {self.names!r}")
-        rules = AsRunRules(n, matrix, self.order, self.names, self.exit_speed)
-        return AsRunSession(site, rules)
+        return AsRunSession(site, AsRunRules(self, matrix))
 
 
-@dataclass(frozen=True)
-class Car:
-    """What the rules know of one vehicle at one moment.
-
-    Attributes:
-        id: of the vehicle.
-        name: as in the authors' driver.
-        movement: its movement.
-        driven: distance since insertion [m].
-    """
+class Car(NamedTuple):
+    """What the rules know of one vehicle: its name in the authors' driver, and how far it is."""
 
     id: int
     name: str
     movement: Movement
-    driven: float
+    driven: float  # since insertion [m]
 
 
 class AsRunRules:
@@ -159,23 +148,13 @@ class AsRunRules:
         chosen: ids of the vehicles with the right of way.
     """
 
-    def __init__(
-        self,
-        arms: int,
-        matrix: HarmonyMatrix,
-        order: str,
-        names: str = "abcde",
-        exit_speed: float = EXIT_SPEED,
-    ) -> None:
-        self.arms = arms
-        self.bound = BOUND[arms]
-        self.red_start = self.bound - YELLOW - RED[arms]
+    def __init__(self, dim: AsRunDim, matrix: HarmonyMatrix) -> None:
+        self.arms, self.matrix = matrix.n, matrix
+        self.order, self.names, self.exit_speed = dim.order, dim.names, dim.exit_speed
+        self.bound = BOUND[self.arms]
         self.yellow_start = self.bound - YELLOW
+        self.red_start = self.yellow_start - RED[self.arms]
         self.green_start = self.bound - GREEN
-        self.matrix = matrix
-        self.order = order
-        self.names = names
-        self.exit_speed = exit_speed
         self.serving: list[int] = []
         self.action: list[int] = []
         self.chosen: tuple[int, ...] = ()
@@ -184,7 +163,7 @@ class AsRunRules:
         """Update the lists from what is on the road; the desired speeds that are set now [m/s].
 
         Args:
-            cars: by id, those from the start of the red zone on until they are clear, at least.
+            cars: by id, at least those from the start of the red zone on until they are clear.
         """
         speeds: dict[int, float] = {}
         visited = sorted(cars.values(), key=lambda car: (car.name, car.id))
@@ -198,10 +177,11 @@ class AsRunRules:
             self.chosen = tuple(v for v in self.chosen if v != lost)
             return speeds
         if not busy:
-            self.chosen = self._decide(cars)
-        for vehicle in self.chosen:
-            speeds[vehicle] = GO_SPEED
-        return speeds
+            # Of one movement only the last entry counts.
+            holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
+            clique = winner(self.matrix, frozenset(holder), self.order, self.names)
+            self.chosen = tuple(holder[movement] for movement in clique)
+        return speeds | dict.fromkeys(self.chosen, GO_SPEED)
 
     def _serve(self, visited: list[Car], cars: Mapping[int, Car], speeds: dict[int, float]) -> None:
         """Red zone: slow down, once."""
@@ -212,7 +192,7 @@ class AsRunRules:
         self.serving = [v for v in self.serving if v not in cars or cars[v].driven <= CLEAR]
 
     def _visit(self, visited: list[Car], speeds: dict[int, float]) -> bool:
-        """Yellow zone and beyond, one vehicle after the other; whether the junction is busy."""
+        """Yellow zone and beyond, vehicle by vehicle; whether the junction is busy."""
         busy = False
         for car in visited:
             if self.yellow_start <= car.driven <= self.bound:
@@ -231,19 +211,11 @@ class AsRunRules:
 
     def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
         """Green zone: participants go regardless; whether there is one."""
-        going = [
-            vehicle
-            for vehicle in takewhile(cars.__contains__, self.serving)
-            if vehicle in self.action and cars[vehicle].driven >= self.green_start
-        ]
+        known = takewhile(cars.__contains__, self.serving)
+        there = [v for v in known if cars[v].driven >= self.green_start]
+        going = [v for v in there if v in self.action]
         speeds.update(dict.fromkeys(going, GREEN_SPEED))
         return bool(going)
-
-    def _decide(self, cars: Mapping[int, Car]) -> tuple[int, ...]:
-        """The ids of the winning clique; of one movement only the last entry counts."""
-        holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
-        clique = winner(self.matrix, frozenset(holder), self.order, self.names)
-        return tuple(holder[movement] for movement in clique)
 
 
 @lru_cache(maxsize=100_000)
@@ -253,9 +225,7 @@ def winner(
     """The maximal clique that wins, sorted by name; no two movements of a lane are in harmony."""
     graph: nx.Graph[Movement] = nx.Graph()
     graph.add_nodes_from(movements)
-    graph.add_edges_from(
-        (a, b) for a in movements for b in movements if a < b and matrix.harmony(a, b)
-    )
+    graph.add_edges_from(pair for pair in combinations(movements, 2) if matrix.harmony(*pair))
 
     def named(movement: Movement) -> tuple[str, int]:
         return names[movement.origin], movement.manoeuvre
@@ -268,18 +238,12 @@ def winner(
 
 
 class AsRunSession:
-    """One run: reads the host's views, and commands what changes.
-
-    Attributes:
-        rules: the authors' loop body.
-        plan: what the host has to provide: a wake-up wherever a zone begins or ends.
-    """
+    """One run: reads the host's views, which come where a zone begins or ends."""
 
     def __init__(self, site: Site, rules: AsRunRules) -> None:
-        instance("site", site, Site)
         self.rules = rules
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
-        zones = (rules.red_start, rules.yellow_start, rules.green_start, rules.bound)
+        zones = rules.red_start, rules.yellow_start, rules.green_start, rules.bound
         if rules.red_start > self._origin:
             raise InputError(
                 f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "
@@ -295,9 +259,9 @@ class AsRunSession:
         self._desired: dict[int, float] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
-        """One round of the rules, repeated in the next step until nothing changes any more."""
+        """One round of the rules; another one in the next step, until nothing changes any more."""
         rules = self.rules
-        before = (list(rules.action), rules.chosen)
+        before = [*rules.action], rules.chosen
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
         lost = any(vehicle not in cars for vehicle in rules.serving)
         speeds = rules.step(cars)
@@ -314,9 +278,6 @@ class AsRunSession:
     def _car(self, vehicle: Observed) -> Car:
         second = int(vehicle.demand_time + ROUNDING)
         lane = self.rules.names[vehicle.lane]
-        return Car(
-            id=vehicle.id,
-            name=f"v{second}.{lane}_{vehicle.manoeuvre}",
-            movement=vehicle.movement,
-            driven=self._origin - vehicle.distance + ROUNDING,
-        )
+        name = f"v{second}.{lane}_{vehicle.manoeuvre}"
+        driven = self._origin - vehicle.distance + ROUNDING
+        return Car(vehicle.id, name, vehicle.movement, driven)

@@ -1,27 +1,27 @@
 """DIM as a controller: one agent per vehicle, hosted.
 
-The vehicles of the paper look around all the time. The host calls at a few wake-ups only, and
-these suffice, because between them no agent would change its mind:
+The vehicles of the paper look around all the time. The host calls at a few wake-ups only. These
+suffice, because between them no agent would change its mind:
 
 - A new vehicle takes part when its front bumper passes the start of the yellow zone (a wake-up), or
   when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps every
   vehicle where it is; the gate "harmonious" asks for a wake-up at the entry.
 - A participant begins to cross only when it holds the right of way, since a waiting vehicle can
   stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
-  stays the same. What is left of the best clique is the best clique among the movements in harmony
-  with the one that went: two cliques compare by the smallest lane rank that only one of them has,
-  and a lane that both have does not count.
+  stays the same: without the vehicle that went, the best clique is the best among the movements in
+  harmony with it. Two cliques compare by the smallest lane rank that only one of them has, so a
+  lane that both have does not count.
 - A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
 There are four exceptions:
 
-- Under `commit="paper"` a vehicle without right of way may roll past half of the green zone, where
-  it is granted the right of way. That is another mark.
-- On a host whose brakes differ, a vehicle that loses its right of way may look committed until it
+- Under `commit="paper"` a vehicle without the right of way may roll past half of the green zone and
+  is then granted it. That is another mark.
+- On a host with other brakes, a vehicle that loses its right of way may look committed until it
   stands. The session then looks again every step.
 - Where lane priorities change with time (`dim.priorities`), it looks again when they do.
-- Where perception errs, vehicles do not see the same, and none of the above holds. They look around
-  with a period (`Perception.period`).
+- Where perception errs, vehicles do not see the same, and none of this holds. They look around at
+  intervals (`Perception.period`).
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reade
 from dim.priorities import (
     SENSOR_RANGE,
     TURN_TIME,
+    PassingTimes,
     Ranking,
-    Watch,
     longest_waiting,
     memory_of,
     rotating,
-)
+)  # fmt: skip
 from dim.senses.noise import NoisyPerception
 from dim.senses.tally import Tally
 from dim.zones import Zones
@@ -89,8 +89,8 @@ class Dim:
         GATES, default="clear",
     )  # fmt: skip
     priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = checked(
-        "rank of each lane, 0 first: given, by descending demand, or changing with time (see "
-        "`dim.priorities`); none is the lanes' own order",
+        "rank of each lane, 0 first: given; by descending demand; each lane first in turn; or the "
+        "lane that has waited longest first; none is the lanes' own order",
         _priorities, "ranks | inflow | rotating | waiting", optional=True, default=None,
     )  # fmt: skip
     zones: Zones = part("the road markings", Zones, kinds={"zones": Zones}, default=Zones())
@@ -111,8 +111,8 @@ class Dim:
         default=TURN_TIME, low=1, high=3600,
     )  # fmt: skip
     sensor_range: float = real(
-        "how far vehicles see the others' approach lanes and yellow zones; what \"waiting\" may "
-        "remember depends on it", "m",
+        "how far vehicles see the others' approach lanes and yellow zones, which limits the waits "
+        'that "waiting" compares', "m",
         default=SENSOR_RANGE, low=1, high=1000,
     )  # fmt: skip
     monitor: Monitor | None = part(
@@ -139,7 +139,7 @@ class Dim:
         return DimSession(self, site)
 
     def ranks(self, site: Site) -> tuple[int, ...]:
-        """Rank of each lane at this site and time 0, 0 first; raises `InputError` for another n."""
+        """Rank of each lane here at time 0, 0 first; raises `InputError` for another n."""
         n = site.intersection.n
         if self.priorities == "inflow":
             by_inflow = sorted(range(n), key=lambda lane: (-site.demand[lane], lane))
@@ -164,16 +164,14 @@ class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
     Attributes:
-        rules: the rules that all agents hold.
-        reader: how they read what they see.
-        see: what each of them sees.
+        rules, reader, see: which all agents share.
         plan: what the host has to provide.
 
     Args:
         dim: the recipe.
         site: where it runs.
         follows: whether the vehicle with an id follows DIM; others are seen, but have no agent.
-        truth: what vehicles would see of a view without an error, for the tally of errors.
+        takes: how vehicles take what they have seen of a true view: (true, seen) -> taken.
     """
 
     def __init__(
@@ -181,9 +179,8 @@ class DimSession:
         dim: Dim,
         site: Site,
         follows: Callable[[int], bool] = lambda _: True,
-        truth: Callable[[View], View] = lambda view: view,
+        takes: Callable[[View, View], View] | None = None,
     ) -> None:
-        instance("dim", dim, Dim)
         instance("site", site, Site)
         zones = dim.zones
         zones.check(site)
@@ -204,22 +201,23 @@ class DimSession:
         )
         self._start = zones.yellow_start + ROUNDING
         self._ranks = _ranking(dim, site)
-        self.see = dim.perception.start(site)
-        self._watch = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
+        see = dim.perception.start(site)
+        self.see = see if takes is None else lambda view, ego: takes(view, see(view, ego))
+        self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt = site.dt
         self._follows = follows
         self._agents: dict[int, Agent] = {}
-        self._truth = truth
+        self._takes = takes
         errs = dim.perception.period is not None
         self._tally = Tally(self.rules, self.reader, self._start) if errs else None
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What its wrong perception did so far (`dim.senses.tally`); empty where it is exact."""
+        """What wrong perception has done so far (`dim.senses.tally`); empty where it is exact."""
         return {} if self._tally is None else self._tally.counts
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Let every vehicle from the yellow zone on perceive and decide; report what changed."""
+        """Let every vehicle from the yellow zone on look and decide; command what changes."""
         commands: list[Command] = []
         agents: dict[int, Agent] = {}  # those that left the view are forgotten
         look_again = waiting = False
@@ -237,8 +235,8 @@ class DimSession:
                 seen, percept = sight, self.reader.read(sight)
             had = agent.right_of_way
             goes = agent.decide(percept, table)
-            if self._watch is not None:
-                goes = self._watch.goes(view, sight, ego, goes, table.priorities)
+            if self._monitors is not None:
+                goes = self._monitors.patience.goes(view, sight, ego, goes, table.priorities)
                 agent.right_of_way = goes
             if goes != had:
                 commands.append(Go(vehicle) if goes else Hold(vehicle))
@@ -246,12 +244,13 @@ class DimSession:
                 look_again |= vehicle in percept.crossing
                 waiting |= vehicle in percept.participants
         self._agents = agents
-        if self._watch is not None:
-            going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
-            commands += self._watch.look(view, sights, going)
-            look_again |= self._watch.needed
+        going = {vehicle for vehicle, agent in agents.items() if agent.right_of_way}
+        if self._monitors is not None:
+            commands += self._monitors.look(view, sights, going)
+            look_again |= self._monitors.needed
         if self._tally is not None:
-            self._tally.count(self._truth(view), sights, table, commands)
+            true = view if self._takes is None else self._takes(view, view)
+            self._tally.count(true, sights, table, going)
         if look_again:
             commands.append(Wake(view.time + self._dt))
         elif waiting and until < math.inf:
@@ -259,26 +258,23 @@ class DimSession:
         return commands
 
     def table(self, view: View) -> tuple[DecisionTable, float]:
-        """The table of the ranks now in force, and until when they hold [s]."""
-        if self._ranks is None:
-            return self.rules.table, math.inf
-        ranks, until = self._ranks(view)
+        """The table of the present ranks, and until when they hold [s]."""
         base = self.rules.table
+        if self._ranks is None:
+            return base, math.inf
+        ranks, until = self._ranks(view)
         return decision_table(base.matrix, base.order, ranks), until
 
 
 def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
-    """How the ranks of this run follow from a view, or None where they never change.
-
-    All participants know the same ranks, so a session works them out once for all.
-    """
+    """The ranks that all participants read from a view, or None where they never change."""
     n = site.intersection.n
     if dim.priorities == "rotating":
         return lambda view: rotating(view.time, n, dim.turn_time)
     if dim.priorities == "waiting":
         memory = memory_of(site, dim.zones, dim.sensor_range)
-        watch = Watch(dim.zones.yellow_start + ROUNDING)
+        passing = PassingTimes(dim.zones.yellow_start + ROUNDING)
         return lambda view: longest_waiting(
-            view.time, n, watch.look(view.time, view.vehicles), memory, dim.turn_time
+            view.time, n, passing.look(view.time, view.vehicles), memory, dim.turn_time
         )
     return None

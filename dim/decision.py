@@ -1,9 +1,9 @@
 """Which vehicles cross: one right of way from the participants' movements, the same for all.
 
 The participants are the nodes of a graph, with an edge where two movements are in harmony; a
-clique of it can cross at once (paper, "Decentralized Intersection Management"). Which of several
-cliques goes is decided by a total order of our own: the order in which a graph library lists
-cliques is arbitrary, and vehicles that decide alone must agree.
+clique of it can cross at once (paper, "Decentralized Intersection Management"). A total order of
+our own chooses among several cliques: vehicles that decide alone must agree, and a graph library
+lists cliques in an arbitrary order.
 """
 
 from __future__ import annotations
@@ -76,23 +76,14 @@ def decide(
 
 @dataclass(frozen=True)
 class Explanation:
-    """A decision and how it came about, for teaching.
+    """A decision and how it came about, for teaching."""
 
-    Attributes:
-        participants: movements of the participants, by lane.
-        edges: pairs of them in harmony.
-        cliques: all maximal cliques, in the order of preference: the first has the right of way.
-        tied: the cliques of the largest size, in the same order.
-        right_of_way: the chosen clique.
-        reason: why, in one sentence.
-    """
-
-    participants: Movements
-    edges: tuple[tuple[Movement, Movement], ...]
-    cliques: tuple[Movements, ...]
-    tied: tuple[Movements, ...]
-    right_of_way: Movements
-    reason: str
+    participants: Movements  # by lane
+    edges: tuple[tuple[Movement, Movement], ...]  # pairs in harmony
+    cliques: tuple[Movements, ...]  # all maximal ones, the preferred first
+    tied: tuple[Movements, ...]  # those of the largest size, in the same order
+    right_of_way: Movements  # the first of `cliques`
+    reason: str  # in one sentence
 
 
 def explain(
@@ -136,14 +127,13 @@ class DecisionTable:
 
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.
-        lanes: case -> lanes with the right of way (no check: for agents, which build cases
-            from what they see).
-        admitted: (case, crossing) -> the case without the participants that are in conflict with
-            one of the movements `crossing`, an integer with bit k set for the k-th movement.
-            Movements of one lane follow each other and are not in conflict.
-        surely: (case, unknown, crossing) -> lanes with the right of way whatever manoeuvre the
-            participants of the lanes `unknown` (bit i for lane i) take, which are missing in the
-            case, among those that `crossing` admits.
+        lanes: case -> lanes with the right of way; the case is not checked.
+        admitted: (case, crossing) -> the case without the participants in conflict with one of the
+            movements `crossing`, an integer with bit k set for the k-th movement. Movements of one
+            lane follow each other and are not in conflict.
+        surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those with the
+            right of way whatever the participants of the lanes `unknown` (bit i for lane i) do,
+            which the case leaves out.
 
     Raises:
         InputError: unknown order, or priorities that are no permutation of the lanes.
@@ -237,13 +227,13 @@ def _participants(movements: Iterable[Movement | str], matrix: HarmonyMatrix) ->
     """The movements by lane, checked."""
     instance("matrix", matrix, HarmonyMatrix)
     given = items("participants", movements, "movements such as a1, b2")
-    found = sorted(matrix.movements[matrix.index(m)] for m in given)
-    for one, other in pairwise(found):
+    participants = sorted(matrix.movements[matrix.index(m)] for m in given)
+    for one, other in pairwise(participants):
         if one.origin == other.origin:
             raise InputError(
                 f"one participant a lane: lane {ARM_NAMES[one.origin]} has {one} and {other}"
             )
-    return tuple(found)
+    return tuple(participants)
 
 
 def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
@@ -278,20 +268,20 @@ def _reason(
     ranks: tuple[int, ...],
 ) -> str:
     chosen, n = cliques[0], len(ranks)
-    who = " ".join(map(str, chosen))
+    names = " ".join(map(str, chosen))
     lanes = " ".join(ARM_NAMES[lane] for lane in sorted(range(n), key=ranks.__getitem__))
     if len(participants) == 1:
-        return f"{who} is alone."
+        return f"{names} is alone."
     if len(cliques) == 1:
-        return f"{who} are all in harmony."
+        return f"{names} are all in harmony."
     if order == "lanes":
         return (
-            f"{who} holds the highest-priority lanes of all {len(cliques)} maximal cliques "
+            f"{names} holds the highest-priority lanes of all {len(cliques)} maximal cliques "
             f"(priority {lanes}), whatever their size."
         )
     if len(tied) == 1:
-        return f"{who} is the only clique of {len(chosen)}, the largest size."
+        return f"{names} is the only clique of {len(chosen)}, the largest size."
     return (
         f"{len(tied)} cliques tie at the largest size, {len(chosen)}; "
-        f"{who} holds the highest-priority lanes of them (priority {lanes})."
+        f"{names} holds the highest-priority lanes of them (priority {lanes})."
     )

@@ -1,7 +1,7 @@
 """Which movements can be driven at once: the paper's harmony matrix.
 
-From the geometry (two movements are in harmony when the corridors that their bodies sweep keep a
-clearance), from a file, or as the paper prints it.
+A matrix comes from the geometry (two movements are in harmony when the corridors that their bodies
+sweep keep a clearance), from a file, or from the paper.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, show
+from minisim.files import write_text
 from minisim.junction.conflicts import CLEARANCE, conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
@@ -110,15 +111,7 @@ class HarmonyMatrix:
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the matrix, whole or not at all; raises `FileError` where that is impossible."""
         instance("path of a harmony matrix", path, (str, os.PathLike))
-        target = Path(path)
-        part = target.parent / f".{target.name}.{os.getpid()}.part"
-        try:
-            part.write_text(self.to_text(), encoding="utf-8")
-            part.replace(target)
-        except (OSError, ValueError) as error:
-            raise FileError(f"cannot write harmony matrix {path!s}: {_reason(error)}") from None
-        finally:
-            _remove(part)
+        write_text(path, self.to_text())
 
     @property
     def movements(self) -> Movements:
@@ -164,12 +157,12 @@ class HarmonyMatrix:
 
     @property
     def spelling(self) -> str:
-        """What command lines and names of controllers call it; empty for all but the paper's."""
+        """Its name on command lines and in names of controllers; only the paper's have one."""
         paper = self.n in PAPER_ARMS and self == HarmonyMatrix.paper(self.n)
         return f"paper({self.n})" if paper else ""
 
     def __repr__(self) -> str:
-        # The digest tells matrices apart wherever a controller's repr is kept as provenance.
+        # A controller's repr is kept as provenance; the digest tells its matrices apart.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
         return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
@@ -241,7 +234,7 @@ def _parse(data: bytes, where: str) -> HarmonyMatrix:
 
 
 def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
-    """The lines that hold cells, each with its number; all as long as the first."""
+    """The lines with cells, each with its number; all as long as the first."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -285,10 +278,3 @@ def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> l
 
 def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
-
-
-def _remove(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except (OSError, ValueError):
-        return  # it was never created, and the reason has been reported

@@ -1,43 +1,42 @@
-"""The safety monitor: each vehicle's last resort when others do not do what it reads them to want.
+"""The safety monitor: a vehicle's last resort when others do not do what it reads them to want.
 
 The decision protects vehicles that read the others' intents right. A monitor does not decide. It
 belongs to one vehicle, uses what that vehicle sees, and watches the others that cross or can no
 longer stop:
 
-- *What another may do* is what it was read to want, as long as its motion does not contradict
-  that. Two kinds of vehicles may do whatever their position on the fan of their lane's paths still
-  allows: one beside every path that it could be on by that reading, and one that was read
-  differently at different times.
-- *Where it matters* is the forbidden region of the two paths (`minisim.junction.coordination`). The
-  ego has to be able to stop before it, however far the other goes, unless it is out of it in good
+- *What another may do*: what it was read to want, as long as its motion does not contradict that.
+  A vehicle may do whatever its position still allows if it is beside every path of that reading, or
+  if it was read differently at different times.
+- *Where it matters*: in the forbidden region of the two paths (`minisim.junction.coordination`).
+  The ego must be able to stop before it, however far the other goes, unless it leaves it in good
   time.
 - *When it brakes*: as soon as this takes at least comfortable braking, and as hard as it takes.
   Where it is too late to stop, the monitor compares whether going on or braking makes the two
   touch.
 
-Vehicles that cross by unanimous decisions are in harmony with each other (the protocol's proof, see
-`dim.proofs.protocol`). So with exact perception and `commit="stoppable"`, no vehicle is ever in
-another's way as far as a monitor can tell. It never brakes, and a run is the same as without it.
+Vehicles that cross by unanimous decisions are in harmony with each other (proved in
+`dim.proofs.protocol`). So with exact perception and `commit="stoppable"` a monitor never sees
+another vehicle in the way. It never brakes, and a run is the same as without it.
 
 Two vehicles that brake for each other must not stand for ever. Of two that stand, the one further
 in goes first, and of equals the one of the first lane, unless the other stands in its way. Both can
 see that.
 
-Vehicles that wait for each other must not do so for ever either: where they read each other
-differently, each may conclude that it is not its turn. There is always a right of way. So where no
-vehicle crosses and all have been standing for a while, some have misread. Then the first lane goes
-alone, for which no intent needs to be known.
+Vehicles that do not cross must not wait for each other for ever either. Where they read each other
+differently, each may conclude that it is not its turn. But there is always a right of way. So where
+no vehicle crosses and all have stood for a while, some have misread. Then the first lane goes
+alone, since that needs no intent (`Patience`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
-from dim.perception import UNKNOWN
+from dim.perception import STANDING, UNKNOWN
 from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
 from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
@@ -52,19 +51,15 @@ TIME_MARGIN = 1.0
 #: requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv 1906.01061).
 TOLERANCE = 0.3
 
-#: How far ahead motion is predicted where it is too late to stop clear of the area [s]: longer than
+#: How far ahead motion is predicted where it is too late to stop before the area [s]: longer than
 #: a vehicle at 20 km/h takes through the junction.
 LOOK_AHEAD = 4.0
-
-#: A slower vehicle stands [m/s]; SUMO's definition of waiting.
-STANDING = 0.1
 
 #: What a vehicle that stops leaves between itself and where it must not be [m].
 ROOM = 0.25
 
-
-#: How long all participants stand before the first of them goes alone [s]: what an all-way stop
-#: takes between two vehicles at most, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
+#: How long all participants stand before the first of them goes alone [s]: the longest time between
+#: two vehicles at an all-way stop, 1 … 2 s in SUMO's recommendations (`jmAllwayStopWait`).
 PATIENCE = 2.0
 
 
@@ -93,29 +88,22 @@ class Monitor:
         default=PATIENCE, low=0.5, high=60,
     )  # fmt: skip
 
-    def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Watch:
-        """Begin a run.
-
-        Args:
-            site: where.
-            matrix: which movements are in harmony.
-            sight: from where on before the junction vehicles take part [m].
-        """
-        return Watch(self, site, matrix, sight)
+    def start(self, site: Site, matrix: HarmonyMatrix, sight: float) -> Monitors:
+        """Begin a run; vehicles take part from `sight` [m] before the junction on."""
+        return Monitors(self, site, matrix, sight)
 
 
-class Watch:
+class Monitors:
     """The monitors of all vehicles in one run; each uses what its own vehicle sees.
 
     Attributes:
+        patience: of vehicles that wait for each other.
         needed: whether a vehicle might get in another's way before the next wake-up.
     """
 
     def __init__(self, monitor: Monitor, site: Site, matrix: HarmonyMatrix, sight: float) -> None:
+        self.patience = Patience(monitor.patience, sight, site.vehicle.deceleration)
         self.needed = False
-        self._sight, self._patience = sight, monitor.patience
-        self._since: dict[int, float] = {}
-        self._alone: set[int] = set()
         self._margin = monitor.time_margin
         self._site, self._rows = site, site.intersection.movements.rows
         self._conflict = ~matrix.values
@@ -129,41 +117,6 @@ class Watch:
         self._readings: dict[tuple[int, int], set[int]] = {}
         self._braking: dict[int, float] = {}
 
-    def goes(
-        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
-    ) -> bool:
-        """Whether a vehicle goes, either as it decided, or alone where all stand and wait.
-
-        Args:
-            view: the true one; only positions and speeds of the others are taken from it.
-            seen: what the ego sees.
-            decided: whether it goes by its own decision.
-            ranks: of the lanes, 0 first.
-        """
-        alone = ego.id in self._alone
-        if not alone and (decided or ego.speed >= STANDING):
-            self._since.pop(ego.id, None)
-            return decided
-        ids = {v.id for v in seen.vehicles}
-        near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
-        free = not any(self._crosses(v) for v in near if v.id != ego.id)
-        if alone:
-            if free or self._crosses(ego):
-                return True
-            self._alone.discard(ego.id)
-            return False
-        fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
-        stuck = free and all(v.speed < STANDING for v in fronts.values())
-        if not stuck or fronts.get(ego.lane) != ego:
-            self._since.pop(ego.id, None)
-            return False
-        since = self._since.setdefault(ego.id, view.time)
-        if view.time < since + self._patience or min(fronts, key=ranks.__getitem__) != ego.lane:
-            return False
-        del self._since[ego.id]
-        self._alone.add(ego.id)
-        return True
-
     def look(self, view: View, seen: Mapping[int, View], going: set[int]) -> Iterator[Command]:
         """Which vehicles have to brake, and how hard.
 
@@ -172,46 +125,33 @@ class Watch:
             seen: what each deciding vehicle sees, by its id.
             going: ids of the vehicles with the right of way.
         """
-        crossing = [v for v in view.vehicles if self._crosses(v)]
-        inside = {v.id for v in crossing}
-        egos = [v for v in view.vehicles if v.id in seen and (v.id in going or v.id in inside)]
-        here = seen.keys()
-        self._alone &= here
-        self._since = {vehicle: since for vehicle, since in self._since.items() if vehicle in here}
-        self.needed = (
-            bool(self._since) or len({v.lane for v in crossing} | {v.lane for v in egos}) > 1
-        )
-        readings = self._readings
-        self._readings = {}
+        crossing = [v for v in view.vehicles if _crosses(v, self._b)]
+        going = going | {v.id for v in crossing}
+        egos = [v for v in view.vehicles if v.id in seen and v.id in going]
+        waiting = self.patience.remember(seen.keys())
+        self.needed = waiting or len({v.lane for v in (*crossing, *egos)}) > 1
+        before, self._readings = self._readings, {}
         braking: dict[int, float] = {}
         for ego in egos:
             read = {v.id: v.manoeuvre for v in seen[ego.id].vehicles}
-            asked = 0.0
             for other in crossing:
                 if other.lane == ego.lane or other.id not in read:
                     continue
                 key = ego.id, other.id
-                known = readings.get(key, set()) | {read[other.id]}
-                self._readings[key] = known
-                asked = max(asked, self._asked(ego, other, known))
-            if asked > 0.0:
-                braking[ego.id] = asked
-        for ego in view.vehicles:
-            if braking.get(ego.id, 0.0) != self._braking.get(ego.id, 0.0):
-                yield Brake(ego.id, braking.get(ego.id, 0.0))
+                readings = self._readings[key] = before.get(key, set()) | {read[other.id]}
+                asked = self._asked(ego, other, readings)
+                braking[ego.id] = max(braking.get(ego.id, 0.0), asked)
+        for vehicle, *_ in view.vehicles:
+            asked = braking.get(vehicle, 0.0)
+            if asked != self._braking.get(vehicle, 0.0):
+                yield Brake(vehicle, asked)
         self._braking = braking
-
-    def _crosses(self, vehicle: Observed) -> bool:
-        return vehicle.distance < 0.0 or not can_stop(vehicle, self._b)
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
         """How hard the ego must brake for another, whatever that one does [m/s²]; or 0."""
         mine = self._rows[ego.lane][ego.manoeuvre]
-        asked = 0.0
-        for theirs in self._possible(other, readings):
-            if self._conflict[mine, theirs]:
-                asked = max(asked, self._asked_by(ego, mine, other, theirs))
-        return asked
+        foes = (k for k in self._possible(other, readings) if self._conflict[mine, k])
+        return max((self._asked_by(ego, mine, other, theirs) for theirs in foes), default=0.0)
 
     def _possible(self, other: Observed, readings: set[int]) -> list[int]:
         """The movements that another may take, by index."""
@@ -233,7 +173,7 @@ class Watch:
         room = shared.room(x, y)
         if room == math.inf:
             return 0.0
-        first = _goes_first(ego, other)
+        first = (ego.distance, ego.lane) < (other.distance, other.lane)
         if other.speed < STANDING and self._open(mine, x, other):
             stuck = not self._open(theirs, y, ego)  # the other, as long as the ego stands
             if first or stuck:
@@ -270,11 +210,8 @@ class Watch:
             return 0.0
         if room > 0.0 and v * v <= 2.0 * self._b_max * room:
             return max(self._gentle, v * v / (2.0 * room))
-        if self._touches(ego, -self._b_max, other, shared) and not self._touches(
-            ego, a, other, shared
-        ):
-            return 0.0
-        return self._b_max
+        brakes = self._touches(ego, -self._b_max, other, shared)
+        return 0.0 if brakes and not self._touches(ego, a, other, shared) else self._b_max
 
     def _touches(self, ego: Observed, acceleration: float, other: Observed, shared: Region) -> bool:
         """Whether the two come too near while the other goes on as it does."""
@@ -285,5 +222,62 @@ class Watch:
         return shared.touches(mine - ego.distance, other.speed * t - other.distance)
 
 
-def _goes_first(one: Observed, other: Observed) -> bool:
-    return (one.distance, one.lane) < (other.distance, other.lane)
+class Patience:
+    """How vehicles that all stand and wait for each other come to an end.
+
+    Args:
+        time: how long all participants stand before the first of them goes alone [s].
+        sight: from where on before the junction vehicles take part [m].
+        deceleration: comfortable braking [m/s²].
+    """
+
+    def __init__(self, time: float, sight: float, deceleration: float) -> None:
+        self._time, self._sight, self._deceleration = time, sight, deceleration
+        self._since: dict[int, float] = {}
+        self._alone: set[int] = set()
+
+    def goes(
+        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
+    ) -> bool:
+        """Whether a vehicle goes, either as it decided, or alone where all stand and wait.
+
+        Args:
+            view: the true one; only positions and speeds of the others are taken from it.
+            seen: what the ego sees.
+            ego: the vehicle.
+            decided: whether it goes by its own decision.
+            ranks: of the lanes, 0 first.
+        """
+        alone = ego.id in self._alone
+        if not alone and (decided or ego.speed >= STANDING):
+            self._since.pop(ego.id, None)
+            return decided
+        ids = {v.id for v in seen.vehicles}
+        near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
+        free = not any(_crosses(v, self._deceleration) for v in near if v.id != ego.id)
+        if alone:
+            if free or _crosses(ego, self._deceleration):
+                return True
+            self._alone.discard(ego.id)
+            return False
+        fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
+        stuck = free and all(v.speed < STANDING for v in fronts.values())
+        if not stuck or fronts.get(ego.lane) != ego:
+            self._since.pop(ego.id, None)
+            return False
+        since = self._since.setdefault(ego.id, view.time)
+        if view.time < since + self._time or min(fronts, key=ranks.__getitem__) != ego.lane:
+            return False
+        del self._since[ego.id]
+        self._alone.add(ego.id)
+        return True
+
+    def remember(self, here: Collection[int]) -> bool:
+        """Forget all vehicles but these; whether any of them is waiting."""
+        self._alone.intersection_update(here)
+        self._since = {vehicle: since for vehicle, since in self._since.items() if vehicle in here}
+        return bool(self._since)
+
+
+def _crosses(vehicle: Observed, deceleration: float) -> bool:
+    return vehicle.distance < 0.0 or not can_stop(vehicle, deceleration)

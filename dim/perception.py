@@ -1,8 +1,8 @@
-"""What one vehicle sees of the others, and how it reads that.
+"""What one vehicle, the ego, sees of the others, and how it reads that.
 
-Seeing and reading are apart. A `Perception` says what an ego sees of the true view: everything
-(`ExactPerception`), or less, later, or wrong (`dim.senses.noise`). `Reader` turns what was seen
-into the few facts that Algorithm 1 needs, the same way for every vehicle.
+A `Perception` says what an ego sees of the true view: everything (`ExactPerception`), or less,
+later, or wrong (`dim.senses.noise`). A `Reader` then picks out the few facts that Algorithm 1
+needs, the same way for every vehicle.
 """
 
 from __future__ import annotations
@@ -13,19 +13,22 @@ from typing import NamedTuple, Protocol, runtime_checkable
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
 from minisim.junction.movements import movements_of
-from minisim.parameters import declared, part, real, whole, word
+from minisim.parameters import declared
 
-#: When a vehicle before the junction is committed. "stoppable": it can no longer stop before the
-#: junction by comfortable braking. "paper": it is past half of the green zone.
+#: When a vehicle before the junction is committed. "stoppable": when comfortable braking no longer
+#: stops it before the junction. "paper": when it is past half of the green zone.
 COMMITS = ("stoppable", "paper")
 
-#: A host may report a front bumper that has just passed a mark a rounding error before it [m].
+#: A host's rounding error [m]: a front bumper that has just passed a mark may seem to be before it.
 ROUNDING = 1e-6
 
-#: The manoeuvre of a vehicle whose intent the ego does not know, in what it sees: it may take any.
+#: A slower vehicle stands [m/s]: SUMO's limit of waiting.
+STANDING = 0.1
+
+#: The manoeuvre that an ego sees where it does not know the intent: it may be any.
 UNKNOWN = 0
 
-#: What an ego sees of a view: again a view, ordered as every view is. It sees itself exactly.
+#: Turns a view and an ego of it into the view that the ego sees. It sees itself exactly.
 See = Callable[[View, Observed], View]
 
 
@@ -35,26 +38,25 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None where what they see changes at wake-ups only.
+        """How often vehicles must look [s]; None where the wake-ups of DIM suffice.
 
-        DIM's few wake-ups suffice as long as all vehicles see the same (`dim.controller`). Where
-        what one sees may change by itself, vehicles have to look again and again.
+        They do as long as all vehicles see the same (`dim.controller`).
         """
 
     def start(self, site: Site) -> See:
-        """Begin a run: random streams and memory, if there are any, belong to the result."""
+        """Begin a run; its random numbers and its memory belong to the result."""
 
 
 @declared
 class ExactPerception:
-    """Every vehicle sees everything, at once and as it is: the paper's assumption."""
+    """Every vehicle sees everything at once and as it is, as the paper assumes."""
 
     @property
     def period(self) -> None:
         """None: the wake-ups suffice."""
 
     def start(self, site: Site) -> See:  # noqa: ARG002  (Perception's argument)
-        """The view itself, which a session reads once for all vehicles."""
+        """Begin a run."""
         return see_all
 
 
@@ -67,16 +69,15 @@ class Percept(NamedTuple):
     """What Algorithm 1 needs to know of a view.
 
     Attributes:
-        participants: ids of the vehicles that take part, by lane: the front vehicle of each lane,
-            if its front bumper is between the start of the yellow zone and the junction and
-            it is not committed. While it is committed, no vehicle of its lane takes part.
-        crossing: ids of the vehicles that are crossing: committed, or any part of the body in
-            the junction.
+        participants: ids of the vehicles that take part, by lane. The front vehicle of a lane does
+            between the start of the yellow zone and the junction, until it is committed. While it
+            is committed, no vehicle of its lane takes part.
+        crossing: ids of the vehicles that are committed, or have any part of the body in the
+            junction.
         case: the participants' movements as an integer, see `DecisionTable`.
-        occupied: the crossing vehicles' movements, an integer with bit k for the k-th movement;
-            all of its lane where the intent is `UNKNOWN`.
-        unknown: lanes whose participant's intent is `UNKNOWN`, an integer with bit i for lane i;
-            the case is without them.
+        occupied: the crossing vehicles' movements, bit k for the k-th movement; all movements of
+            the lane where the intent is `UNKNOWN`.
+        unknown: lanes of participants with `UNKNOWN` intent, bit i for lane i; not in the case.
     """
 
     participants: tuple[int, ...]
@@ -86,23 +87,19 @@ class Percept(NamedTuple):
     unknown: int = 0
 
 
-@declared
-class Reader:
-    """How a view is read, by public rules that every vehicle shares."""
+class Reader(NamedTuple):
+    """The public rules by which every vehicle reads a view; `commit` is one of `COMMITS`."""
 
-    n: int = whole("number of arms", low=3, high=12, label="number of arms")
-    zones: Zones = part("the road markings", Zones)
-    deceleration: float = real("the vehicles' comfortable braking", "m/s²", above=0)
-    commit: str = word(
-        "when a vehicle is committed, see `COMMITS`", COMMITS, default="stoppable",
-        label="commit rule",
-    )  # fmt: skip
+    n: int  # arms
+    zones: Zones
+    deceleration: float  # comfortable braking [m/s²]
+    commit: str
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        A vehicle that brakes comfortably for the hold line never is: the green zone is longer
-        than the margin of `can_stop`.
+        A vehicle that brakes comfortably for the hold line never is, since the green zone is
+        longer than the margin of `can_stop`.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0

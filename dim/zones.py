@@ -13,9 +13,9 @@ KMH = 1.0 / 3.6
 class Zones:
     """Red, yellow and green zone, in this order towards the junction (paper, same section).
 
-    A vehicle slows down in the red zone. It takes part in decisions from the start of the yellow
-    zone and waits for its right of way at the hold line, the end of the yellow zone. The green
-    zone is the buffer in which a vehicle that loses its right of way still stops.
+    A vehicle slows down in the red zone. From the start of the yellow zone it takes part in
+    decisions. At the end of the yellow zone, the hold line, it waits for its right of way. The
+    green zone is a buffer: a vehicle that loses its right of way still stops in it.
     """
 
     red: float = real(
@@ -51,27 +51,26 @@ class Zones:
         return self.green + self.yellow + self.red
 
     def markings(self, site: Site) -> tuple[Marking, ...]:
-        """What is painted on every approach lane, from the far end to the junction.
+        """The markings of every approach lane, from the far end to the junction.
 
-        A vehicle of the paper enters the red zone and *then* slows down, while a host slows ahead
-        of the stretch on which a limit holds. So the limit holds from where comfortable braking
-        that begins at the start of the red zone has reached it: (v² − v_red²) / 2b further on,
-        23.1 m for the paper's 40 to 20 km/h at 2 m/s². Up to there the red zone is painted
-        without a limit. A red zone too short for that is where braking ends, not where it
-        begins: the limit holds in the yellow zone in any case.
+        In the paper a vehicle enters the red zone and *then* slows down. A host slows it ahead of
+        a limit. So the limit begins where comfortable braking from the start of the red zone has
+        reached it: after (v² − v_red²) / 2b, 23.1 m for the paper's 40 to 20 km/h at 2 m/s². The
+        red zone before that has no limit. In a red zone too short for this, vehicles begin to
+        brake before it: the limit holds in the yellow zone in any case.
         """
         b = site.vehicle.deceleration
         braking = stopping_distance(site.speed_limit, b) - stopping_distance(self.red_speed, b)
         slowed = min(max(self.red_start - braking, self.yellow_start), self.red_start)
         stretches = (
-            Marking("red", self.red_start, slowed) if self.red_start > slowed else None,
-            Marking("red", slowed, self.yellow_start, self.red_speed)
-            if slowed > self.yellow_start
-            else None,
-            Marking("yellow", self.yellow_start, self.green, self.red_speed),
-            Marking("green", self.green, 0.0, self.red_speed),
+            ("red", self.red_start, slowed, None),
+            ("red", slowed, self.yellow_start, self.red_speed),
+            ("yellow", self.yellow_start, self.green, self.red_speed),
+            ("green", self.green, 0.0, self.red_speed),
         )
-        return tuple(marking for marking in stretches if marking is not None)
+        return tuple(
+            Marking(name, start, end, speed) for name, start, end, speed in stretches if start > end
+        )
 
     def check(self, site: Site) -> None:
         """Raise `InputError` where a vehicle could be inserted past the start of the zones."""

@@ -14,18 +14,16 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Floats
 from minisim.results.trajectories import LANE, MANOEUVRE, TIME, VEHICLE, S
 from scenarios.crossval import Result
-from scenarios.crossval.comparison import times
+from scenarios.crossval.comparison import JUDGED, Parting, times
 
 if TYPE_CHECKING:
     import pandas as pd
 
-METRICS: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
-
-#: Each source: told apart without colour too.
+#: The sources can be told apart without colour, too.
 MINISIM = style.Look("minisim", style.BLUE, "o", "-")
 SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
 PUBLISHED = style.Look("published", style.BLACK, "D", ":")
-#: Lines are drawn so far apart that their interval bars do not cover each other [veh/h/lane].
+#: The lines are this far apart, so that their interval bars do not cover each other [veh/h/lane].
 DODGE: Final = 2.5
 
 #: What a trajectory figure shows: around the parting [s], and around the junction entry [m].
@@ -36,45 +34,35 @@ SHOWN_FROM, SHOWN_TO = -90.0, 40.0
 TAIL: Final = 0.995
 
 
-def group_of(result: Result) -> tuple[str, str, str]:
-    """What is drawn together: all densities of a junction, split and controller."""
-    return result.case.scenario.name, result.case.split, result.case.controller
-
-
 def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figure]]:
-    """Every figure of a comparison: name of its file, caption, and the figure itself."""
-    groups: dict[tuple[str, str, str], list[Result]] = {}
+    """Every figure of a comparison: name of its file, caption, and the figure itself.
+
+    All densities of a junction, split and controller are drawn together.
+    """
+    groups: dict[tuple[str, ...], list[Result]] = {}
     for result in results:
         if result.rows:
-            groups.setdefault(group_of(result), []).append(result)
+            groups.setdefault(_group(result), []).append(result)
     for group, members in groups.items():
         ordered = sorted(members, key=lambda result: result.case.density)
         title = ", ".join(group)
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
-        drawable = [result for result in ordered if any(len(ours) for ours, _ in _both(result))]
+        drawable = [result for result in ordered if _travel_times(result).size]
         if drawable:  # in a short run it may be that no vehicle has arrived
             yield _file("trips", *group), f"{title}: every trip", trips_figure(drawable)
     for result in results:
-        if result.film is not None and result.film.parting is not None:
-            name = result.case.name
-            yield (
-                _file("parting", *name.split()),
-                f"{name}: where the hosts part",
-                parting_figure(result),
-            )
+        if result.parting is not None:
+            name, figure = result.case.name, parting_figure(result, result.parting)
+            yield _file("parting", name), f"{name}: where the hosts part", figure
 
 
 def means_figure(results: Sequence[Result]) -> Figure:
-    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's.
-
-    Args:
-        results: of one junction, split and controller, by density.
-    """
+    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's."""
     figure = style.new_figure(8.6, 4.0)
-    panels = figure.subplots(1, len(METRICS))
+    panels = figure.subplots(1, len(JUDGED))
     figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
-    for axes, (metric, name) in zip(panels, METRICS.items(), strict=True):
+    for axes, (metric, name) in zip(panels, JUDGED.items(), strict=True):
         densities = [result.case.density for result in results]
         for look, host, aside in ((MINISIM, "minisim", -DODGE / 2), (SUMO, "sumo", DODGE / 2)):
             intervals = [getattr(result.row(metric), host) for result in results]
@@ -101,11 +89,7 @@ def means_figure(results: Sequence[Result]) -> Figure:
 
 
 def trips_figure(results: Sequence[Result]) -> Figure:
-    """Distributions of both hosts above, the same trip in both below; one column a density.
-
-    Args:
-        results: of one junction, split and controller, by density.
-    """
+    """Distributions of both hosts above, the same trip in both below; one column a density."""
     columns = len(results)
     figure = style.new_figure(max(6.4, 2.7 * columns + 0.9), 7.6)
     panels = figure.subplots(3, columns, squeeze=False)
@@ -114,7 +98,7 @@ def trips_figure(results: Sequence[Result]) -> Figure:
         bottom=0.065, wspace=0.3, hspace=0.5,
     )  # fmt: skip
     for k, result in enumerate(results):
-        for axes, (metric, name) in zip(panels[:2, k], METRICS.items(), strict=True):
+        for axes, (metric, name) in zip(panels[:2, k], JUDGED.items(), strict=True):
             _distributions(axes, result, metric)
             title = f"{result.case.density:g} veh/h/lane" if axes is panels[0, k] else ""
             ylabel = "share of trips" if k == 0 else ""
@@ -126,23 +110,22 @@ def trips_figure(results: Sequence[Result]) -> Figure:
     return figure
 
 
-def parting_figure(result: Result) -> Figure:
+def parting_figure(result: Result, parting: Parting) -> Figure:
     """Distance to the junction over time, one panel a lane, both hosts over each other."""
-    film = result.film
-    if film is None or film.parting is None:
-        raise ValueError("the hosts do not part in this result")
-    site = result.case.scenario.site()
-    entry, arms = site.intersection.approach_length, site.intersection.n
-    start = film.parting.time - SHOWN_BEFORE
+    junction = result.case.scenario.intersection
+    entry, arms = junction.approach_length, junction.n
+    start = parting.time - SHOWN_BEFORE
     figure = style.new_figure(9.6, 1.25 + 1.45 * arms)
     height = figure.get_figheight()
     panels = figure.subplots(arms, 1, sharex=True, squeeze=False)[:, 0]
     figure.subplots_adjust(
         left=0.085, right=0.985, top=1.0 - 0.95 / height, bottom=0.55 / height, hspace=0.14
     )
-    for frame, look in ((film.minisim, MINISIM), (film.sumo, SUMO)):
-        shown = frame[(frame[TIME] >= start) & (frame[TIME] <= start + SHOWN_BEFORE + SHOWN_AFTER)]
-        near = shown[(shown[S] >= entry + SHOWN_FROM) & (shown[S] <= entry + SHOWN_TO)]
+    for frame, look in ((parting.minisim, MINISIM), (parting.sumo, SUMO)):
+        near = frame[
+            frame[TIME].between(start, start + SHOWN_BEFORE + SHOWN_AFTER)
+            & frame[S].between(entry + SHOWN_FROM, entry + SHOWN_TO)
+        ]
         width = 1.3 if look is MINISIM else 1.8
         for _, trip in near.groupby(VEHICLE):
             axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
@@ -155,9 +138,9 @@ def parting_figure(result: Result) -> Figure:
         axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
         axes.set_ylim(SHOWN_FROM, SHOWN_TO)
         axes.set_xlim(start, start + SHOWN_BEFORE + SHOWN_AFTER)
-    lane = panels[ARM_NAMES.index(film.movement[0])]
+    lane = panels[ARM_NAMES.index(parting.movement[0])]
     lane.plot(
-        film.parting.time, film.parting.positions[0] - entry, "o", markersize=13,
+        parting.time, parting.positions[0] - entry, "o", markersize=13,
         markerfacecolor="none", markeredgecolor=style.VERMILLION, markeredgewidth=1.8,
     )  # fmt: skip
     panels[-1].set_xlabel("time [s]", fontsize=9.5, color=style.INK)
@@ -177,15 +160,10 @@ def _distributions(axes: Axes, result: Result, metric: str) -> None:
         SUMO: np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
     }
     for look, seconds in values.items():
-        ordered = np.sort(seconds)
-        shares = np.arange(1, len(ordered) + 1) / len(ordered)
-        axes.step(
-            ordered, shares, where="post", color=look.colour, linestyle=look.dashes, linewidth=1.6,
-            label=look.label,
-        )  # fmt: skip
-    low, high = np.quantile(np.concatenate(list(values.values())), (0.0, TAIL))
-    room = 0.03 * max(high - low, 1.0)
-    axes.set_xlim(low - room, high + room)
+        axes.ecdf(
+            seconds, color=look.colour, linestyle=look.dashes, linewidth=1.6, label=look.label
+        )
+    axes.set_xlim(_limits(np.concatenate(list(values.values()))))
     axes.set_ylim(0.0, 1.02)
     axes.text(
         0.97, 0.06, f"KS {result.row(metric).ks:.3f}", transform=axes.transAxes, ha="right",
@@ -195,14 +173,12 @@ def _distributions(axes: Axes, result: Result, metric: str) -> None:
 
 def _scatter(axes: Axes, result: Result) -> None:
     """Travel time of each trip that ended in both hosts."""
-    ours, theirs = (np.concatenate(part) for part in zip(*_both(result), strict=True))
+    both = _travel_times(result)
     axes.plot(
-        ours, theirs, linestyle="none", marker="o", markersize=2.6, markeredgewidth=0,
+        *both, linestyle="none", marker="o", markersize=2.6, markeredgewidth=0,
         color=style.BLUE, alpha=0.35, rasterized=True,
     )  # fmt: skip
-    low, high = np.quantile(np.concatenate([ours, theirs]), (0.0, TAIL))
-    room = 0.03 * max(high - low, 1.0)
-    limits = (low - room, high + room)
+    limits = _limits(both)
     axes.plot(limits, limits, color=style.VERMILLION, linewidth=1.0, zorder=1)
     axes.set_xlim(limits)
     axes.set_ylim(limits)
@@ -212,10 +188,21 @@ def _scatter(axes: Axes, result: Result) -> None:
     )  # fmt: skip
 
 
-def _both(result: Result) -> Iterator[tuple[Floats, Floats]]:
-    for pair in result.pairs:
-        ended = pair.minisim.arrived & pair.sumo.arrived
-        yield pair.minisim.travel_time[ended], pair.sumo.travel_time[ended]
+def _limits(values: Floats) -> tuple[float, float]:
+    """Of an axis of times [s], with a little room."""
+    low, high = map(float, np.quantile(values, (0.0, TAIL)))
+    room = 0.03 * max(high - low, 1.0)
+    return low - room, high + room
+
+
+def _travel_times(result: Result) -> Floats:
+    """In minisim and in SUMO, of the trips that ended in both [s], shape (2, k)."""
+    return np.hstack([
+        np.array([pair.minisim.travel_time, pair.sumo.travel_time])[
+            :, pair.minisim.arrived & pair.sumo.arrived
+        ]
+        for pair in result.pairs
+    ])  # fmt: skip
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
@@ -234,7 +221,7 @@ def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
     case = result.case
     height = figure.get_figheight()
     left = figure.subplotpars.left
-    where = case.name if note else ", ".join(group_of(result))
+    where = case.name if note else ", ".join(_group(result))
     arrivals = "drawn" if case.published is None else "published"
     title = f"{where} · profile {case.scenario.profile.name}, {arrivals} arrivals"
     figure.text(left, 1 - 0.2 / height, title, fontsize=10.5, color=style.INK, va="center")
@@ -250,6 +237,10 @@ def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
     )  # fmt: skip
 
 
-def _file(kind: str, *words: str) -> str:
+def _group(result: Result) -> tuple[str, ...]:
+    return result.case.scenario.name, result.case.split, result.case.controller
+
+
+def _file(*words: str) -> str:
     """A file name without what is special in links and file systems."""
-    return "_".join([kind, *words]).replace(":", "-").replace(" ", "_")
+    return "_".join(words).replace(":", "-").replace(" ", "_")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
@@ -17,33 +15,30 @@ from minisim.errors import choice
 from scenarios.studies import NAMES, module_name
 
 #: Study -> its section, in the order of the studies.
-STUDIES: Mapping[str, Section] = MappingProxyType(
-    {name: import_module(f"figures.studies.{module_name(name)}").SECTION for name in NAMES}
-)
+STUDIES: dict[str, Section] = {
+    name: import_module(f"figures.studies.{module_name(name)}").SECTION for name in NAMES
+}
 
 #: In the order of the report.
-SECTIONS: tuple[Section, ...] = tuple(
-    sorted((*STUDIES.values(), schematic.SECTION), key=lambda section: section.appendix)
-)
+SECTIONS = sorted((*STUDIES.values(), schematic.SECTION), key=lambda section: section.appendix)
 
-#: All figures and tables.
-GALLERY: Mapping[str, Item] = MappingProxyType(
-    {item.name: item for section in SECTIONS for item in section.items}
-)
+#: All figures and tables, by name.
+GALLERY = {item.name: item for section in SECTIONS for item in section.items}
 
 
 def item_named(name: str) -> Item:
-    """A figure or table by name; raises `InputError` with the nearest one."""
+    """A figure or table by name; `InputError` names the nearest one."""
     return GALLERY[choice("figure", name, GALLERY)]
 
 
 def write(drawing: Drawing, folder: Path, name: str) -> list[Path]:
     """Write a drawing in all its formats, each whole or not at all; returns the files."""
-    suffixes = FORMATS if isinstance(drawing, Figure) else tuple(WRITERS)
-    files = [folder / f"{name}.{suffix}" for suffix in suffixes]
-    for file in files:
-        if isinstance(drawing, Figure):
+    if isinstance(drawing, Figure):
+        files = [folder / f"{name}.{suffix}" for suffix in FORMATS]
+        for file in files:
             save(drawing, file)
-        else:
+    else:
+        files = [folder / f"{name}.{suffix}" for suffix in WRITERS]
+        for file in files:
             save_table(drawing, file)
     return files

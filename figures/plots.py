@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
@@ -19,22 +19,17 @@ from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-#: Series are drawn side by side, so that their bars do not cover each other, over this share of
-#: the range, and at least so much apart.
-DODGE = 0.028
-APART = 0.0075
+#: Series are drawn side by side, so that their bars do not cover each other: over this share of
+#: the range of demands, or this share a series if that is more.
+DODGE, APART = 0.028, 0.0075
 DENSITY_LABEL = "demand [veh/h/lane]"
-#: Of small print [pt].
+#: Left edge of titles, legends and small print, as a share of the figure.
+LEFT = 0.012
+#: Size of the small print [pt].
 FOOTNOTE_SIZE = 7.5
 
-
 #: A line with few points, see `draw_line`.
-BOLD: Mapping[str, Any] = MappingProxyType(
-    {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
-)
+BOLD: dict[str, Any] = {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
 
 
 class Estimate(NamedTuple):
@@ -56,14 +51,9 @@ def draw_line(
     axes: Axes, x: Sequence[float], estimates: Sequence[Estimate], look: style.Look,
     growing: Iterable[bool] = (), **changes: Any,
 ) -> None:  # fmt: skip
-    """A line with intervals, and arrows where the queue still grew.
+    """A line with intervals, and arrows at points whose queue was still growing.
 
-    Args:
-        axes: to draw on.
-        x, estimates: of its points.
-        look: of the line.
-        growing: of each point, where known.
-        changes: of the keywords of `Axes.errorbar`.
+    `changes` are keywords of `Axes.errorbar`.
     """
     bars = [[e.value - e.low for e in estimates], [e.high - e.value for e in estimates]]
     drawn: dict[str, Any] = {
@@ -71,13 +61,17 @@ def draw_line(
         "markersize": 5.0, "capsize": 2.6, "elinewidth": 1.1, "zorder": 3, "label": look.label,
     }  # fmt: skip
     axes.errorbar(x, [e.value for e in estimates], yerr=bars, **(drawn | changes))
+    arrow = {
+        "arrowstyle": "<-", "color": look.colour, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 5.5,
+    }  # fmt: skip
     for place, estimate, grown in zip(x, estimates, growing, strict=False):
         if grown:
-            growth_arrow(axes, place, estimate.high, look.colour)
+            axes.annotate("", (place, estimate.high), xytext=(0, 16), textcoords="offset points",
+                          zorder=4, arrowprops=arrow)  # fmt: skip
 
 
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
-    """One line a series over demand: mean over seeds, interval, arrows where queues still grow.
+    """One line a series over demand: mean over seeds, interval, arrows at growing queues.
 
     Args:
         axes: to draw on.
@@ -93,23 +87,21 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
         return
     for place, name in enumerate(series):
         known = rows[(rows["series"] == name) & rows[metric].notna()]
-        if known.empty:
-            continue
-        cells = list(known.groupby("density"))
-        shift = offset(rows, place, len(series))
-        draw_line(
-            axes, [float(str(density)) + shift for density, _ in cells],
-            [mean_estimate(cell[metric]) for _, cell in cells], style.look(name),
-            [saturated(cell) for _, cell in cells],
-        )  # fmt: skip
+        if not known.empty:
+            shift = offset(rows, place, len(series))
+            draw_over(axes, known, "density", metric, style.look(name), 1.0, shift)
 
 
-def growth_arrow(axes: Axes, x: float, y: float, colour: str) -> None:
-    """An arrow up from above a marker or the end of its bar: the queue was still growing there."""
-    axes.annotate(
-        "", (x, y), xytext=(0, 16), textcoords="offset points", zorder=4,
-        arrowprops={"arrowstyle": "<-", "color": colour, "linewidth": 1.1, "shrinkA": 0,
-                    "shrinkB": 5.5},
+def draw_over(
+    axes: Axes, rows: pd.DataFrame, by: str, metric: str, look: style.Look,
+    scale: float, shift: float,
+) -> None:  # fmt: skip
+    """One line over the values of a column, which are scaled and shifted."""
+    cells = list(rows.groupby(by))
+    draw_line(
+        axes, [scale * float(str(value)) + shift for value, _ in cells],
+        [mean_estimate(cell[metric]) for _, cell in cells], look,
+        [saturated(cell) for _, cell in cells],
     )  # fmt: skip
 
 
@@ -163,17 +155,14 @@ def paper_densities(axes: Axes) -> None:
 
 
 def ylabel(axes: Axes, text: str) -> None:
-    """Write beside the vertical axis."""
+    """Label the vertical axis."""
     axes.set_ylabel(text, fontsize=9.5, color=style.INK)
 
 
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
     """A logarithmic time axis from `low` to `high` [s] with plain numbers.
 
-    Args:
-        axes: to scale.
-        low, high: its ends; with `linear`, `low` may be 0.
-        linear: below it the axis is linear, so that 0 can be shown.
+    Below `linear` it is linear, so that it can show 0.
     """
     if linear is None:
         axes.set_yscale("log")
@@ -185,19 +174,19 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.set_yticks(([0.0] if low == 0.0 else []) + [t for t in shown if t >= (linear or 0.0)])
     axes.set_yticks([], minor=True)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    # A marker on 0 is whole, and so is one on the lowest value.
+    # A marker at 0 is shown whole, and so is one at the lowest value.
     axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
 
 
 def scale_words(linear: float | None) -> str:
-    """What to say of an axis of `log_time` beside its label."""
+    """The scale of an axis of `log_time`, for its label."""
     return "logarithmic" if linear is None else f"log., linear below {linear:g}"
 
 
 def panels(
     width: float, height: float, count: int, *, rows: int = 1, sharey: bool = True, **edges: float
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of inches with panels in rows; `edges` as of `Figure.subplots_adjust`."""
+    """A figure of inches with panels in rows; `edges` as in `Figure.subplots_adjust`."""
     figure = style.new_figure(width, height)
     drawn = figure.subplots(rows, count // rows, sharey=sharey, squeeze=False)
     figure.subplots_adjust(**edges)
@@ -206,11 +195,11 @@ def panels(
 
 def heading(figure: Figure, text: str) -> None:
     """The title of a figure, above its legends."""
-    figure.text(0.012, 0.965, text, fontsize=13, fontweight="bold", color=style.INK, va="center")
+    style.write(figure, LEFT, 0.965, text, 13, bold=True)
 
 
 def looks_legend(
-    figure: Figure, looks: Iterable[style.Look], left: float, top: float, ncols: int | None = None,
+    figure: Figure, looks: Iterable[style.Look], top: float, ncols: int | None = None,
     *, lines: bool = True, **changes: Any,
 ) -> None:  # fmt: skip
     """A legend of lines and markers, or of markers only; `changes` as in `legend`."""
@@ -220,18 +209,18 @@ def looks_legend(
                linestyle=k.dashes if lines else "none")
         for k in shown
     ]  # fmt: skip
-    legend(figure, handles, [k.label for k in shown], left, top, ncols, **changes)
+    legend(figure, handles, [k.label for k in shown], top, ncols, **changes)
 
 
 def series_legend(
-    figure: Figure, series: Iterable[str], left: float, top: float, ncols: int | None = None
+    figure: Figure, series: Iterable[str], top: float, ncols: int | None = None
 ) -> None:
     """A legend of lines and markers by series."""
-    looks_legend(figure, map(style.look, series), left, top, ncols)
+    looks_legend(figure, map(style.look, series), top, ncols)
 
 
-def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> None:
-    """A legend of what markers mean, whatever the series."""
+def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:
+    """A legend of the markers of every series, with those of the paper's values or without."""
     handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
     labels = ["ours, mean and 95 % interval"]
     if paper:
@@ -240,7 +229,7 @@ def marks_legend(figure: Figure, left: float, top: float, *, paper: bool) -> Non
         labels += ["the paper's value", "not the run that its label says"]
     handles.append(_mark(r"$\uparrow$", 8.0))
     labels.append("queue still growing at the end")
-    legend(figure, handles, labels, left, top, fontsize=8.5)
+    legend(figure, handles, labels, top, fontsize=8.5)
 
 
 def _mark(marker: str, size: float, **look: Any) -> Line2D:
@@ -250,12 +239,12 @@ def _mark(marker: str, size: float, **look: Any) -> Line2D:
 
 
 def legend(
-    figure: Figure, handles: Sequence[Any], labels: Sequence[str], left: float, top: float,
+    figure: Figure, handles: Sequence[Any], labels: Sequence[str], top: float,
     ncols: int | None = None, **changes: Any,
 ) -> None:  # fmt: skip
-    """A legend in the quiet style; `changes` are of the keywords of `Figure.legend`."""
+    """A legend in the quiet style; `changes` are keywords of `Figure.legend`."""
     drawn: dict[str, Any] = {
-        "loc": "upper left", "bbox_to_anchor": (left, top), "frameon": False, "fontsize": 9.5,
+        "loc": "upper left", "bbox_to_anchor": (LEFT, top), "frameon": False, "fontsize": 9.5,
         "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
         "handler_map": {tuple: HandlerTuple(ndivide=1)}, "columnspacing": 1.7,
         "ncols": len(labels) if ncols is None else ncols,
@@ -265,9 +254,9 @@ def legend(
 
 def footnote(figure: Figure, text: str) -> None:
     """Small print along the lower edge, in as many lines as it takes."""
-    # Sans serif is half as wide as high, in points of which there are 72 an inch; with a margin.
+    # A letter is about 0.54 of its size wide; an inch has 72 points.
     columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
     figure.text(
-        0.012, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        LEFT, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
         va="bottom", linespacing=1.05,
     )  # fmt: skip

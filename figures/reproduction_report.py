@@ -1,19 +1,18 @@
-"""The report of a reproduction: one Markdown file that a reviewer can read."""
+"""The report of a reproduction: one Markdown file for a reviewer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import style
 from figures.gallery import GALLERY, SECTIONS, STUDIES, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
-from minisim.errors import FileError
-from minisim.files import write_text
+from minisim.files import make_folder, write_text
 from minisim.version import __version__
 from scenarios.studies import NAMES, study_named
 from scenarios.studies.shared.archive import Archive, MissingRunsError
@@ -22,32 +21,20 @@ from scenarios.studies.shared.reproduction import Made
 from scenarios.studies.shared.study import Results
 from scenarios.sweep.cells import saturated, too_short
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-Progress = Callable[[int, int], None]
-
 
 def write_report(
-    archive: Archive,
-    made: Sequence[Made],
-    jobs: int,
-    folder: Path,
-    pictures: Path,
-    progress: Progress,
-    *,
-    parts: Collection[str] = NAMES,
-) -> int:
-    """Draw into `pictures`, then write `folder`/report.md.
+    archive: Archive, made: Sequence[Made], jobs: int, folder: Path,
+    progress: Callable[[int, int], None], *, parts: Collection[str] = NAMES,
+) -> int:  # fmt: skip
+    """Draw into `folder`/figures, then write `folder`/report.md.
 
     Args:
         archive: of the runs.
-        made: what was run, and what failed.
+        made: the studies that were run.
         jobs: processes used.
         folder: of the report.
-        pictures: a folder inside it.
-        progress: of drawing.
-        parts: what to report on: all, or only what is drawn from these studies.
+        progress: called with the figures drawn and their number.
+        parts: studies; unless they are all, the report has only figures that need one of them.
 
     Returns:
         The number of figures and tables.
@@ -55,6 +42,7 @@ def write_report(
     Raises:
         FileError: something cannot be written.
     """
+    pictures = make_folder(folder / "figures")
     drawn: dict[str, Drawing] = {}
     missing: dict[str, str] = {}
     whole = set(parts) >= set(NAMES)
@@ -71,26 +59,22 @@ def write_report(
         else:
             write(drawn[name], pictures, name)
         progress(done, len(chosen))
-    try:
-        inside = pictures.relative_to(folder).as_posix()
-    except ValueError as error:
-        raise FileError(f"{pictures} is not inside {folder}") from error
-    text = "\n\n".join(_report(archive, made, jobs, drawn, missing, inside, parts))
+    text = "\n\n".join(_report(archive, made, jobs, drawn, missing, parts))
     write_text(folder / "report.md", text.rstrip() + "\n")
     return len(drawn)
 
 
 def _report(
     archive: Archive, made: Sequence[Made], jobs: int, drawn: dict[str, Drawing],
-    missing: dict[str, str], folder: str, parts: Collection[str],
+    missing: dict[str, str], parts: Collection[str],
 ) -> Iterator[str]:  # fmt: skip
     effort = archive.effort
     studies = [archive.study(name) for name in NAMES if name in parts]
     yield "# The paper's experiments, reproduced"
     yield (
         f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s a run, "
-        f"{jobs} {'process' if jobs == 1 else 'processes'}. Every controller of a cell gets the "
-        "same arrivals, but in `as-run`, where some met another inflow than their label says. "
+        f"{jobs} {'process' if jobs == 1 else 'processes'}. All controllers of a cell get the "
+        "same arrivals, except in `as-run`, where some met another inflow than their label says. "
         "Intervals are 95 %, Student's t over seeds."
     )
     if effort.densities is not None:
@@ -102,7 +86,7 @@ def _report(
     yield _made_table(made).markdown()
     yield _cost_table(studies).markdown()
     answers = [
-        section.answer(archive)
+        section.answer(archive.study(name))
         for name, section in STUDIES.items()
         if name in parts and section.answer is not None
     ]
@@ -116,7 +100,7 @@ def _report(
             yield f"## {section.heading}"
         for item in shown:
             if item.name in drawn:
-                yield _shown(item, drawn[item.name], folder)
+                yield _shown(item, drawn[item.name])
             else:
                 yield f"*{item.title}: {missing[item.name]}.*"
         if shown and section.ending is not None:
@@ -151,8 +135,9 @@ def _made_table(made: Sequence[Made]) -> Table:
             "clique first) and says what the paper's rules give; `as-run` are the profiles "
             "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
             "the published numbers must be compared with; all others are the profile `fair`: one "
-            "vehicle, one limit for all. Wall is of what was computed now, drawing not counted; "
-            "CPU is of all runs, whenever made, and a run that two studies share counts in both.",
+            "vehicle, one limit for all. Wall time is that of the runs computed now, without "
+            "drawing. CPU time is that of all runs, whenever they were made; a run that two "
+            "studies share counts in both.",
         ),
     )  # fmt: skip
 
@@ -161,10 +146,10 @@ def _cost_table(studies: Iterable[Results]) -> Table:
     """CPU seconds a simulated hour by controller and study."""
     run = [results for results in studies if not results.good.empty]
     series = dict.fromkeys(point.series for results in run for point in results.study.points)
-    rows = []
-    for name in series:
-        cells = [results.good[results.good["series"] == name] for results in run]
-        rows.append((style.look(name).label, *map(_cost, cells)))
+    rows = [
+        (style.look(name).label, *(_cost(each.good[each.good["series"] == name]) for each in run))
+        for name in series
+    ]
     return Table(
         "CPU seconds for one simulated hour, mean of the runs",
         ("controller", *(results.study.name for results in run)), tuple(rows),
@@ -178,36 +163,32 @@ def _cost(rows: pd.DataFrame) -> str:
     return f"{float(rows['cpu_s'].astype(float).sum()) / hours:.2f}"
 
 
-def _shown(item: Item, drawing: Drawing, folder: str) -> str:
+def _shown(item: Item, drawing: Drawing) -> str:
     if isinstance(drawing, Figure):
         caption = item.title[0].upper() + item.title[1:]
-        return f"![{item.title}]({folder}/{item.name}.png)\n\n*{caption}.*"
+        return f"![{item.title}](figures/{item.name}.png)\n\n*{caption}.*"
     return drawing.markdown()
 
 
 def _cells(results: Results) -> Iterator[tuple[Point, pd.DataFrame]]:
-    for point in results.study.chosen(results.effort):
-        rows = results.good
-        for key, value in point._asdict().items():
-            if rows.empty:
-                break
-            rows = rows[rows[key] == value]
-        if not rows.empty:
-            yield point, rows
+    """Each point that has rows, with its rows."""
+    if not results.good.empty:
+        groups = results.good.groupby(list(results.study.points[0]._asdict()))
+        for point in results.study.chosen(results.effort):
+            key = tuple(point._asdict().values())
+            if key in groups.indices:
+                yield point, groups.get_group(key)
 
 
 def _collisions(studies: Iterable[Results]) -> str:
-    lines = []
-    for results in studies:
-        for point, rows in _cells(results):
-            count = int(rows["collisions"].sum())
-            if count:
-                hours = len(rows) * results.effort.horizon / 3600.0
-                where = f"{point.where}, {point.density:g} veh/h/lane"
-                lines.append(
-                    f"- {results.study.name}: {style.look(point.series).label}, {where}: {count} "
-                    f"in {hours:.1f} h"
-                )
+    lines = [
+        f"- {results.study.name}: {style.look(point.series).label}, {point.where}, "
+        f"{point.density:g} veh/h/lane: {count} in "
+        f"{len(rows) * results.effort.horizon / 3600.0:.1f} h"
+        for results in studies
+        for point, rows in _cells(results)
+        if (count := int(rows["collisions"].sum()))
+    ]
     return "\n".join(lines) or "None in any run."
 
 
@@ -226,12 +207,12 @@ def _saturated(studies: Iterable[Results]) -> str:
             for where, densities in grown.items()
         ]
     head = (
-        "Queues of the junction or of one lane grew more than chance until the end: the means of "
-        "these cells depend on the horizon and are no delay that a driver could expect."
+        "In these cells, queues of the junction or of one lane grew more than chance until the "
+        "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
         lines.append(
-            f"- In {short} cells the runs are too short to tell: the roads were still filling."
+            f"- In {short} cells, the runs are too short to tell: the roads were still filling."
         )
     return f"{head}\n\n" + ("\n".join(lines) if lines else "None.")
 

@@ -1,20 +1,20 @@
 """One look for every figure: colours, type and the bare figure.
 
-Colours are Okabe & Ito's (jfly.uni-koeln.de/color, 2008), told apart by colour-blind readers and
-in grey print. Figures are made through matplotlib's objects, never through pyplot: nothing here
-touches global state, a display or another program's figures.
+The colours are Okabe & Ito's (jfly.uni-koeln.de/color, 2008), which colour-blind readers can tell
+apart. Figures are made from matplotlib's objects, without pyplot, so nothing here touches global
+state, a display or another program's figures.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from minisim.errors import InputError
 from minisim.files import replacing
@@ -22,51 +22,54 @@ from scenarios.controllers import VARIANTS
 from scenarios.controllers import Look as Look
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-PURPLE, SKY, YELLOW, BLACK = "#CC79A7", "#56B4E9", "#F0E442", "#000000"
+PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
 
 INK, MUTED, FAINT, PAPER = "#22272E", "#68707C", "#D9DDE3", "#FFFFFF"
 GRASS, ASPHALT, PAINT = "#EEF2E8", "#C9CED6", "#FFFFFF"
 
-#: Road markings by the name of their zone; any other name is drawn in `SKY`.
-ZONES: Mapping[str, str] = MappingProxyType(
-    {"red": "#E8A49A", "yellow": "#F3D984", "green": "#A3D2AE"}
-)
-#: Vehicles by what they are doing.
+#: Road markings by the name of their zone; any other zone is drawn in `SKY`.
+ZONES = {"red": "#E8A49A", "yellow": "#F3D984", "green": "#A3D2AE"}
+#: Vehicles by their state.
 RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
 
-
-BROWN, GREY = "#7A4A1E", "#5C6470"
-
-#: Colours by the names that the table of controllers has for them.
-COLOURS: Mapping[str, str] = MappingProxyType({
+#: Colours by their names in the table of controllers.
+COLOURS = {
     "blue": BLUE, "sky": SKY, "green": GREEN, "vermillion": VERMILLION, "orange": ORANGE,
-    "purple": PURPLE, "brown": BROWN, "ink": INK, "grey": GREY,
-})  # fmt: skip
+    "purple": PURPLE, "brown": "#7A4A1E", "ink": INK, "grey": FREE,
+}  # fmt: skip
 
-#: Series that are no controllers: DIM by the number of arms.
-ARMS: Mapping[str, Look] = MappingProxyType(
-    {
-        "dim-3": Look("3 arms", "green", "^", "--"),
-        "dim-4": Look("4 arms", "blue", "o", "-"),
-        "dim-5": Look("5 arms", "vermillion", "p", "-."),
-    }
-)
+#: Series that are not controllers: DIM by the number of arms.
+ARMS = {
+    "dim-3": Look("3 arms", "green", "^", "--"),
+    "dim-4": Look("4 arms", "blue", "o", "-"),
+    "dim-5": Look("5 arms", "vermillion", "p", "-."),
+}
+
+#: Formats of a figure file.
+FORMATS = ("png", "pdf", "svg")
 
 
 def look(series: str) -> Look:
-    """The look of a series, with its colour as matplotlib takes it; grey where it has none."""
+    """The look of a series, with its colour as matplotlib takes it; grey for an unknown one."""
     variant = VARIANTS.get(series)
     known = ARMS.get(series) or (variant and variant.look) or Look(series, "grey", "h", "-")
     return known._replace(colour=COLOURS[known.colour])
 
 
-#: Formats that a figure can be written in.
-FORMATS = ("png", "pdf", "svg")
-
-
 def new_figure(width: float, height: float, *, dpi: float = 150) -> Figure:
     """An empty figure of width × height inches on white paper."""
     return Figure(figsize=(width, height), dpi=dpi, facecolor=PAPER)
+
+
+def write(
+    figure: Figure, x: float, y: float, text: str, size: float, *, bold: bool = False,
+    colour: str = INK, **changes: Any,
+) -> Text:  # fmt: skip
+    """Write a line of text in a figure, centred on the height `y`."""
+    weight = "bold" if bold else "normal"
+    return figure.text(
+        x, y, text, fontsize=size, fontweight=weight, color=colour, va="center", **changes
+    )
 
 
 def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
@@ -91,9 +94,7 @@ def figure_format(path: str | os.PathLike[str]) -> str:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure in the format of its suffix, whole or not at all.
-
-    The same figure gives the same bytes.
+    """Write a figure in the format of its suffix, with the same bytes every time.
 
     Raises:
         InputError: a suffix other than `FORMATS`.

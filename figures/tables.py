@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 from minisim.errors import InputError
 from minisim.files import markdown_table, write_text
@@ -59,10 +57,8 @@ class Table:
         return "\n".join(lines)
 
 
-#: Suffix -> how a table is written in it.
-WRITERS: Mapping[str, Callable[[Table], str]] = MappingProxyType(
-    {"md": Table.markdown, "csv": Table.csv, "tex": Table.latex}
-)
+#: Suffix -> writer.
+WRITERS = {"md": Table.markdown, "csv": Table.csv, "tex": Table.latex}
 
 
 def save_table(table: Table, path: Path) -> None:

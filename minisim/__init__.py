@@ -26,18 +26,14 @@ if TYPE_CHECKING:
     from minisim.simulation import Simulation, simulate
     from minisim.vehicle import VehicleType
 
-_HOME = {
-    "Arrivals": "minisim.arrivals",
-    "Demand": "minisim.arrivals",
-    "Intersection": "minisim.junction.geometry",
-    "MinisimError": "minisim.errors",
-    "Movement": "minisim.junction.movements",
-    "Run": "minisim.results.run",
-    "Simulation": "minisim.simulation",
-    "VehicleType": "minisim.vehicle",
-    "read_arrivals": "minisim.arrivals",
-    "simulate": "minisim.simulation",
-    "write_arrivals": "minisim.arrivals",
+_NAMES = {
+    "minisim.arrivals": ("Arrivals", "Demand", "read_arrivals", "write_arrivals"),
+    "minisim.errors": ("MinisimError",),
+    "minisim.junction.geometry": ("Intersection",),
+    "minisim.junction.movements": ("Movement",),
+    "minisim.results.run": ("Run",),
+    "minisim.simulation": ("Simulation", "simulate"),
+    "minisim.vehicle": ("VehicleType",),
 }
 
 __all__ = [
@@ -57,9 +53,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module 'minisim' has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOME[name]), name)
+    for module, names in _NAMES.items():
+        if name in names:
+            return getattr(importlib.import_module(module), name)
+    raise AttributeError(f"module 'minisim' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -45,24 +45,18 @@ MAX_TIME = 1e7
 class Arrivals:
     """An arrival table, sorted by demand time (ties keep lane order).
 
-    Attributes:
-        time: demand time [s], shape (k,).
-        lane: index of the approach lane, shape (k,).
-        manoeuvre: 1 … n−1, shape (k,).
-        speed_factor: the driver's factor on the speed limit, shape (k,); None where it is drawn.
+    All columns have the shape (k,).
     """
 
-    time: Floats
-    lane: Ints
-    manoeuvre: Ints
-    speed_factor: Floats | None = None
+    time: Floats  # demand time [s]
+    lane: Ints  # index of the approach lane
+    manoeuvre: Ints  # 1 … n−1
+    speed_factor: Floats | None = None  # drivers' factors on the speed limit; None: they are drawn
 
     def __post_init__(self) -> None:
-        time, lane, manoeuvre = (
-            _column("demand_time_s", self.time, np.float64),
-            _column("lane", self.lane, np.int64),
-            _column("manoeuvre", self.manoeuvre, np.int64),
-        )
+        time = _column("demand_time_s", self.time, np.float64)
+        lane = _column("lane", self.lane, np.int64)
+        manoeuvre = _column("manoeuvre", self.manoeuvre, np.int64)
         columns = {"time": time, "lane": lane, "manoeuvre": manoeuvre}
         if self.speed_factor is not None:
             factors = _column("speed_factor", self.speed_factor, np.float64)
@@ -77,23 +71,19 @@ class Arrivals:
             raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
         order = np.lexsort((lane, time))
         for name, column in columns.items():
-            sorted_column = column[order]
-            sorted_column.setflags(write=False)
-            object.__setattr__(self, name, sorted_column)
+            column = column[order]
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
 
     def __len__(self) -> int:
         return len(self.time)
 
     def check(self, n: int) -> None:
         """Raise `InputError` for a lane or manoeuvre that n arms do not have."""
-        if not len(self):
-            return
-        if self.lane.min() < 0 or self.lane.max() >= n:
-            bad = int(self.lane[(self.lane < 0) | (self.lane >= n)][0])
+        for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
             name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
             raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
-        if self.manoeuvre.min() < 1 or self.manoeuvre.max() >= n:
-            bad = int(self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)][0])
+        for bad in self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)].tolist():
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
@@ -185,9 +175,7 @@ class Demand:
         lane = np.repeat(np.arange(n), [len(t) for t in times])
         time = np.concatenate(times)
         order = np.lexsort((lane, time))
-        manoeuvre = stream(seed, "manoeuvres").choice(
-            np.arange(1, n), size=len(time), p=np.array(turns)
-        )
+        manoeuvre = stream(seed, "manoeuvres").choice(np.arange(1, n), size=len(time), p=turns)
         return Arrivals(time[order], lane[order], manoeuvre)
 
     def _lane_times(self, rate: float, duration: float, rng: np.random.Generator) -> Floats:
@@ -221,7 +209,7 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
     instance("arrivals file", path, (str, os.PathLike))
     if n is not None:
         integer("number of arms", n, low=3, high=len(ARM_NAMES))
-    times, lanes, manoeuvres, factors = [], [], [], []
+    factors = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
@@ -232,20 +220,18 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
                     f"{path}: column {', '.join(wrong)} missing or twice; "
                     f"needed once each: {', '.join(COLUMNS)}"
                 )
+            rows = []
             for row in reader:
-                time, lane, manoeuvre = _parse_row(path, reader.line_num, row, n)
-                times.append(time)
-                lanes.append(lane)
-                manoeuvres.append(manoeuvre)
+                rows.append(_parse_row(path, reader.line_num, row, n))
                 if FACTORS in header:
                     factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot read arrivals from {path}: {reason}") from error
+    time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
     return Arrivals(
-        np.array(times, dtype=np.float64), np.array(lanes, dtype=np.int64),
-        np.array(manoeuvres, dtype=np.int64),
-        np.array(factors, dtype=np.float64) if FACTORS in header else None,
+        np.array(time, float), np.array(lane, int), np.array(manoeuvre, int),
+        np.array(factors, float) if FACTORS in header else None,
     )  # fmt: skip
 
 
@@ -258,10 +244,8 @@ def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
         with Path(path).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(COLUMNS)
-            for time, lane, manoeuvre in zip(
-                arrivals.time.tolist(), arrivals.lane, arrivals.manoeuvre, strict=True
-            ):
-                writer.writerow([time, ARM_NAMES[lane], manoeuvre])
+            lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
+            writer.writerows(zip(arrivals.time.tolist(), lanes, arrivals.manoeuvre, strict=True))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot write arrivals to {path}: {reason}") from error
@@ -307,7 +291,7 @@ def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, .
     """Shares of so many things, with the sum 1."""
     if given is None:
         return (1.0 / count,) * count
-    shares = tuple(map(float, given))  # a text no more: `Demand` has read it
+    shares = tuple(map(float, given))  # `Demand` has already turned a text into numbers
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     total = sum(shares)

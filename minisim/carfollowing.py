@@ -1,7 +1,7 @@
 """Car-following laws as pure functions of plain floats, compiled where numba is installed.
 
-All in SI units. Under the IDM positions and speeds advance by the ballistic rule (`ballistic`), so
-an acceleration here is what a vehicle keeps for one step. Krauß's law speaks of the next speed
+All values are in SI units. Under the IDM, positions and speeds advance by the ballistic rule
+(`ballistic`): a vehicle keeps its acceleration for one step. Krauß's law gives the next speed
 instead, and a vehicle drives the whole step at it (`semi_implicit`), as in SUMO by default.
 """
 

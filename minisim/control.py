@@ -1,10 +1,10 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Beside this room, `dim` and `baselines` may look into `minisim.junction` (geometry, conflicts,
+Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
 movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
-and what they refuse), `minisim.streams` (random numbers), and `minisim.carfollowing` with
-`minisim.jit` (equations, for those that predict). None of these leads to the engine room, to the
-hosts or to the results; `make lint` proves it.
+and their checks), `minisim.files` (writers), `minisim.streams` (random numbers), and
+`minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
+engine, the hosts or the results; `make lint` proves it.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -31,10 +31,9 @@ from minisim.vehicle import VehicleType
 #: `--junctions.limit-turn-speed`, so that turn speeds compare with SUMO.
 LATERAL_ACCELERATION = 5.5
 
-#: Margin before a vehicle counts as unable to stop [m]: less than what a held vehicle leaves
-#: before its line (`minisim.engine.state.STOP_MARGIN`), so that a vehicle that brakes for the
-#: junction entry never counts as committed; more than rounding, so that one that can stop always
-#: does.
+#: Margin before a vehicle counts as unable to stop [m]. A held vehicle leaves more before its line
+#: (`minisim.engine.state.STOP_MARGIN`), so a vehicle that brakes for the junction entry is never
+#: committed. The margin is more than rounding, so a vehicle that can stop always does.
 COMMIT_MARGIN = 0.1
 
 
@@ -109,7 +108,7 @@ def can_stop(vehicle: Observed, deceleration: float) -> bool:
 
     Position and speed alone decide it, so every observer comes to the same answer.
     """
-    needed = vehicle.speed * vehicle.speed / (2.0 * deceleration)
+    needed = stopping_distance(vehicle.speed, deceleration)
     return needed + COMMIT_MARGIN <= vehicle.distance or (
         vehicle.speed == 0.0 and vehicle.distance >= 0.0
     )
@@ -173,8 +172,8 @@ class Advise:
 class Brake:
     """Make one vehicle brake at least at `deceleration` [m/s²] until told otherwise; 0 lifts it.
 
-    It acts wherever the vehicle is, inside the junction too, and no harder than its brakes can. A
-    vehicle that stands keeps standing. It ends when the vehicle leaves the view for good, since no
+    It acts everywhere, inside the junction too, and never exceeds what the brakes can do. A vehicle
+    that stands keeps standing. The command ends when the vehicle leaves the view for good, since no
     session could lift it after that.
     """
 

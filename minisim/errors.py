@@ -57,7 +57,7 @@ class MissingExtraError(MinisimError):
 
 
 class ExecutorError(MinisimError):
-    """An executor gave up runs that it had; they have not failed, and may be tried again."""
+    """An executor gave up runs. They have not failed and may be tried again."""
 
 
 class SumoError(MinisimError):
@@ -98,15 +98,12 @@ def number(
 
 def integer(name: str, value: object, *, low: int, high: int | None = None) -> int:
     """Return `value` as an int inside [low, high], or raise `InputError`."""
-    if type(value) is int and low <= value and (high is None or value <= high):
-        return value  # the usual case first, as in `number`
+    if type(value) is int or (isinstance(value, Integral) and not isinstance(value, bool)):
+        result = int(value)
+        if low <= result and (high is None or result <= high):
+            return result
     allowed = f"an integer of at least {low}" if high is None else f"an integer {low} … {high}"
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise InputError(f"{name} must be {allowed}, got {show(value)}")
-    result = int(value)
-    if result < low or (high is not None and result > high):
-        raise InputError(f"{name} must be {allowed}, got {show(value)}")
-    return result
+    raise InputError(f"{name} must be {allowed}, got {show(value)}")
 
 
 def choice(name: str, value: object, allowed: Iterable[str]) -> str:
@@ -159,13 +156,6 @@ def show(value: object) -> str:
 
 
 def _range(low: float, high: float, above: float, below: float) -> str:
-    parts = []
-    if math.isfinite(above):
-        parts.append(f"above {above:g}")
-    elif math.isfinite(low):
-        parts.append(f"at least {low:g}")
-    if math.isfinite(below):
-        parts.append(f"below {below:g}")
-    elif math.isfinite(high):
-        parts.append(f"at most {high:g}")
-    return " and ".join(parts) if parts else "a finite number"
+    least = f"above {above:g}" if math.isfinite(above) else f"at least {low:g}"
+    most = f"below {below:g}" if math.isfinite(below) else f"at most {high:g}"
+    return " and ".join(bound for bound in (least, most) if "inf" not in bound) or "a finite number"

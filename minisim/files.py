@@ -77,12 +77,9 @@ def write_table(frame: pd.DataFrame, path: AnyPath) -> None:
 def markdown_table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], words: Collection[int] = (0,)
 ) -> str:
-    """A Markdown table; whatever the cells hold, they stay in their column.
+    """A Markdown table in which each cell stays in its column, whatever it holds.
 
-    Args:
-        headings: of the columns.
-        rows: their cells.
-        words: indices of the columns that are aligned to the left; numbers are to the right.
+    `words` are the indices of the columns aligned to the left; the others are aligned to the right.
     """
     rule = ["---" if k in words else "---:" for k in range(len(headings))]
     cells = ([" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows)
@@ -177,7 +174,7 @@ def _target(path: AnyPath) -> Path:
 
 
 def _probe(folder: Path) -> None:
-    """Write and remove a temporary file: the only sure test, permissions tell half of it."""
+    """Write and remove a temporary file; permissions alone do not tell whether that works."""
     with tempfile.TemporaryFile(dir=folder):
         pass
 

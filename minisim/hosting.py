@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from minisim.arrivals import Arrivals
 from minisim.control import (
@@ -30,6 +31,7 @@ from minisim.errors import (
     CollisionError,
     ControllerError,
     InputError,
+    choice,
     integer,
     number,
     show,
@@ -42,6 +44,11 @@ ON_COLLISION = ("stop", "record")
 #: What may happen at a collision where SUMO or its cruise control drives.
 REACTIONS = (*ON_COLLISION, "teleport")
 
+#: What a scenario must have.
+NEEDED = (
+    "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
+)  # fmt: skip
+
 #: Commands by what they address. Building a union of types for each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
@@ -50,12 +57,7 @@ AFTERMATH = 2.0
 
 
 class Alarm:
-    """When the clock wakes a session: at the period of its plan, and once when it asks for it.
-
-    Args:
-        period: of the plan [s], or None.
-        dt: step [s].
-    """
+    """When the clock wakes a session: at the period of its plan, and once when it asks for it."""
 
     def __init__(self, period: float | None, dt: float) -> None:
         self._dt = dt
@@ -80,61 +82,110 @@ class Alarm:
         self._asked = first_tick(command.time, self._dt)
 
 
-class Beginning(NamedTuple):
-    """A run that is about to begin in any host: checked, and the session started."""
+@dataclass(frozen=True, eq=False)
+class Hosted:
+    """A run in any host: its arguments are checked and its session has started."""
 
+    scenario: ScenarioLike
+    controller: Controller
+    seed: int
+    record: str | None
+    record_window: tuple[float, float]
+    on_collision: str
     site: Site
     arrivals: Arrivals
     session: Session
     plan: Plan
 
+    def ask(self, view: View, tick: int) -> list[Command]:
+        """Show the session its view at `tick`; returns its commands.
 
-def begin(scenario: ScenarioLike, controller: Controller, seed: int) -> Beginning:
+        Raises:
+            ControllerError: it answered with something that cannot be carried out.
+        """
+        commands = list(self.session.decide(view))
+        try:
+            for command in commands:
+                _check_command(command, tick, self.site, len(self.arrivals))
+        except InputError as error:
+            raise ControllerError(
+                f"controller {self.controller.name!r} at {view.time:.1f} s: {error}"
+            ) from error
+        return commands
+
+    def collided(
+        self, collisions: Sequence[Collision], replay: Callable[..., Run]
+    ) -> CollisionError:
+        """The error that stops the run, with a `replay` that records what led to it."""
+        what = "; ".join(map(str, collisions))
+        where = f"scenario {self.scenario.name}, controller {self.controller.name}"
+        return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(collisions), replay)
+
+    def result(self, **measured: Any) -> Run:
+        """The result; `measured` are the fields of `Run` that only the host knows."""
+        session = self.session
+        kinds = map(session.kind, range(len(self.arrivals))) if isinstance(session, Kinds) else ()
+        return Run(
+            scenario=self.scenario,
+            controller=self.controller,
+            seed=self.seed,
+            site=self.site,
+            plan=self.plan,
+            record=self.record,
+            counts=dict(session.counts) if isinstance(session, Counting) else {},
+            kinds=tuple(kinds),
+            **measured,
+        )
+
+
+def begin(
+    scenario: ScenarioLike,
+    controller: Controller,
+    seed: int,
+    *,
+    record: str | None,
+    record_window: tuple[float, float],
+    on_collision: str,
+    reactions: Sequence[str] = ON_COLLISION,
+) -> Hosted:
     """Check what is to be run, draw the arrivals and start the controller's session.
 
     Raises:
-        InputError: no scenario, controller or seed, or a scenario that the controller cannot
-            serve.
+        InputError: an argument that is not allowed (`reactions`: to a collision), or a scenario
+            that the controller cannot serve.
         ControllerError: the controller gave no session.
     """
-    _check_scenario(scenario)
+    if record is not None:
+        choice("record", record, RECORDS)
+    choice("on_collision", on_collision, reactions)
+    window = checked_window(record_window)
+    if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
+        raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
     if not isinstance(controller, Controller) or isinstance(controller, type):
-        given = show(controller)
-        raise InputError(f"controller must be a Controller such as Dim(), got {given}")
+        raise InputError(f"controller must be a Controller such as Dim(), got {show(controller)}")
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n)
     session = controller.start(site)
-    return Beginning(site, arrivals, session, _plan_of(session, controller))
-
-
-def ask(
-    session: Session, view: View, tick: int, *, controller: Controller, site: Site, vehicles: int
-) -> list[Command]:
-    """Show a session its view at `tick` of a run of so many vehicles; returns its commands.
-
-    Raises:
-        ControllerError: it answered with something that cannot be carried out.
-    """
-    commands = list(session.decide(view))
-    try:
-        for command in commands:
-            _check_command(command, tick, site, vehicles)
-    except InputError as error:
+    plan = getattr(session, "plan", None)
+    if not isinstance(plan, Plan) or not isinstance(session, Session):
         raise ControllerError(
-            f"controller {controller.name!r} at {view.time:.1f} s: {error}"
-        ) from error
-    return commands
+            f"controller {controller.name!r}: start() must return a Session with a Plan, "
+            f"got {show(session)}"
+        )
+    return Hosted(
+        scenario, controller, int(seed), record, window, on_collision, site, arrivals, session, plan
+    )
 
 
-def counts_of(session: Session) -> dict[str, float]:
-    """What a session has counted; empty if it counts nothing."""
-    return dict(session.counts) if isinstance(session, Counting) else {}
-
-
-def kinds_of(session: Session, vehicles: int) -> tuple[str, ...]:
-    """The kind of each vehicle; empty where the session knows no kinds."""
-    return tuple(map(session.kind, range(vehicles))) if isinstance(session, Kinds) else ()
+def checked_window(window: object) -> tuple[float, float]:
+    """Return a `record_window`, or raise `InputError`."""
+    if not isinstance(window, tuple) or len(window) != 2:
+        raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
+    start = number("start of record_window [s]", window[0], low=0)
+    if window[1] == math.inf:
+        return start, math.inf
+    return start, number("end of record_window [s]", window[1], low=start)
 
 
 def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:
@@ -152,44 +203,3 @@ def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> No
             raise InputError(f"wake-up time {command.time:g} s is not after {now:g} s")
     else:
         raise InputError(f"{show(command)} is not a command")
-
-
-def collision_error(
-    collisions: Sequence[Collision],
-    scenario: ScenarioLike,
-    controller: Controller,
-    seed: int,
-    replay: Callable[..., Run],
-) -> CollisionError:
-    """The error that stops a run, with a `replay` that records what led to it."""
-    what = "; ".join(str(collision) for collision in collisions)
-    where = f"scenario {scenario.name}, controller {controller.name}"
-    return CollisionError(f"{what} ({where}, seed {seed})", tuple(collisions), replay)
-
-
-def _check_scenario(scenario: object) -> None:
-    needed = (
-        "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
-    )  # fmt: skip
-    if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in needed):
-        raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-
-
-def _plan_of(session: object, controller: Controller) -> Plan:
-    plan = getattr(session, "plan", None)
-    if not isinstance(plan, Plan) or not isinstance(session, Session):
-        raise ControllerError(
-            f"controller {controller.name!r}: start() must return a Session with a Plan, "
-            f"got {show(session)}"
-        )
-    return plan
-
-
-def checked_window(window: Iterable[float]) -> tuple[float, float]:
-    """Return a `record_window`, or raise `InputError`."""
-    if not isinstance(window, tuple) or len(window) != 2:
-        raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
-    start = number("start of record_window [s]", window[0], low=0)
-    if window[1] == math.inf:
-        return start, math.inf
-    return start, number("end of record_window [s]", window[1], low=start)

@@ -1,12 +1,11 @@
 """`njit`: numba's compiler, or plain Python where numba is missing or switched off.
 
-Switch it off with the environment variable `MINISIM_JIT=0`: every kernel then runs as the
-Python that stands in the file, step by step in a debugger if need be.
+Switch it off with the environment variable `MINISIM_JIT=0`. Every kernel then runs as plain Python,
+which a debugger can follow.
 
-Compiled code is kept on disk. It includes all functions that it calls and all constants that it
-reads, from any module, but numba only checks the file of the function itself. So ours is kept for
-one state of all sources beside the function and beside this file: a change in any of them compiles
-it again.
+Compiled code is cached on disk. It includes all functions that it calls and all constants that it
+reads, from any module, but numba only checks the file of the function itself. Our cache also checks
+all sources beside the function and beside this file, and compiles again when one of them changes.
 """
 
 from __future__ import annotations

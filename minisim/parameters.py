@@ -11,23 +11,25 @@
 `declared` makes a frozen dataclass whose constructor checks every such field and raises
 `InputError` with one sentence. Rules between fields go into `__post_init__`, which runs after
 that. The class docstring gets a list of the parameters; `parameters` gives them as data, for help
-texts and for readers of command lines and files. `spelled` writes a recipe as such a reader takes
-it, which makes its name.
+texts and for readers of command lines and files. `spelled` makes the name of a recipe, in the
+spelling that those readers accept.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
+import inspect
 import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass
-from functools import cache
+from functools import cache, partial
 from numbers import Integral, Real
-from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypedDict, TypeVar, Unpack, dataclass_transform, overload
 
-from minisim.errors import choice, instance, integer, number, numbers, show
+from minisim.errors import InputError, choice, instance, integer, number, numbers, show
 
 _T = TypeVar("_T")
 
@@ -49,21 +51,21 @@ class Parameter:
         meaning: in a few words.
         unit: such as "m"; empty where it has none.
         allowed: the values that it takes, in words.
-        label: what messages call it; empty is the name of the field.
         check: see `Check`.
-        kinds: word -> what makes the value of that name, for a field that holds another recipe.
-        words: what a text may be, for a field that is one of some words.
+        label: what messages call it; empty is the name of the field.
         optional: whether None is allowed too.
+        words: what a text may be, for a field that is one of some words.
+        kinds: word -> what makes the value of that name, for a field that holds another recipe.
     """
 
     meaning: str
     unit: str
     allowed: str
-    label: str
     check: Check
-    kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
-    words: tuple[str, ...] = ()
+    label: str = ""
     optional: bool = False
+    words: tuple[str, ...] = ()
+    kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
 
     def title(self, name: str) -> str:
         """What messages call it: its label or name, and its unit."""
@@ -71,17 +73,20 @@ class Parameter:
 
 
 class Declared(NamedTuple):
-    """A parameter of a class.
-
-    Attributes:
-        name: of the field.
-        parameter: what is declared of it.
-        default: its default value, or `dataclasses.MISSING`.
-    """
+    """A parameter of a class; `default` is `dataclasses.MISSING` where it has none."""
 
     name: str
     parameter: Parameter
     default: Any
+
+
+class Common(TypedDict, total=False):
+    """What every field may have: see `Parameter` and `dataclasses.field`."""
+
+    optional: bool
+    label: str
+    default: Any
+    default_factory: Any
 
 
 def real(
@@ -92,76 +97,37 @@ def real(
     high: float = math.inf,
     above: float = -math.inf,
     below: float = math.inf,
-    optional: bool = False,
-    label: str = "",
-    default: Any = MISSING,
+    **common: Unpack[Common],
 ) -> Any:
-    """A finite number in [low, high] and (above, below); None too where it is `optional`."""
-
-    def check(title: str, value: Any) -> Any:
-        number(title, value, low=low, high=high, above=above, below=below)
-        return value
-
-    allowed = _range(low, high, above, below)
-    return _field(meaning, unit, allowed, label, check, optional, default)
+    """A finite number in [low, high] and (above, below)."""
+    check = _unchanged(partial(number, low=low, high=high, above=above, below=below))
+    return checked(meaning, check, _range(low, high, above, below), unit, **common)
 
 
 def whole(
-    meaning: str,
-    unit: str = "",
-    *,
-    low: int,
-    high: int | None = None,
-    optional: bool = False,
-    label: str = "",
-    default: Any = MISSING,
+    meaning: str, unit: str = "", *, low: int, high: int | None = None, **common: Unpack[Common]
 ) -> Any:
-    """An integer in [low, high]; None too where it is `optional`."""
-
-    def check(title: str, value: Any) -> Any:
-        integer(title, value, low=low, high=high)
-        return value
-
+    """An integer in [low, high]."""
     allowed = f"integer ≥ {low}" if high is None else f"integer {low} … {high}"
-    return _field(meaning, unit, allowed, label, check, optional, default)
+    check = _unchanged(partial(integer, low=low, high=high))
+    return checked(meaning, check, allowed, unit, **common)
 
 
-def word(
-    meaning: str,
-    among: Sequence[str],
-    *,
-    optional: bool = False,
-    label: str = "",
-    default: Any = MISSING,
-) -> Any:
+def word(meaning: str, among: Sequence[str], **common: Unpack[Common]) -> Any:
     """One of some words."""
-
-    def check(title: str, value: Any) -> Any:
-        return choice(title, value, among)
-
-    made = _field(meaning, "", " | ".join(among), label, check, optional, default)
-    return _with(made, words=tuple(among))
+    check = partial(choice, allowed=among)
+    return _field(meaning, check, " | ".join(among), words=tuple(among), **common)
 
 
-def switch(meaning: str, *, label: str = "", default: Any = MISSING) -> Any:
+def switch(meaning: str, **common: Unpack[Common]) -> Any:
     """True or false."""
-
-    def check(title: str, value: Any) -> Any:
-        instance(title, value, bool)
-        return value
-
-    made = _field(meaning, "", " | ".join(SWITCH), label, check, False, default)
-    return _with(made, words=SWITCH)
+    check = _unchanged(partial(instance, kind=bool))
+    return _field(meaning, check, " | ".join(SWITCH), words=SWITCH, **common)
 
 
-def text(meaning: str, *, label: str = "", default: Any = MISSING) -> Any:
+def text(meaning: str, **common: Unpack[Common]) -> Any:
     """Any text."""
-
-    def check(title: str, value: Any) -> Any:
-        instance(title, value, str)
-        return value
-
-    return _field(meaning, "", "text", label, check, False, default)
+    return checked(meaning, _unchanged(partial(instance, kind=str)), "text", **common)
 
 
 def reals(
@@ -170,20 +136,22 @@ def reals(
     *,
     low: float = -math.inf,
     high: float = math.inf,
-    optional: bool = False,
-    label: str = "",
-    default: Any = MISSING,
+    count: int | None = None,
+    **common: Unpack[Common],
 ) -> Any:
-    """Any sequence of finite numbers in [low, high], kept as a tuple."""
+    """Any sequence of finite numbers in [low, high], or of so many, kept as a tuple."""
 
     def check(title: str, value: Any) -> Any:
-        found = numbers(title, value)
-        for i, one in enumerate(found):
+        kept = numbers(title, value)
+        if count not in (None, len(kept)):
+            raise InputError(f"{title} must be {count} numbers, got {kept}")
+        for i, one in enumerate(kept):
             number(f"{title}[{i}]", one, low=low, high=high)
-        return found
+        return kept
 
-    allowed = "numbers" if _range(low, high) == "number" else f"numbers {_range(low, high)}"
-    return _field(meaning, unit, allowed, label, check, optional, default)
+    allowed = f"numbers {_range(low, high)}".removesuffix(" number")
+    allowed = allowed if count is None else f"{count} {allowed}"
+    return checked(meaning, check, allowed, unit, **common)
 
 
 def part(
@@ -191,33 +159,26 @@ def part(
     kind: type | tuple[type, ...],
     *,
     kinds: Mapping[str, Callable[..., Any]] | None = None,
-    optional: bool = False,
-    label: str = "",
-    default: Any = MISSING,
-    default_factory: Any = MISSING,
+    **common: Unpack[Common],
 ) -> Any:
     """Another object, of class or protocol `kind`.
 
-    Args:
-        meaning: in a few words.
-        kind: what it must be an instance of.
-        kinds: word -> what makes it, for command lines and files.
-        optional: whether None is allowed too.
-        label: what messages call it.
-        default, default_factory: as of `dataclasses.field`.
+    Command lines and files name it by a word of `kinds`, which maps words to what makes it.
     """
-
-    def check(title: str, value: Any) -> Any:
-        instance(title, value, kind)
-        return value
-
     classes = kind if isinstance(kind, tuple) else (kind,)
     allowed = " | ".join(kinds or (one.__name__ for one in classes))
-    made = _field(meaning, "", allowed, label, check, optional, default, default_factory)
-    return _with(made, kinds=dict(kinds or {}))
+    check = _unchanged(partial(instance, kind=kind))
+    return _field(meaning, check, allowed, kinds=kinds or {}, **common)
 
 
 def checked(
+    meaning: str, check: Check, allowed: str, unit: str = "", **common: Unpack[Common]
+) -> Any:
+    """A field with a check of its own; `allowed` says in words which values pass it."""
+    return _field(meaning, check, allowed, unit, **common)
+
+
+def _field(
     meaning: str,
     check: Check,
     allowed: str,
@@ -227,9 +188,28 @@ def checked(
     label: str = "",
     default: Any = MISSING,
     default_factory: Any = MISSING,
+    words: tuple[str, ...] = (),
+    kinds: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
 ) -> Any:
-    """A field with a check of its own; `allowed` says in words what that lets through."""
-    return _field(meaning, unit, allowed, label, check, optional, default, default_factory)
+    def unless_none(title: str, value: Any) -> Any:
+        return None if value is None else check(title, value)
+
+    if optional:
+        allowed = f"{allowed} | none"
+    it = Parameter(
+        meaning, unit, allowed, unless_none if optional else check, label, optional, words, kinds
+    )
+    return dataclasses.field(default=default, default_factory=default_factory, metadata={_KEY: it})
+
+
+def _unchanged(test: Callable[[str, Any], object]) -> Check:
+    """A check that gives the value back as it came, such as an int where a float is allowed."""
+
+    def check(title: str, value: Any) -> Any:
+        test(title, value)
+        return value
+
+    return check
 
 
 @overload
@@ -237,17 +217,15 @@ def declared(cls: type[_T], /) -> type[_T]: ...
 
 
 @overload
-def declared(*, kw_only: bool = False, eq: bool = True) -> Callable[[type[_T]], type[_T]]: ...
+def declared(*, kw_only: bool) -> Callable[[type[_T]], type[_T]]: ...
 
 
 @dataclass_transform(
     frozen_default=True,
-    field_specifiers=(
-        real, whole, word, switch, text, reals, part, checked, dataclasses.field, Field,
-    ),
-)  # fmt: skip
+    field_specifiers=(real, whole, word, switch, text, reals, part, checked, dataclasses.field),
+)
 def declared(
-    cls: type[_T] | None = None, /, *, kw_only: bool = False, eq: bool = True
+    cls: type[_T] | None = None, /, *, kw_only: bool = False
 ) -> type[_T] | Callable[[type[_T]], type[_T]]:
     """Make a frozen dataclass that checks its declared fields when it is made."""
 
@@ -265,9 +243,9 @@ def declared(
 
         if between is not None or not hasattr(kind, "__post_init__"):
             kind.__post_init__ = check_all  # type: ignore[attr-defined]
-        about = kind.__doc__
-        made = dataclass(frozen=True, kw_only=kw_only, eq=eq)(kind)
-        made.__doc__ = _documented(about or "", made)
+        about = kind.__doc__ or ""
+        made = dataclass(frozen=True, kw_only=kw_only)(kind)
+        made.__doc__ = _documented(about, made)
         return made
 
     return make if cls is None else make(cls)
@@ -288,19 +266,28 @@ def parameters(kind: Any) -> tuple[Declared, ...]:
 def spelled(name: str, recipe: object) -> str:
     """A recipe as command lines and files name it: `dim:gate=harmonious,order=lanes`.
 
-    It has the parameters that differ from their defaults. A value without a text of its own, such
-    as a matrix, is named by its class and a digest, so that different recipes have different names.
+    Only parameters that differ from their defaults are spelled. A value without a text of its own,
+    such as a matrix, becomes its class and a digest, so different recipes get different names.
     """
     arguments = _arguments(recipe)
     return f"{name}:{arguments}" if arguments else name
 
 
+class Name:
+    """The attribute `name` of a recipe: its spelling, with `word` before any parameters."""
+
+    def __init__(self, word: str) -> None:
+        self._word = word
+
+    def __get__(self, recipe: object, kind: type) -> str:
+        return spelled(self._word, recipe)
+
+
 def _arguments(recipe: Any) -> str:
-    values = ((it, getattr(recipe, it.name)) for it in parameters(recipe.__class__))
     return ",".join(
-        f"{it.name}={spelled_value(value, it.parameter.kinds)}"
-        for it, value in values
-        if it.default is MISSING or value != it.default
+        f"{name}={spelled_value(getattr(recipe, name), it.kinds)}"
+        for name, it, default in parameters(recipe.__class__)
+        if default is MISSING or getattr(recipe, name) != default
     )
 
 
@@ -337,40 +324,6 @@ def _checks(kind: Any) -> tuple[tuple[str, str, Check], ...]:
     return tuple((name, it.title(name), it.check) for name, it, _ in parameters(kind))
 
 
-def _field(
-    meaning: str,
-    unit: str,
-    allowed: str,
-    label: str,
-    check: Check,
-    optional: bool,
-    default: Any,
-    default_factory: Any = MISSING,
-) -> Any:
-    def check_unless_none(title: str, value: Any) -> Any:
-        return None if value is None else check(title, value)
-
-    if optional:
-        allowed = f"{allowed} | none"
-    metadata = {
-        _KEY: Parameter(
-            meaning, unit, allowed, label, check_unless_none if optional else check,
-            optional=optional,
-        )
-    }  # fmt: skip
-    if default_factory is not MISSING:
-        return dataclasses.field(default_factory=default_factory, metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
-
-
-def _with(field: Any, **more: Any) -> Any:
-    """The same field with more said of it."""
-    metadata = {_KEY: dataclasses.replace(field.metadata[_KEY], **more)}
-    if field.default_factory is not MISSING:
-        return dataclasses.field(default_factory=field.default_factory, metadata=metadata)
-    return dataclasses.field(default=field.default, metadata=metadata)
-
-
 def _default(field: Field[Any]) -> Any:
     return field.default_factory() if field.default_factory is not MISSING else field.default
 
@@ -382,16 +335,11 @@ def _documented(about: str, kind: type) -> str:
         + ("." if default is MISSING else f"; {show(default)} by default.")
         for name, it, default in parameters(kind)
     ]
-    head = about.strip() or f"{kind.__name__}."
+    head = inspect.cleandoc(about) or f"{kind.__name__}."
     return "\n".join([head, "", "Parameters:", *lines]) if lines else head
 
 
-def _range(
-    low: float,
-    high: float,
-    above: float = -math.inf,
-    below: float = math.inf,
-) -> str:
+def _range(low: float, high: float, above: float = -math.inf, below: float = math.inf) -> str:
     least = f"≥ {low:g}" if math.isfinite(low) else ""
     most = f"≤ {high:g}" if math.isfinite(high) else ""
     if math.isfinite(above) and above >= low:

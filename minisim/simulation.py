@@ -22,9 +22,8 @@ from minisim.control import (
     Wake,
 )
 from minisim.engine import kernel
-from minisim.engine.collision import Body, Collision, touching
+from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.state import (
-    DRIVING,
     OBSERVED,
     TRACE,
     Records,
@@ -35,19 +34,8 @@ from minisim.engine.state import (
     first_tick,
     time_of,
 )
-from minisim.errors import InputError, choice, number
-from minisim.hosting import (
-    AFTERMATH,
-    REACTIONS,
-    RECORDS,
-    Alarm,
-    ask,
-    begin,
-    checked_window,
-    collision_error,
-    counts_of,
-    kinds_of,
-)
+from minisim.errors import InputError, number
+from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
 from minisim.vehicle import CruiseVehicle
@@ -83,31 +71,26 @@ class Simulation:
         record_window: tuple[float, float] = (0.0, math.inf),
         on_collision: str = "stop",
     ) -> None:
-        self.site, arrivals, self._session, self.plan = begin(scenario, controller, seed)
-        self.scenario = scenario
-        self.controller = controller
-        self.seed = int(seed)
-        if record is not None:
-            choice("record", record, RECORDS)
-        self.record = record
-        self._stop_on_collision = choice("on_collision", on_collision, REACTIONS) == "stop"
+        self._hosted = hosted = begin(
+            scenario, controller, seed, record=record, record_window=record_window,
+            on_collision=on_collision, reactions=REACTIONS,
+        )  # fmt: skip
+        self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
-
-        self._demand_time = arrivals.time
-        self._road = build_road(self.site, self.plan)
+        self._road = build_road(self.site, plan)
         self._law = build_law(
             self.site,
-            self.plan,
+            plan,
             depart_speed=scenario.depart_speed,
             record=record,
-            record_window=checked_window(record_window),
+            record_window=hosted.record_window,
         )
-        self._vehicles = build_vehicles(self.site, arrivals)
+        self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._motion = kernel.build_motion(self.site, self._vehicles, teleports)
         self._advice = self._vehicles["advice"]
-        self._lanes = build_lanes(self.site, self._vehicles, self.plan.lanes_open)
+        self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
@@ -117,7 +100,7 @@ class Simulation:
         self._seen = 0
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._horizon_tick = first_tick(scenario.horizon, self.site.dt)
-        self._alarm = Alarm(self.plan.period, self.site.dt)
+        self._alarm = Alarm(plan.period, self.site.dt)
         self._started = False
         self._done = False
         self.tick = 0
@@ -185,34 +168,22 @@ class Simulation:
         """The result so far."""
         self._keep_trace()
         horizon = self._horizon_tick * self.site.dt
-        return Run(
-            scenario=self.scenario,
-            controller=self.controller,
-            seed=self.seed,
-            site=self.site,
-            plan=self.plan,
+        return self._hosted.result(
             collisions=self.collisions,
             columns=collect_trips(
                 self._vehicles,
-                self._demand_time,
+                self._hosted.arrivals.time,
                 self.site.intersection.movements,
                 self.site.dt,
                 horizon if self._done else self.time,
             ),
-            record=self.record,
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path"]].copy(),
-            counts=counts_of(self._session),
-            kinds=kinds_of(self._session, len(self._vehicles)),
         )
 
     def _decide(self) -> None:
         self._alarm.reset(self.tick)
-        commands = ask(
-            self._session, self.view(), self.tick,
-            controller=self.controller, site=self.site, vehicles=len(self._vehicles),
-        )  # fmt: skip
-        for command in commands:
+        for command in self._hosted.ask(self.view(), self.tick):
             self._apply(command)
 
     def _apply(self, command: Command) -> None:
@@ -234,81 +205,29 @@ class Simulation:
             self._vehicles["brake"][row] = -limited if limited > 0.0 else math.inf
 
     def _check_collisions(self) -> None:
-        """Ask pymunk which bodies touch; within a lane the gap decides."""
-        rows, bodies = self._near_bodies()
-        pairs = [(rows[i], rows[j]) for i, j in touching(bodies)] + self._overlaps_in_lane()
-        new = []
-        for i, j in pairs:
-            collision = self._describe(i, j)
-            if collision.vehicles not in self._collisions:
-                self._collisions[collision.vehicles] = collision
-                new.append(collision)
-        if new and self._stop_on_collision:
-            raise collision_error(
-                new, self.scenario, self.controller, self.seed, partial(_replay, self)
-            )
-
-    def _near_bodies(self) -> tuple[list[int], list[Body]]:
-        """Rows and bodies of all vehicles in and near the junction."""
-        v, vehicle = self._vehicles, self.site.vehicle
-        paths = self.site.intersection.paths
-        rows, bodies = [], []
-        for i in np.flatnonzero(v["status"] == DRIVING).tolist():
-            path, s = paths[v["path"][i]], float(v["s"][i])
-            if path.entry - vehicle.length <= s <= path.exit + 2 * vehicle.length:
-                centre, heading = path.pose(s, vehicle.length)
-                rows.append(i)
-                (x, y), (ux, uy) = centre.tolist(), heading.tolist()
-                bodies.append(Body(x, y, ux, uy, vehicle.length, vehicle.width))
-        return rows, bodies
-
-    def _overlaps_in_lane(self) -> list[tuple[int, int]]:
-        """Rows of the vehicles whose front has reached the rear of the one ahead."""
-        v, length = self._vehicles, self.site.vehicle.length
-        exits, branch = self._road.ends[:, 0], self._road.branch
-        pairs = []
-        for i in np.flatnonzero(v["status"] == DRIVING).tolist():
-            p = v["path"][i]
-            same_lane = np.flatnonzero((v["status"] == DRIVING) & (v["lane"] == v["lane"][i]))
-            for j in same_lane[same_lane < i].tolist():
-                rear = v["s"][j] - length
-                if rear <= v["s"][i] and rear < branch[v["path"][j], p]:
-                    pairs.append((j, i))
-            j = int(v["ahead"][i])
-            if j >= 0 and v["status"][j] == DRIVING and v["s"][i] >= exits[p]:
-                rear = v["s"][j] - length - exits[v["path"][j]]
-                if rear <= v["s"][i] - exits[p]:
-                    pairs.append((j, i))
-        return pairs
-
-    def _describe(self, i: int, j: int) -> Collision:
-        v = self._vehicles
-        i, j = sorted((i, j), key=lambda row: int(v["id"][row]))
-        movements = self.site.intersection.movements
-        return Collision(
-            time=self.time,
-            vehicles=(int(v["id"][i]), int(v["id"][j])),
-            movements=(str(movements[v["path"][i]]), str(movements[v["path"][j]])),
-            positions=(float(v["s"][i]), float(v["s"][j])),
-            speeds=(float(v["v"][i]), float(v["v"][j])),
-        )
+        now = collisions_now(self._vehicles, self._road, self.site, self.time)
+        new = {it.vehicles: it for it in now if it.vehicles not in self._collisions}
+        self._collisions |= new
+        if new and self._hosted.on_collision == "stop":
+            replay = partial(_replay, self._hosted, self.time)
+            raise self._hosted.collided(list(new.values()), replay)
 
     def _keep_trace(self) -> None:
         self._traces.append(self._trace[: self._traced].copy())
         self._traced = 0
 
 
-def _replay(stopped: Simulation, seconds: float = 10.0) -> Run:
-    """Run again until shortly after the collision; record the last `seconds` before it."""
+def _replay(hosted: Hosted, time: float, seconds: float = 10.0) -> Run:
+    """Run again until shortly after `time`; record the last `seconds` before it."""
     again = Simulation(
-        stopped.scenario,
-        stopped.controller,
-        seed=stopped.seed,
+        hosted.scenario,
+        hosted.controller,
+        seed=hosted.seed,
         record="all",
-        record_window=(max(0.0, stopped.time - seconds), math.inf),
+        record_window=(max(0.0, time - seconds), math.inf),
         on_collision="record",
     )
-    again.advance(stopped.time + AFTERMATH)
+    again.advance(time + AFTERMATH)
     return again.result()
 
 

@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from minisim.arrivals import MAX_DENSITY, Arrivals, Demand
 from minisim.control import (
@@ -30,14 +31,7 @@ from minisim.control import (
     View,
     Wake,
 )
-from minisim.errors import (
-    ControllerError,
-    MinisimError,
-    choice,
-    instance,
-    integer,
-    number,
-)
+from minisim.errors import ControllerError, MinisimError, choice, instance, integer, number
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import declared, part, real, reals, text, word
@@ -49,9 +43,9 @@ from minisim.vehicle import VehicleType
 #: roads. An all-way stop, the slowest sensible rule, needs about 2.5 s a vehicle.
 SECONDS_PER_VEHICLE, SECONDS_PER_ROAD = 10.0, 600.0
 
-
-#: What `simulate` of every host looks like to the contract.
+#: `simulate` of a host, and `decide` of a session.
 Simulate = Callable[..., Run]
+Decide = Callable[[View], Iterable[Command]]
 
 HOSTS = ("minisim", "sumo")
 
@@ -174,24 +168,22 @@ def check_controller(
     before = repr(controller), hash(controller)
     for n in arms:
         scenario = drained(n, density=density, demand_time=horizon)
-        first = _watched_run(controller, scenario, run)
+        try:
+            first = run(scenario, _watched(controller), 1, on_collision="record")
+        except ControllerError as error:
+            raise ContractError(str(error)) from error
         _check_arrivals(controller, first)
         if collision_free:
-            _require(
-                not first.collisions,
-                controller,
-                f"vehicles collided: {'; '.join(map(str, first.collisions[:1]))}",
-            )
+            touched = "; ".join(map(str, first.collisions[:1]))
+            _require(not touched, controller, f"vehicles collided: {touched}")
         _check_served(controller, first)
-        disturbed = _Disturbed(controller, scenario, run)
-        _require(
-            _same(first, run(scenario, disturbed, 1, on_collision="record")), controller,
-            "a second run with the same seed gave other trips; a run left its traces",
-        )  # fmt: skip
-        _require(
-            _same(first, run(scenario, copy, 1, on_collision="record")), controller,
-            "a pickled copy gave other trips",
-        )  # fmt: skip
+        again = _disturbed(controller, scenario, run)
+        for other, problem in (
+            (again, "a second run with the same seed gave other trips; a run left its traces"),
+            (_watched(copy), "a pickled copy gave other trips"),
+        ):
+            trips = run(scenario, other, 1, on_collision="record").trips
+            _require(first.trips.equals(trips), controller, problem)
     _require(
         (repr(controller), hash(controller)) == before and controller == copy, controller,
         "it is not the same after its runs: a run must not change its controller",
@@ -229,70 +221,67 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
     return None if isinstance(command, get_args(Command)) else "this is not a command"
 
 
-class _Watched:
-    """A controller, with a check of its sessions' answers on the way to the host."""
+@dataclass(frozen=True)
+class _Wrapped:
+    """A controller with something around `decide` of its sessions."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self.name = controller.name
+    controller: Controller
+    name: str
+    wrap: Callable[[Session, Site], Decide]
 
     def start(self, site: Site) -> Session:
-        session = self._controller.start(site)
+        session = self.controller.start(site)
         _require(
-            isinstance(session, Session), self._controller,
+            isinstance(session, Session), self.controller,
             f"start(site) must give a Session with a plan and decide(view), got {session!r}",
         )  # fmt: skip
         _require(
-            isinstance(session.plan, Plan), self._controller,
+            isinstance(session.plan, Plan), self.controller,
             f"the plan of its session must be a Plan, got {session.plan!r}",
         )  # fmt: skip
-        return _WatchedSession(session, self._controller, site)
+        return _WrappedSession(session.plan, self.wrap(session, site))
 
 
-class _WatchedSession:
-    def __init__(self, session: Session, controller: Controller, site: Site) -> None:
-        self.plan = session.plan
-        self._session, self._controller, self._site = session, controller, site
-
-    def decide(self, view: View) -> tuple[Command, ...]:
-        answer = self._session.decide(view)
-        _require(
-            isinstance(answer, Iterable), self._controller,
-            f"decide(view) must answer with commands, got {answer!r}",
-        )  # fmt: skip
-        commands = tuple(answer)
-        try:
-            check_commands(commands, view, self._site)
-        except ContractError as error:
-            raise ContractError(f"controller {self._controller.name!r} {error}") from None
-        return commands
+class _WrappedSession(NamedTuple):
+    plan: Plan
+    decide: Decide
 
 
-class _Disturbed:
-    """A controller, with a run of another seed in the middle of each of its runs."""
+def _watched(controller: Controller) -> _Wrapped:
+    """The controller, with a check of its sessions' answers on the way to the host."""
 
-    def __init__(self, controller: Controller, scenario: SmallScenario, run: Simulate) -> None:
-        self._controller, self._scenario, self._run = controller, scenario, run
-        self.name = controller.name
+    def wrap(session: Session, site: Site) -> Decide:
+        def decide(view: View) -> tuple[Command, ...]:
+            answer = session.decide(view)
+            wanted = f"decide(view) must answer with commands, got {answer!r}"
+            _require(isinstance(answer, Iterable), controller, wanted)
+            commands = tuple(answer)
+            try:
+                check_commands(commands, view, site)
+            except ContractError as error:
+                raise ContractError(f"controller {controller.name!r} {error}") from None
+            return commands
 
-    def start(self, site: Site) -> Session:
-        session = self._controller.start(site)
-        return _DisturbedSession(session, self._scenario.demand_time / 2.0, self._disturb)
+        return decide
 
-    def _disturb(self) -> None:
-        self._run(self._scenario, self._controller, 2, on_collision="record")
+    return _Wrapped(controller, controller.name, wrap)
 
 
-class _DisturbedSession:
-    def __init__(self, session: Session, time: float, disturb: Callable[[], None]) -> None:
-        self.plan = session.plan
-        self._session, self._time, self._disturb = session, time, disturb
+def _disturbed(controller: Controller, scenario: SmallScenario, run: Simulate) -> _Wrapped:
+    """The controller, with a run of another seed in the middle of each of its runs."""
 
-    def decide(self, view: View) -> Iterable[Command]:
-        if view.time >= self._time:
-            self._time = math.inf
-            self._disturb()
-        return self._session.decide(view)
+    def wrap(session: Session, site: Site) -> Decide:  # noqa: ARG001
+        due = [scenario.demand_time / 2.0]
+
+        def decide(view: View) -> Iterable[Command]:
+            if due and view.time >= due[0]:
+                due.clear()
+                run(scenario, controller, 2, on_collision="record")
+            return session.decide(view)
+
+        return decide
+
+    return _Wrapped(controller, controller.name, wrap)
 
 
 def _check_value(controller: Controller) -> Controller:
@@ -305,12 +294,11 @@ def _check_value(controller: Controller) -> Controller:
         copy: Controller = pickle.loads(pickle.dumps(controller))
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         raise _broken(controller, f"it is not picklable: {error}") from error
-    for name, alike in (
-        ("is not equal to it", copy == controller),
-        ("has another hash", hash(copy) == hash(controller)),
-        ("prints as something else", repr(copy) == repr(controller)),
-    ):
-        _require(alike, controller, f"a pickled copy of it {name}")
+    _require(copy == controller, controller, "a pickled copy of it is not equal to it")
+    _require(hash(copy) == hash(controller), controller, "a pickled copy of it has another hash")
+    _require(
+        repr(copy) == repr(controller), controller, "a pickled copy of it prints as something else"
+    )
     return copy
 
 
@@ -324,22 +312,13 @@ def _simulate_in(host: str | Simulate) -> Simulate:
     return simulate_in_sumo
 
 
-def _watched_run(controller: Controller, scenario: SmallScenario, run: Simulate) -> Run:
-    try:
-        return run(scenario, _Watched(controller), 1, on_collision="record")
-    except ControllerError as error:
-        raise ContractError(str(error)) from error
-
-
 def _check_arrivals(controller: Controller, run: Run) -> None:
-    drawn, trips = run.scenario.arrivals(run.seed), run.columns
+    drawn = run.scenario.arrivals(run.seed)
+    met = Arrivals(run.columns.demand_time, run.columns.lane, run.columns.manoeuvre)
     _require(
-        trips.demand_time.tolist() == drawn.time.tolist()
-        and trips.lane.tolist() == drawn.lane.tolist()
-        and trips.manoeuvre.tolist() == drawn.manoeuvre.tolist(),
-        controller,
-        "the run did not meet the arrivals of its scenario and seed",
-    )
+        all(getattr(met, of).tolist() == column.tolist() for of, column in vars(drawn).items()),
+        controller, "the run did not meet the arrivals of its scenario and seed",
+    )  # fmt: skip
 
 
 def _check_served(controller: Controller, run: Run) -> None:
@@ -351,10 +330,6 @@ def _check_served(controller: Controller, run: Run) -> None:
         f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served on {n} arms "
         f"(lanes {lanes}), {run.scenario.horizon:.0f} s after the first could come",
     )  # fmt: skip
-
-
-def _same(run: Run, other: Run) -> bool:
-    return run.trips.equals(other.trips)
 
 
 def _require(condition: bool, controller: Controller, problem: str) -> None:

@@ -16,7 +16,6 @@ class Model(NamedTuple):
     `minisim.engine.laws` says how a run applies them.
 
     Attributes:
-        meaning: in a few words.
         braking: what it asks of the brakes in front of a standing obstacle [m/s²], given the
             vehicle's acceleration and comfortable deceleration.
         stepwise: whether it speaks of the next speed, at which a vehicle drives the whole step
@@ -38,8 +37,8 @@ class Model(NamedTuple):
 def _idm_braking(a: float, b: float) -> float:
     """What the IDM asks of the brakes, and a quarter more [m/s²].
 
-    It brakes at k²/b where k = v²/2s is just enough, and its free-road term takes up to a away
-    again: k²/b − a = k at k = (b + √(b² + 4ab))/2.
+    It brakes at k²/b, where k = v²/2s is just enough. Its free-road term takes up to a away again:
+    k²/b − a = k at k = (b + √(b² + 4ab))/2.
     """
     return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
 
@@ -69,13 +68,15 @@ class VehicleType:
     width 1.8, minGap 2.5, accel 2.6, decel 4.5, tau 1.0, emergencyDecel 9), so that runs
     compare with SUMO. The exponent is Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
 
-    The headway has a lower bound because a law cannot react within less than the longest step
+    The headway has a lower bound because no law reacts faster than the longest step allows
     (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
-    (`needed_braking`). Even so they can be too weak for a leader that stops at high speed: the
-    vehicles then collide, and the run reports it.
+    (`needed_braking`). They can still be too weak when a leader stops from high speed: then the
+    vehicles collide, and the run reports it.
     """
 
-    length: float = real("bumper to bumper", "m", default=5.0, low=0.5, high=30, label="vehicle length")  # fmt: skip # noqa: E501
+    length: float = real(
+        "bumper to bumper", "m", default=5.0, low=0.5, high=30, label="vehicle length"
+    )
     width: float = real("of the body", "m", default=1.8, low=0.3, high=4, label="vehicle width")
     acceleration: float = real(
         "the IDM's a, Krauß's acceleration", "m/s²", default=2.6, above=0, high=100
@@ -120,7 +121,7 @@ class VehicleType:
         return MODELS[self.model].braking(self.acceleration, self.deceleration)
 
     def top_speed(self, limit: float) -> float:
-        """No vehicle of this type is faster where the speed limit is `limit` [m/s]."""
+        """Bound on the speed of this type where the speed limit is `limit` [m/s]."""
         return 2.0 * limit
 
 
@@ -176,5 +177,5 @@ class CruiseVehicle(VehicleType):
     )
 
     def top_speed(self, limit: float) -> float:
-        """As of any vehicle; the cruise speed may be higher."""
+        """The same, or the cruise speed where that is higher."""
         return max(super().top_speed(limit), self.cruise_speed)

@@ -1,7 +1,16 @@
-"""What is simulated: scenarios and profiles here; sweeps, studies and the command line within."""
+"""What is simulated: scenarios and profiles; also sweeps, studies and the command line.
 
-from scenarios.library import five_way, four_way, from_bearings, regular, three_way
-from scenarios.scenario import AS_RUN, FAIR, PAPER, PROFILES, Profile, Scenario
+The names below are loaded when they are first used, so `minisim --help` is quick.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from scenarios.library import five_way, four_way, from_bearings, regular, three_way
+    from scenarios.scenario import AS_RUN, FAIR, PAPER, PROFILES, Profile, Scenario
+
+_LIBRARY = ("five_way", "four_way", "from_bearings", "regular", "three_way")
 
 __all__ = [
     "AS_RUN",
@@ -16,3 +25,10 @@ __all__ = [
     "regular",
     "three_way",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'scenarios' has no attribute {name!r}")
+    home = "scenarios.library" if name in _LIBRARY else "scenarios.scenario"
+    return getattr(importlib.import_module(home), name)

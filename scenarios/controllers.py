@@ -8,7 +8,7 @@ A controller is named the same way on the command line, in files and in Python:
     path/to/file.py:MyController(k=3)          installed
     {name = "dim", gate = "harmonious"}        a table, as TOML has it
 
-An installed package may add names by entry points of the group `minisim.controllers`.
+An installed package may add names through entry points of the group `minisim.controllers`.
 """
 
 from __future__ import annotations
@@ -39,16 +39,10 @@ from scenarios.spelling import Call, build, call_of, parse_arguments
 
 
 class Look(NamedTuple):
-    """How a series is drawn, the same in every figure; told apart in grey print too.
-
-    Attributes:
-        label: in legends.
-        colour: by its name in `figures.style.COLOURS`.
-        marker, dashes: of its line.
-    """
+    """How a series is drawn in every figure; two looks differ in grey print too."""
 
     label: str
-    colour: str
+    colour: str  # its name in `figures.style.COLOURS`
     marker: str
     dashes: Literal["-", "--", "-.", ":"]
 
@@ -57,7 +51,7 @@ class Variant(NamedTuple):
     """A controller with some of its parameters, as studies compare it.
 
     Attributes:
-        arguments: that differ from the defaults, as they are spelled; empty for none.
+        arguments: those that differ from the defaults, as they are spelled.
         look: in figures; None is grey.
         rival: whether it is compared with all others on equal terms.
     """
@@ -68,15 +62,14 @@ class Variant(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A controller by name.
+    """A row of the table of controllers.
 
     Attributes:
-        name: before any parameters.
-        make: its class, which declares the parameters; the first line of its docstring says what
-            it is.
-        variants: that have a look or are rivals.
-        safe: whether these never collide, whatever the number of arms.
-        as_run: what the name alone means under the profile `as_run`; empty is no other.
+        name: without parameters.
+        make: its class, which declares the parameters; the first line of its docstring is the help.
+        variants: those that have a look or are rivals.
+        safe: whether these never collide, with any number of arms.
+        as_run: what the name alone means under the profile `as_run`; empty means the same.
     """
 
     name: str
@@ -85,15 +78,8 @@ class Entry(NamedTuple):
     safe: bool = True
     as_run: str = ""
 
-    def spellings(self) -> dict[str, Variant]:
-        """The variants by name."""
-        return {
-            f"{self.name}:{one.arguments}" if one.arguments else self.name: one
-            for one in self.variants
-        }
 
-
-#: Every controller of ours, the paper's four first; figures show rivals in this order.
+#: Our controllers, the paper's four first; figures show rivals in this order.
 CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
     entry.name: entry
     for entry in (
@@ -131,18 +117,18 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
     )
 })  # fmt: skip
 
-#: Every variant of the table by its name.
+#: Every variant by its spelling.
 VARIANTS: Mapping[str, Variant] = MappingProxyType({
-    name: variant
-    for entry in CONTROLLERS.values()
-    for name, variant in entry.spellings().items()
+    f"{name}:{variant.arguments}" if variant.arguments else name: variant
+    for name, entry in CONTROLLERS.items()
+    for variant in entry.variants
 })  # fmt: skip
 
-#: Names of all that are compared on equal terms, in the order of figures.
+#: Spellings of those that are compared on equal terms, in the order of figures.
 RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 
-#: Names of all that never collide and serve any number of arms.
-SAFE = tuple(name for entry in CONTROLLERS.values() if entry.safe for name in entry.spellings())
+#: Spellings of those that never collide and serve any number of arms.
+SAFE = tuple(name for name in VARIANTS if CONTROLLERS[name.partition(":")[0]].safe)
 
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 
@@ -150,7 +136,7 @@ _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 def controller_named(
     spec: str | Mapping[str, Any] | Controller, profile: str | Profile = "paper"
 ) -> Controller:
-    """The controller that a text or table names, set up for a profile; a controller is itself.
+    """The controller that a text or a table names; a controller passes through.
 
     Args:
         spec: see the module's docstring.
@@ -162,38 +148,38 @@ def controller_named(
     """
     as_run = profile_named(profile).name == AS_RUN.name
     if isinstance(spec, str):
-        return _made(_read(spec), spec, as_run)
-    if isinstance(spec, Mapping):
-        named = call_of(spec)
-        read = _read(named.name)
-        both = {**read.named, **named.named}
-        return _made(Call(read.name, read.places, both), named.name, as_run)
-    return _checked(spec, show(spec))
+        call, text = _read(spec), spec
+    elif isinstance(spec, Mapping):
+        table = call_of(spec)
+        read, text = _read(table.name), table.name
+        call = Call(read.name, read.places, {**read.named, **table.named})
+    else:
+        return check_controller(show(spec), spec)
+    name = call.name
+    if as_run and not call.named and name in CONTROLLERS:
+        name = CONTROLLERS[name].as_run or name
+    return check_controller(text, build(name, maker_of(name), call))
 
 
-class Described(NamedTuple):
-    """What makes controllers of some name.
-
-    Attributes:
-        make: the class, or a function of a plugin.
-        title: what messages call it.
-    """
-
-    make: Any
-    title: str
+def check_controller(what: str, value: Any) -> Controller:
+    """Return a controller, or raise `InputError` with what `value` lacks."""
+    if isinstance(value, Controller) and not isinstance(value, type):
+        return value
+    lacks = [part for part in ("name", "start") if not hasattr(value, part)]
+    why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
+    raise InputError(f"{what} is no controller: {why}")
 
 
-def described(name: str) -> Described:
-    """What makes the controllers of a name or `module:Class`; raises `InputError`."""
-    written = _CLASS.fullmatch(name)
-    if written is not None and name not in CONTROLLERS:
-        return Described(load_class(written[1], written[2]), name)
+def maker_of(name: str) -> Any:
+    """The class, or a plugin's function, of a name or of `module:Class`; raises `InputError`."""
     if name in CONTROLLERS:
-        return Described(CONTROLLERS[name].make, name)
+        return CONTROLLERS[name].make
+    if written := _CLASS.fullmatch(name):
+        return load_class(written[1], written[2])
     plugin = plugins()[choice("controller", name, [*CONTROLLERS, *plugins()])]
     try:
-        return Described(plugin.load(), name)
-    except (Exception, SystemExit) as error:  # code of others may raise anything
+        return plugin.load()
+    except (Exception, SystemExit) as error:  # another author's code may raise anything
         raise InputError(
             f"controller {name} of package {package_of(plugin)} cannot be loaded: "
             f"{type(error).__name__}: {error}"
@@ -202,12 +188,9 @@ def described(name: str) -> Described:
 
 @cache
 def plugins() -> Mapping[str, EntryPoint]:
-    """The controllers that installed packages register, by name; ours come first."""
-    return {
-        point.name: point
-        for point in entry_points(group="minisim.controllers")
-        if point.name not in CONTROLLERS
-    }
+    """The controllers that installed packages register, by name; our own names come first."""
+    points = entry_points(group="minisim.controllers")
+    return {point.name: point for point in points if point.name not in CONTROLLERS}
 
 
 def package_of(plugin: EntryPoint) -> str:
@@ -216,7 +199,7 @@ def package_of(plugin: EntryPoint) -> str:
 
 
 def _read(text: str) -> Call:
-    """A name with its arguments, as a text has them."""
+    """A controller's name with its arguments."""
     head, colon, rest = text.partition(":")
     written = _CLASS.fullmatch(text)
     if written is not None and (head not in CONTROLLERS or rest[:1].isupper()):
@@ -231,19 +214,3 @@ def _read(text: str) -> Call:
             f"parameters of {head} are written {head}:key=value,key=value, got {show(text)}"
         )
     return call
-
-
-def _made(call: Call, text: str, as_run: bool) -> Controller:
-    name = call.name
-    if as_run and not call.named and name in CONTROLLERS:
-        name = CONTROLLERS[name].as_run or name
-    make, title = described(name)
-    return _checked(build(title, make, call), text)
-
-
-def _checked(made: object, what: str) -> Controller:
-    if isinstance(made, type) or not isinstance(made, Controller):
-        lacks = [part for part in ("name", "start") if not hasattr(made, part)]
-        why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
-        raise InputError(f"{what} is no controller: {why}")
-    return made

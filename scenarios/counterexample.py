@@ -1,7 +1,7 @@
-"""From a path on which the protocol is unsafe to arrivals with which simulated vehicles collide.
+"""Turns a path on which the protocol is unsafe into arrivals that make simulated vehicles collide.
 
-The model knows no seconds. It says who comes, in which order, and that the last one comes when the
-ones before it are on their way; the simulator finds out when that is.
+The model has no clock. It gives the order of the vehicles, and says that the last one comes while
+the others are on their way. The simulator finds out when that is.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from minisim.arrivals import Arrivals
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
-#: The last vehicle comes so much later than those before it, at most [s]: longer than anybody
-#: takes from the start of the yellow zone through the junction.
+#: The largest delay of the last vehicle [s]. No vehicle takes as long from the start of the yellow
+#: zone through the junction.
 LATEST = 10.0
 
 #: Simulated time after the last demand [s]: twice 500 m at 10 m/s.
@@ -26,10 +26,10 @@ PATIENCE = 100.0
 
 
 def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> Arrivals | None:
-    """Arrivals in the order of one of `paths` that end in a collision, or None: there are none.
+    """Arrivals in the order of one of `paths` that end in a collision; None where there are none.
 
-    All vehicles but the last want to enter the road at time 0. The last one comes later, by as
-    many steps as it takes: the shortest delay that ends in a collision on any path.
+    All vehicles want to enter the road at time 0, except the last one. It comes after the shortest
+    delay that ends in a collision on any path.
 
     Args:
         scenario: junction and profile; its demand is not used.
@@ -46,8 +46,8 @@ def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> A
 
 
 def _table(path: Path, delay: float) -> Arrivals:
-    comers = [(event.lane, event.manoeuvre) for event in path if event.what == "arrive"]
-    lane, manoeuvre = (np.array(column) for column in zip(*comers, strict=True))
+    arrivals = [(event.lane, event.manoeuvre) for event in path if event.what == "arrive"]
+    lane, manoeuvre = np.array(arrivals).T
     time = np.zeros(len(lane))
     time[-1] = round(delay, 6)
     return Arrivals(time, lane, manoeuvre)

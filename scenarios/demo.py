@@ -1,4 +1,4 @@
-"""The tour of `minisim demo`: DIM beside a fixed-time signal over density, with intervals."""
+"""The tour of `minisim demo`: DIM and a fixed-time signal at several densities."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run
 
-#: Controllers of the tour and how they are called in its table and figure.
+#: Controllers of the tour -> their names in its table and figure.
 CONTROLLERS = {
     "dim": "DIM, paper's gate",
     "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
-#: Averaged over seeds: column of a sweep -> heading.
+#: Column of a sweep, averaged over seeds -> its heading.
 METRICS = {
     name: heading(name)
     for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
@@ -66,14 +66,10 @@ class Tour:
             film_seconds=10.0,
         )  # fmt: skip
 
-    def experiments(self) -> list[Recipe]:
-        """Every density under every controller with every seed."""
+    def recipes(self) -> list[Recipe]:
+        """Every density with every controller and seed."""
         return [
-            Recipe(
-                four_way(density, profile=PROFILE, horizon=self.horizon),
-                controller_named(name, PROFILE),
-                seed,
-            )
+            _recipe(density, name, seed, self.horizon)
             for density in self.densities
             for name in self.controllers
             for seed in range(1, self.seeds + 1)
@@ -82,19 +78,23 @@ class Tour:
     def film(self) -> Run:
         """The run of the animation."""
         end = self.film_start + self.film_seconds
-        scenario = four_way(self.densities[-1], profile=PROFILE, horizon=end)
-        recipe = Recipe(scenario, controller_named(self.controllers[0], PROFILE), seed=1)
+        recipe = _recipe(self.densities[-1], self.controllers[0], 1, end)
         return recipe.run(record="all", record_window=(self.film_start, end))
 
 
+def _recipe(density: float, controller: str, seed: int, horizon: float) -> Recipe:
+    scenario = four_way(density, profile=PROFILE, horizon=horizon)
+    return Recipe(scenario, controller_named(controller, PROFILE), seed)
+
+
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
-    """Run the tour's experiments and average them; see `average`.
+    """Run the tour and average its rows; see `average`.
 
     Raises:
         MinisimError: a run failed.
     """
     with workers(jobs) as executor:
-        rows = sweep(tour.experiments(), executor, progress)
+        rows = sweep(tour.recipes(), executor, progress)
     failed = rows[rows["error"].notna()]
     if len(failed):
         first = failed.iloc[0]
@@ -112,23 +112,15 @@ def average(rows: pd.DataFrame) -> pd.DataFrame:
         One row a controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`
         (sums), and each of `METRICS` with its `…_ci95`.
     """
-    import pandas as pd
-
-    points = []
-    for (controller, density), runs in rows.groupby(["controller", "density"], sort=False):
-        point: dict[str, object] = {
-            "controller": controller,
-            "density": density,
-            "seeds": len(runs),
-            "trips": int(runs["trips"].sum()),
-            "collisions": int(runs["collisions"].sum()),
-        }
-        for metric in METRICS:
-            interval = mean_interval(runs[metric].astype(float).tolist())
-            point[metric] = interval.mean
-            point[f"{metric}_ci95"] = interval.half_width
-        points.append(point)
-    return pd.DataFrame(points)
+    runs = rows.groupby(["controller", "density"], sort=False)
+    points = runs.agg(
+        seeds=("seed", "size"), trips=("trips", "sum"), collisions=("collisions", "sum")
+    ).astype(int)
+    for metric in METRICS:
+        intervals = [mean_interval(values) for _, values in runs[metric]]
+        points[metric] = [interval.mean for interval in intervals]
+        points[f"{metric}_ci95"] = [interval.half_width for interval in intervals]
+    return points.reset_index()
 
 
 def demo_title(tour: Tour) -> str:
@@ -140,7 +132,7 @@ def demo_title(tour: Tour) -> str:
 
 
 def demo_table(points: pd.DataFrame) -> Table:
-    """The result for a terminal."""
+    """The points as a table for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
     for k, title in enumerate(_headings()):
         table.add_column(title, justify="left" if k == 1 else "right")

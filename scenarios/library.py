@@ -21,18 +21,17 @@ from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_na
 
 Side = Literal["left", "right"]
 
-#: Distance of the entries from the centre in the authors' networks, by number of arms [m]: their
+#: Number of arms -> distance of the entries from the centre in the authors' networks [m]. Their
 #: approach lanes are 495.84, 492.8 and 491.6 m long. The first two follow from the default kerb
-#: radius, but netconvert rounds to centimetres; 3 mm shift which vehicle passes the edge of a zone
-#: when.
+#: radius, but netconvert rounds to centimetres, and 3 mm change when a vehicle enters a zone.
 PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
 class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
-    The profile may be a name. Shares of lanes (`split`) and of manoeuvres (`turns`) may be numbers
-    or a text such as "4:3:2:1".
+    A profile may be given by name, and shares of lanes (`split`) and of manoeuvres (`turns`) as
+    numbers or as a text such as "4:3:2:1".
     """
 
     name: str
@@ -51,14 +50,13 @@ class Options(TypedDict, total=False):
     recorded: Arrivals | None
 
 
-#: What the keywords are for.
 _PARTS = (Intersection, Demand, Scenario)
 
 _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
 
-def _told(make: _Maker) -> _Maker:
-    """Show the keywords of `Options`, with their defaults, to help and completion."""
+def _shown(make: _Maker) -> _Maker:
+    """Give `make` a signature in which help and completion see `Options` and their defaults."""
     defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
     own = inspect.signature(make).parameters.values()
     kept = [parameter for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
@@ -70,19 +68,19 @@ def _told(make: _Maker) -> _Maker:
     return make
 
 
-@_told
+@_shown
 def three_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's Y junction: arms at 0°, 120° and 240°."""
     return _regular("three-way", 3, density, options)
 
 
-@_told
+@_shown
 def four_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's 4-arm junction: a north, b east, c south, d west."""
     return _regular("four-way", 4, density, options)
 
 
-@_told
+@_shown
 def five_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """The paper's 5-arm junction, with the junction radius of the authors' network."""
     return _regular("five-way", 5, density, {"junction_radius": PUBLISHED_RADII[5], **options})
@@ -92,20 +90,20 @@ def five_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
 MAKERS: dict[int, Callable[..., Scenario]] = {3: three_way, 4: four_way, 5: five_way}
 
 
-@_told
+@_shown
 def regular(n: int, density: float = 350.0, **options: Unpack[Options]) -> Scenario:
     """A junction of n arms at equal angles (3 ≤ n ≤ 12)."""
     count = integer("number of arms", n, low=3, high=12)
     return _regular(f"{count}-way", count, density, options)
 
 
-@_told
+@_shown
 def from_bearings(
     bearings: Sequence[float], density: float = 350.0, **options: Unpack[Options]
 ) -> Scenario:
     """A junction with arms at these bearings [degrees clockwise from north].
 
-    Every other scenario of this module is this one with given bearings.
+    The other functions of this module call this one.
 
     Raises:
         InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
@@ -130,8 +128,8 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
 
     Raises:
-        InputError: unknown name (with the nearest one), or bearings without `custom` or
-            `custom` without bearings.
+        InputError: an unknown name (with the nearest one), or one of `custom` and bearings without
+            the other.
     """
     instance("scenario", name, str)
     if name == "custom":
@@ -157,16 +155,16 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
 
 
 def _regular(name: str, n: int, density: float, options: Mapping[str, Any]) -> Scenario:
-    bearings = [360.0 * i / n for i in range(n)]
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
         published = {"ways": published_ways(n), "junction_radius": PUBLISHED_RADII[n]}
         options = {**published, **options}
+    bearings = [360.0 * i / n for i in range(n)]
     return from_bearings(bearings, density, **{"name": name, **options})
 
 
 def _is_published(n: int, options: Mapping[str, Any]) -> bool:
-    """Whether this is a junction of the paper: its arms, side and measures."""
+    """Whether the junction has the arms, side and measures of one of the paper's."""
     radius = options.get("junction_radius")
     return (
         n in PUBLISHED_ARMS

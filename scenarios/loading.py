@@ -1,8 +1,8 @@
-"""Classes of the caller's own, named `module:Class`, from the working directory or installed.
+"""A caller's own classes, named `module:Class`, from the working directory or installed.
 
-Python finds a module of the working directory only where that is on the search path, and a worker
-process does not have it there. So it is put there for as long as the module is imported, and
-objects of the module's classes are pickled with the folder that they came from.
+Python may not search the working directory, and a worker process does not. So the directory is on
+the search path while a module of it is imported, and objects of the module's classes are pickled
+together with their folder.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Any
 
 from minisim.errors import InputError, choice
 
-#: File -> its text when it was last imported here.
+#: File -> its text when it was last imported.
 _texts: dict[Path, bytes] = {}
 
 
 def load_class(module: str, name: str) -> type:
-    """A class by the name of its module, or the path of its file, and its own name.
+    """A class by its own name and the name of its module or the path of its file.
 
     Raises:
-        InputError: no such module or class, or one that cannot be imported; the message names file
-            and line where there is one.
+        InputError: no such module or class, or one that cannot be imported; the message names the
+            file and line where there is one.
     """
     file = _file_of(module)
     loaded = _imported(module) if file is None else _from_file(*file)
@@ -47,11 +47,7 @@ def load_class(module: str, name: str) -> type:
 
 
 def _file_of(module: str) -> tuple[Path, str] | None:
-    """The folder to import from and the module's name there; None where it is elsewhere.
-
-    Raises:
-        InputError: a path to no file.
-    """
+    """The folder and the module's name there; None for an installed module."""
     if module.endswith(".py"):
         path = Path(module)
         if not path.is_file():
@@ -73,7 +69,7 @@ def _imported(module: str) -> ModuleType:
 
 
 def _from_file(folder: Path, name: str) -> ModuleType:
-    """Import a module of a folder; again where its text has changed."""
+    """Import a module of a folder, again when its text has changed."""
     file = _source(folder, name)
     try:
         text = file.read_bytes()
@@ -97,14 +93,13 @@ def _from_file(folder: Path, name: str) -> ModuleType:
 
 
 def _source(folder: Path, name: str) -> Path:
-    """The file of a module."""
     place = folder.joinpath(*name.split("."))
     package = place / "__init__.py"
     return package if package.is_file() else place.with_name(f"{place.name}.py")
 
 
 def _check_own(module: ModuleType | None, file: Path) -> None:
-    """Raise `InputError` where a module is not the one of the file."""
+    """Raise `InputError` when a module was imported from another file."""
     origin = getattr(module, "__file__", None) or ""
     if module is not None and Path(origin).resolve() != file.resolve():
         raise InputError(
@@ -114,7 +109,7 @@ def _check_own(module: ModuleType | None, file: Path) -> None:
 
 @contextmanager
 def _found_in(folder: Path) -> Iterator[None]:
-    """The folder is where Python looks first. No byte code: its age is known to a second only."""
+    """Search the folder first, and write no byte code: Python knows its age only to a second."""
     before, written = list(sys.path), sys.dont_write_bytecode
     sys.path.insert(0, str(folder))
     sys.dont_write_bytecode = True
@@ -127,7 +122,7 @@ def _found_in(folder: Path) -> Iterator[None]:
 
 
 def _told(error: BaseException, folder: Path = Path("/")) -> str:
-    """What went wrong, and the last line of the folder's files that led there."""
+    """What went wrong, after the last line of the folder's files that led there."""
     if isinstance(error, SyntaxError):
         return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
     lines = [
@@ -139,7 +134,7 @@ def _told(error: BaseException, folder: Path = Path("/")) -> str:
 
 
 class _Reduce:
-    """How objects of a folder's module are pickled: with the folder and the module's name."""
+    """Pickles an object with the folder and name of its module."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self._origin = str(folder), name
@@ -157,7 +152,7 @@ class _Reduce:
 
 
 def _restored(folder: str, name: str, data: bytes) -> Any:
-    """An object again, in this process or another on the same machine."""
+    """The object, in this process or in another one on the same machine."""
     if name not in sys.modules:
         _from_file(Path(folder), name)
     return pickle.loads(data)

@@ -1,7 +1,7 @@
-"""The paper's runs: how each was set up, replays of them, and its reference numbers.
+"""The paper's runs: their set-up, replays of them, and the paper's numbers.
 
 The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`) and V2I-C
-(`v2ic`). Some of its runs were not what their label says; `RAN` lists how.
+(`v2ic`). Some of its runs were not what their label says; `RAN` lists them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from baselines import Actuated, Adaptive, FixedTime
@@ -39,33 +38,22 @@ DENSITIES = (150, 200, 250, 300, 350)
 #: Splits of the inflow over the lanes, as in `reference.csv`.
 SPLITS = ("balanced", "4:3:2:1", "4:1:4:1")
 
-#: What the paper compares DIM with, as in `reference.csv`; on 4 arms only.
-BASELINES = ("fts", "ats", "v2ic")
-
-#: Greens of the published fixed-time runs, by mean inflow a lane [s]: Webster's, as the paper's
-#: table rounds them. 5 and 7 s follow from the trips, where cycles last 28 and 36 s; 61.75 is in
-#: the network file, and 19.25 (the table prints 19.75) in that of the adaptive signal.
+#: Mean inflow a lane [veh/h] -> green [s] of the published fixed-time runs: Webster's, as the
+#: paper's table rounds it. 5 and 7 s follow from the trips, where cycles last 28 and 36 s. 61.75 is
+#: in the network file, and 19.25 (the table prints 19.75) in that of the adaptive signal.
 GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.
 PHASES = (2, 1, 0, 3)
 
-
-#: Their names of all four -> ours.
-SERIES: Mapping[str, str] = MappingProxyType(
-    {"dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"}
-)
+#: The paper's names of the controllers, as in `reference.csv` -> ours.
+SERIES: Mapping[str, str] = {
+    "dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"
+}  # fmt: skip
 
 
 class Cell(NamedTuple):
-    """One published run.
-
-    Attributes:
-        split: one of `SPLITS`.
-        density: mean inflow a lane [veh/h].
-        arms: of the junction.
-        controller: "dim", or one of `BASELINES`.
-    """
+    """One published run: one of `SPLITS`, inflow a lane [veh/h], arms, and a key of `SERIES`."""
 
     split: str
     density: int
@@ -73,33 +61,33 @@ class Cell(NamedTuple):
     controller: str = "dim"
 
     def __str__(self) -> str:
-        who = "" if self.controller == "dim" else f"{self.controller}, "
-        return f"{who}{self.split} {self.density} veh/h, {self.arms} arms"
+        prefix = "" if self.controller == "dim" else f"{self.controller}, "
+        return f"{prefix}{self.split} {self.density} veh/h, {self.arms} arms"
 
 
-#: Every published run of DIM: 3 and 5 arms with equal inflow only.
+#: Every published run of DIM. On 3 and 5 arms all have equal inflow.
 GRID: tuple[Cell, ...] = (
     *(Cell("balanced", density, arms) for arms in PUBLISHED_ARMS for density in DENSITIES),
     *(Cell(split, density, 4) for split in SPLITS[1:] for density in DENSITIES),
 )
 
-#: Every published run of the others.
+#: Every published run of the other controllers, all on 4 arms.
 BASELINE_GRID: tuple[Cell, ...] = tuple(
     Cell(split, density, 4, controller)
-    for controller in BASELINES
+    for controller in ("fts", "ats", "v2ic")
     for split in SPLITS
     for density in DENSITIES
 )
 
 
 class Ran(NamedTuple):
-    """How a published run was set up; a None stands for what the label says.
+    """How a published run was set up; None where its label is right.
 
     Attributes:
-        shares: of the inflow, by arm, clockwise from north; equal ones are "balanced".
-        controller: name of a controller, see `scenarios.controllers`.
+        shares: split of the inflow over the arms, clockwise from north.
+        controller: its spelling, as of `scenarios.controllers`.
         green: of a fixed-time signal, at every density [s].
-        profile: whose vehicle.
+        profile: the one with its vehicle.
     """
 
     shares: str | None = None
@@ -108,9 +96,9 @@ class Ran(NamedTuple):
     profile: Profile | None = None
 
 
-#: The runs that were not what they are labelled, by controller and split. The vehicle of the
-#: fixed-time signal's unbalanced runs was that of DIM: their driver switches its ACC on, the trips
-#: have a speed factor of 1.00 and the 0.16 s of waiting with which that vehicle starts.
+#: Controller and split -> what ran, where the label is wrong. The unbalanced runs of the fixed-time
+#: signal had DIM's vehicle: their driver switches its ACC on, and their trips have a speed factor
+#: of 1.00 and the 0.16 s of waiting with which that vehicle starts.
 RAN: dict[tuple[str, str], Ran] = {
     ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
@@ -120,7 +108,7 @@ RAN: dict[tuple[str, str], Ran] = {
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }
 
-#: What the labels mean: each controller's name and the profile of its balanced runs.
+#: What a label means: a controller and the profile of its balanced runs.
 LABELS: dict[str, tuple[str, Profile]] = {
     "dim": ("dim-as-run", AS_RUN),
     "fts": ("fixed-time", AS_RUN_SIGNALS),
@@ -138,12 +126,12 @@ def scenario(
     profile: str | Profile | None = None,
     as_labelled: bool = False,
 ) -> Scenario:
-    """A cell of the grid with arrivals drawn by seed.
+    """The scenario of a published run, with arrivals drawn by seed.
 
     Args:
         split, density, arms, controller: see `Cell`.
         profile: None is that of the published run.
-        as_labelled: what the label says, instead of what was run (`RAN`).
+        as_labelled: what the label says, not what ran (`RAN`).
 
     Raises:
         InputError: no such cell, or an unknown profile.
@@ -164,7 +152,7 @@ def replay(
     profile: str | Profile | None = None,
     sumo: str = "1.18",
 ) -> Scenario:
-    """A cell of the grid with the arrivals of its published run.
+    """The scenario of a published run, with its own arrivals.
 
     With `controller_of` the same cell and collisions answered by "teleport", the trips of DIM are
     those of SUMO 1.18 on the same arrivals, vehicle by vehicle. Vehicles that were still on the
@@ -179,23 +167,18 @@ def replay(
     Raises:
         InputError: no such cell, or an unknown profile or version.
     """
-    cell = _cell(split, density, arms, controller)
-    ran = _ran(cell, as_labelled=False)
-    made = MAKERS[cell.arms](
-        cell.density,
-        split=ran.shares or split,
-        profile=profile or _profile(cell, ran),
-        recorded=published_arrivals(*cell),
+    made = replace(
+        scenario(split, density, arms, controller, profile=profile),
+        recorded=published_arrivals(split, density, arms, controller),
     )
     vehicle, junction = made.profile.vehicle, made.intersection
     if not isinstance(vehicle, CruiseVehicle) or junction.ways is None:
         return made
-    signals = cell.controller == "fts"  # its network has none
-    turnarounds = "" if sumo != "1.18" or signals else TURNAROUNDS[split]
-    ways = published_ways(cell.arms, turnarounds if cell.arms == 4 else "")
+    signals = controller == "fts"  # its network has none
+    turnarounds = "" if sumo != "1.18" or signals or arms != 4 else TURNAROUNDS[split]
     return replace(
         made,
-        intersection=replace(junction, ways=ways),
+        intersection=replace(junction, ways=published_ways(arms, turnarounds)),
         profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo)),
     )
 
@@ -203,7 +186,7 @@ def replay(
 def controller_of(
     split: str, density: int, arms: int, controller: str = "dim", *, as_labelled: bool = False
 ) -> Controller:
-    """What decided in a published run, or would have by its label.
+    """The controller of a published run, or the one that its label names.
 
     Raises:
         InputError: no such cell.
@@ -233,9 +216,7 @@ def _reference() -> pd.DataFrame:
     import pandas as pd
 
     with (resources.files("scenarios") / "data" / "reference.csv").open(encoding="utf-8") as text:
-        table = pd.read_csv(text, keep_default_na=True)
-    table["note"] = table["note"].fillna("")
-    return table
+        return pd.read_csv(text).fillna({"note": ""})
 
 
 def reference() -> pd.DataFrame:
@@ -248,31 +229,10 @@ def reference() -> pd.DataFrame:
 
 
 def reference_rows(cell: Cell, metric: str, lane: str = "all") -> pd.DataFrame:
-    """What the paper has of one mean of a cell: the rows of `reference`, none or one."""
+    """The rows of `reference`, none or one, with a metric of a cell."""
     table = _reference()
-    return table[
-        (table["controller"] == cell.controller)
-        & (table["arms"] == cell.arms)
-        & (table["split"] == cell.split)
-        & (table["density"] == cell.density)
-        & (table["metric"] == metric)
-        & (table["lane"] == lane)
-    ].copy()
-
-
-def reference_value(
-    cell: Cell, metric: str, controller: str | None = None, lane: str = "all"
-) -> float:
-    """One published mean [s], of the cell's controller or of another; raises `InputError`."""
-    table = _reference()
-    if controller is not None:
-        cell = cell._replace(controller=controller)
-    choice("metric", metric, sorted(set(table["metric"])))
-    choice("published controller", cell.controller, sorted(set(table["controller"])))
-    rows = reference_rows(cell, metric, lane)
-    if rows.empty:
-        raise InputError(f"the paper has no {metric} of {cell.controller}, lane {lane}, for {cell}")
-    return float(rows["value"].iloc[0])
+    asked = {**cell._asdict(), "metric": metric, "lane": lane}
+    return table[(table[list(asked)] == list(asked.values())).all(axis="columns")].copy()
 
 
 def _cell(split: str, density: int, arms: int, controller: str) -> Cell:

@@ -1,7 +1,4 @@
-"""Data of the published runs that travel with the project: junctions and arrivals.
-
-See the README beside each kind of file in `scenarios/data` for where it comes from.
-"""
+"""Junctions and arrivals of the published runs, from `scenarios/data`; READMEs there say more."""
 
 from __future__ import annotations
 
@@ -16,9 +13,9 @@ from minisim.errors import choice
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 
-#: From 10 August 2023 on, when the runs at 4:1:4:1 were made, the authors' networks call the arms,
-#: clockwise from north, by these letters (`my_network.net.xml` of that time: b+ comes from the
-#: south, c+ from the east).
+#: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
+#: when the runs at 4:1:4:1 were made (in `my_network.net.xml` of that time, b+ comes from the south
+#: and c+ from the east).
 RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
 #: Arm counts of the published junctions.
@@ -62,13 +59,7 @@ def _way(row: dict[str, str], arms: int, turnarounds: str) -> Way:
 
 
 def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
-    """The arrivals of a published run, by the arms of our junctions (clockwise from north).
-
-    Args:
-        split: "balanced", "4:3:2:1" or "4:1:4:1".
-        density: mean inflow a lane [veh/h].
-        arms: of the junction.
-        controller: "dim", "fts", "ats" or "v2ic".
+    """The arrivals of a published run (`scenarios.paper.Cell`), by the arms of our junctions.
 
     Raises:
         InputError: no such run was published.

@@ -1,9 +1,9 @@
-"""One recipe of a run, from which every entrance starts: Python, the command line, files, studies.
+"""The recipe of a run. Python, the command line, files and studies all start from one.
 
     run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
     run.summary()
 
-Two entrances that describe the same recipe get the same numbers.
+The same recipe gives the same numbers, wherever it comes from.
 """
 
 from __future__ import annotations
@@ -17,33 +17,28 @@ from minisim.errors import InputError, show
 from minisim.parameters import checked, declared, part, real, text, whole, word
 from minisim.results.metrics import Metric, named_metrics, recording
 from minisim.results.run import Run
+from scenarios.controllers import check_controller
 from scenarios.scenario import Scenario
 
-#: What a collision may do to a run; "teleport" is for SUMO only.
+#: What a collision does to a run; "teleport" is for SUMO only.
 ON_COLLISION = ("stop", "record", "teleport")
 
 #: Makes a run of a scenario, a controller and a seed, such as `minisim.simulate`.
 Host = Callable[..., Run]
 
 
-def _controller(title: str, value: Any) -> Controller:
-    if isinstance(value, Controller) and not isinstance(value, type):
-        return value
-    missing = [part for part in ("name", "start") if not hasattr(value, part)]
-    lack = f"which has no {' and no '.join(missing)}" if missing else "which is a class"
-    raise InputError(f"{title} must be a Controller, got {show(value)}, {lack}")
-
-
 @declared
 class Recipe:
-    """One run to be made: what is simulated, who decides, and the seed.
+    """One run: what is simulated, which controller decides, and the seed.
 
     Raises:
         InputError: a value that is not allowed, or humans with a controller other than DIM.
     """
 
     scenario: Scenario = part("what is simulated", Scenario)
-    controller: Controller = checked("who decides", _controller, "Controller")
+    controller: Controller = checked(
+        "decides who goes", lambda _, value: check_controller(show(value), value), "Controller"
+    )
     seed: int = whole("of the random streams", low=0, default=0)
     humans: float = real(
         "share of human drivers among the vehicles of DIM",
@@ -54,9 +49,8 @@ class Recipe:
         "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
         ON_COLLISION, default="stop",
     )  # fmt: skip
-
     metrics: tuple[str | Metric, ...] = checked(
-        "what rows have besides the usual (`minisim.results.metrics`)",
+        "columns besides the usual ones (`minisim.results.metrics`)",
         lambda _, value: named_metrics(value),
         "names and Metrics", default=(),
     )  # fmt: skip
@@ -84,8 +78,8 @@ class Recipe:
         """Simulate it, and record what its metrics need.
 
         Args:
-            host: `minisim.simulate`, or another function that takes the same arguments.
-            options: of the host, such as `record`.
+            host: `minisim.simulate` unless given; takes the same arguments.
+            options: more arguments of the host, such as `record`.
 
         Raises:
             InputError: an option that is not allowed, or a scenario that the controller cannot
@@ -94,9 +88,8 @@ class Recipe:
         """
         from minisim.simulation import simulate
 
-        host = host or simulate
         if options.get("record") is None and (record := recording(self.metrics)):
             options["record"] = record
-        return host(
+        return (host or simulate)(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

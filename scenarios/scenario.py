@@ -1,4 +1,4 @@
-"""What is simulated: a junction, its demand and a profile; frozen, so it can name a result."""
+"""What is simulated: a junction, its demand and a profile."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ KMH = 1.0 / 3.6
 class Profile:
     """One consistent set of vehicle, speeds and step."""
 
-    name: str = text("as on the command line", label="profile name")
+    name: str = text("its name on the command line", label="profile name")
     vehicle: VehicleType = part("the type of all vehicles", VehicleType)
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     depart_speed: float | None = real(
@@ -30,9 +30,9 @@ class Profile:
             number("depart_speed [m/s]", self.depart_speed, high=self.speed_limit)
 
 
-#: The parameters that the paper's text prescribes: §III road 40 km/h, deceleration 2 m/s², car of
-#: 4 m with 2 m of headway. What it leaves open (acceleration, time headway, emergency braking,
-#: width) is SUMO's passenger car, since the paper simulates in SUMO.
+#: What the paper's text prescribes in §III: roads of 40 km/h, deceleration 2 m/s², cars of 4 m with
+#: 2 m of headway. The rest (acceleration, time headway, emergency braking, width) is that of SUMO's
+#: passenger car, since the paper simulates in SUMO.
 PAPER = Profile(
     name="paper",
     vehicle=VehicleType(length=4.0, min_gap=2.0, deceleration=2.0),
@@ -85,7 +85,7 @@ AS_RUN_SIGNALS = Profile(
     dt=0.01,
 )
 
-#: The profiles of published runs: they go with the junctions of the authors' networks.
+#: The profiles of published runs, which use the junctions of the authors' networks.
 PUBLISHED_PROFILES = (AS_RUN, AS_RUN_SIGNALS)
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROFILES)}
@@ -93,7 +93,7 @@ PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROF
 
 @declared(kw_only=True)
 class Scenario:
-    """A junction, its demand and a profile: everything of a run but controller and seed."""
+    """A junction, its demand and a profile: all of a run except its controller and seed."""
 
     name: str = text('such as "four-way"', label="scenario name")
     intersection: Intersection = part("the geometry", Intersection)
@@ -103,7 +103,7 @@ class Scenario:
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
     warmup: float = real(
-        "trips demanded before it do not count in any mean or number of trips", "s",
+        "trips demanded before it count in no mean and no number of trips", "s",
         low=0, default=0.0,
     )  # fmt: skip
     recorded: Arrivals | None = part(
@@ -132,18 +132,14 @@ class Scenario:
     @property
     def density(self) -> float:
         """Mean inflow a lane [veh/h], as demanded or as recorded."""
-        if self.recorded is None:
-            return self.demand.density
-        rates = self.rates
-        return sum(rates) / len(rates)
+        return self.demand.density if self.recorded is None else sum(self.rates) / len(self.rates)
 
     @property
     def rates(self) -> tuple[float, ...]:
         """Mean inflow of each lane [veh/h]."""
         n = self.intersection.n
-        if self.recorded is not None:
-            return self.recorded.rates(n, self.horizon)
-        return self.demand.rates(n)
+        recorded = self.recorded
+        return recorded.rates(n, self.horizon) if recorded is not None else self.demand.rates(n)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know of it."""
@@ -164,7 +160,7 @@ class Scenario:
 
 
 def profile_named(name: str | Profile) -> Profile:
-    """Look a profile up by name; a `Profile` passes through."""
+    """The profile of a name; a `Profile` passes through."""
     if isinstance(name, Profile):
         return name
     return PROFILES[choice("profile", name, PROFILES)]

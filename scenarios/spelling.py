@@ -3,8 +3,8 @@
     dim:gate=harmonious,priorities=(3,2,1,0),perception=noisy(intent_error=0.15,kind=symmetric)
 
 Values are numbers, words, quoted texts, lists in brackets, and nested recipes. `true`, `false` and
-`none` may be in any case; `on` and `off` say whether something is there. A text is parsed as Python
-source, and never evaluated. A table, as TOML has it, means the same: `{name = "dim", gate =
+`none` may be in any case; `on` and `off` switch a part on and off. A text is parsed as Python
+source and never evaluated. A table, as TOML has it, means the same: `{name = "dim", gate =
 "harmonious", perception = {name = "noisy", intent_error = 0.15}}`.
 """
 
@@ -31,7 +31,7 @@ _SIMPLE = (float, int, str, bool)
 
 @dataclass(frozen=True)
 class Call:
-    """A recipe as it was written: a name, and arguments by place and by name."""
+    """A recipe as written: a name, and arguments by position and by name."""
 
     name: str
     places: tuple[Any, ...] = ()
@@ -43,7 +43,7 @@ class Call:
 
 
 def parse_arguments(name: str, text: str) -> Call:
-    """`key=value,…` as the arguments of a recipe of that name; raises `InputError`."""
+    """`key=value,…`, the arguments of the recipe `name`; raises `InputError`."""
     try:
         tree = ast.parse(f"_({text})", mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -67,18 +67,21 @@ def call_of(value: Mapping[str, Any]) -> Call:
 
 
 def build(title: str, make: Callable[..., Any], call: Call) -> Any:
-    """What `make` makes of the arguments.
+    """Call `make` with the arguments of `call`.
 
     Args:
         title: what messages call the recipe.
-        make: a class or function. Values for declared parameters (`minisim.parameters`) may be
-            words and nested recipes; others must have the type of a simple annotation.
+        make: a class or function. Declared parameters (`minisim.parameters`) take words and nested
+            recipes; the values of others must fit a simple annotation.
         call: the arguments.
 
     Raises:
         InputError: no such parameter (with the nearest one), or a value that is not allowed.
     """
-    signature = _signature(title, make)
+    try:
+        signature = inspect.signature(make)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{title} cannot be made from parameters: {error}") from None
     kinds = {it.name: it.kind for it in signature.parameters.values()}
     names = [name for name, kind in kinds.items() if kind not in _VARIABLE]
     if inspect.Parameter.VAR_KEYWORD not in kinds.values():
@@ -106,7 +109,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
 
 
 def _value(name: str, parameter: Parameter, value: Any) -> Any:
-    """What a written value means for a declared parameter; its check comes later."""
+    """What a written value means for a declared parameter, which checks it later."""
     if isinstance(value, Mapping):
         only = {"name": next(iter(parameter.kinds))} if len(parameter.kinds) == 1 else {}
         value = call_of({**only, **value})
@@ -126,21 +129,13 @@ def _value(name: str, parameter: Parameter, value: Any) -> Any:
     return build(f"{name}={word}", parameter.kinds[word], call)
 
 
-def _signature(title: str, make: Callable[..., Any]) -> inspect.Signature:
-    try:
-        return inspect.signature(make)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{title} cannot be made from parameters: {error}") from None
-
-
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:
-    """Annotations by parameter; none where they name what cannot be looked up."""
-    annotated: Any = make
-    if isinstance(make, type):
-        annotated = vars(make).get("__init__", make)
+    """Annotations by parameter; none where one of them cannot be resolved."""
     try:
-        return typing.get_type_hints(annotated)
-    except Exception:  # they are the caller's own, and may be anything
+        return typing.get_type_hints(
+            vars(make).get("__init__", make) if isinstance(make, type) else make
+        )
+    except Exception:  # the annotations are the caller's own, and may be anything
         return {}
 
 
@@ -150,15 +145,13 @@ def _check_simple(title: str, hint: Any, value: Any) -> None:
     kinds = typing.get_args(hint) if union else (hint,)
     if any(kind not in (*_SIMPLE, types.NoneType) for kind in kinds):
         return
-    if not any(_is_simple(value, kind) for kind in kinds):
+    if not any(
+        isinstance(value, (float, int) if kind is float else kind)
+        for kind in kinds
+        if (kind is bool) == isinstance(value, bool)  # True is no number here
+    ):
         names = " or ".join("None" if kind is types.NoneType else kind.__name__ for kind in kinds)
         raise InputError(f"{title} must be a {names}, got {show(value)}")
-
-
-def _is_simple(value: object, kind: type) -> bool:
-    if isinstance(value, bool):
-        return kind is bool
-    return isinstance(value, (float, int) if kind is float else kind)
 
 
 def _call(name: str, node: ast.Call) -> Call:
@@ -175,7 +168,7 @@ def _call(name: str, node: ast.Call) -> Call:
 
 
 def _parsed(name: str, node: ast.expr) -> Any:
-    """The value that a piece of source stands for."""
+    """The value of a piece of source."""
     match node:
         case ast.Constant(value=bool() | int() | float() | str() | None as value):
             return value

@@ -11,23 +11,17 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, number, numbers
 
-#: Standard deviations of chance beyond which a queue is said to grow: a normal variable exceeds
-#: them in 1 % of cases.
+#: A queue grows when it exceeds this many standard deviations of chance; a normal variable does so
+#: in 1 % of cases.
 GROWTH_SCORE = 2.326
 
-#: The shortest horizon that can show growth, in travel times on a free road: the roads are full
-#: when the second of four quarters begins.
+#: The shortest horizon that can show growth, in travel times on a free road. The roads are then
+#: full at the start of the second quarter.
 FILLING = 4.0
 
 
 class Interval(NamedTuple):
-    """A mean and the half width of its confidence interval.
-
-    Attributes:
-        mean: of the values.
-        half_width: the interval is mean ± half_width; NaN for a single value.
-        size: number of values.
-    """
+    """The interval mean ± half_width of a number (`size`) of values; NaN wide for a single one."""
 
     mean: float
     half_width: float
@@ -50,16 +44,16 @@ def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval
 
 
 def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
-    """Where one more independent value would lie, t·s·√(1 + 1/n) about the mean of n.
+    """Interval of one more independent value, t·s·√(1 + 1/n) about the mean of n values.
 
-    One published run is compared with this interval, not with that of the mean. For normally
-    distributed values it holds the next one with probability `confidence` (Hahn & Meeker 1991,
-    Statistical Intervals, §4.7).
+    Compare a single published run with this interval, not with that of the mean. It holds the next
+    of normally distributed values with probability `confidence` (Hahn & Meeker 1991, Statistical
+    Intervals, §4.7).
 
     Raises:
         InputError: as `mean_interval`.
     """
-    from scipy.special import stdtrit  # a tenth of a second, which `minisim run` need not wait for
+    from scipy.special import stdtrit  # takes a tenth of a second to import
 
     data = numbers("values", values)
     number("confidence", confidence, above=0, below=1)
@@ -75,10 +69,11 @@ def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> In
 
 
 def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Confidence interval of the mean of a Poisson variable of which one value is known.
+    """Confidence interval of the mean of a Poisson variable from one value of it.
 
-    Exact: the means at which so few or so many events are just likely enough (Garwood 1936). After
-    0 events the mean is below −ln((1−confidence)/2), which is 3.7 for 0.95.
+    Exact: at the upper end, `count` or fewer events have probability (1−confidence)/2, at the lower
+    end `count` or more (Garwood 1936). After 0 events the upper end is −ln((1−confidence)/2), which
+    is 3.7 for 0.95.
 
     Raises:
         InputError: no count, or a confidence outside (0, 1).
@@ -93,19 +88,18 @@ def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float
 
 
 def growing(growth: float, trips: int) -> bool:
-    """Whether queues kept growing, which makes a mean delay an artefact of the horizon.
+    """Whether queues kept growing; a mean delay then depends on the horizon.
 
     With Poisson arrivals at rate λ and service that just keeps up, the number of vehicles is a
     random walk of variance λ a second. The means of two windows of length T/4 that begin T/2 apart
-    then differ with variance λ(T/2 − T/12) = 5/12 λT, λT being the expected number of trips: the
-    integral of the walk's covariance min(s, t) over both windows. A queue with capacity to spare
-    returns to its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals, 0.2 %
-    are called growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Growth and trips
-    may be sums over runs, which sees slower growth: of cells of ten such hours none at 0.95, 6 %
-    at 1, 98 % at 1.1.
+    differ with variance λ(T/2 − T/12) = 5/12 λT: the integral of the walk's covariance min(s, t)
+    over both windows. λT is the expected number of trips. A queue with capacity to spare returns to
+    its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals, 0.2 % are called
+    growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Sums over runs show slower
+    growth: of cells of ten such hours, none is called growing at 0.95, 6 % at 1, 98 % at 1.1.
 
-    A horizon of less than four travel times (`FILLING`) says nothing: the roads are still filling
-    in the second quarter, and have more vehicles in the last whatever the queues do.
+    A horizon of less than four travel times (`FILLING`) shows nothing: the roads still fill in the
+    second quarter, so the last one has more vehicles in any case.
     """
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 
@@ -114,7 +108,7 @@ def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
     """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
 
     The two-sample statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for
-    samples that do not overlap. scipy has it too, in a module that takes a second to import.
+    samples that do not overlap. scipy's own takes a second to import.
 
     Raises:
         InputError: a sample is empty or holds something that is not finite.

@@ -43,7 +43,7 @@ def floats(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def bearings(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> tuple[float, ...]:
-    """Bearings of 3 … 6 arms, at least `MIN_ANGLE` apart; any such set can come out."""
+    """Bearings of 3 … 6 arms, at least `MIN_ANGLE` apart; every such set is possible."""
     n = draw(st.integers(min_arms, max_arms))
     spare = 360.0 - MIN_ANGLE * n
     cuts = sorted(draw(st.lists(floats(0.0, spare), min_size=n - 1, max_size=n - 1)))
@@ -55,36 +55,28 @@ def bearings(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> tuple[flo
 
 @st.composite
 def intersections(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> Intersection:
-    """Junctions of any shape: both sides, lanes of 2.8 … 4 m, the default radius or a larger."""
+    """Junctions of any shape: both sides, lanes of 2.8 … 4 m, at least the default radius."""
     lane_width = draw(st.sampled_from([3.2, 2.8, 3.5, 4.0]))
     widened = draw(st.sampled_from([1.0, 1.25, 2.0]))
     angles = draw(bearings(min_arms, max_arms))
-    default = Intersection(angles, lane_width=lane_width).junction_radius
-    return Intersection(
-        angles,
-        side=draw(st.sampled_from(SIDES)),
-        lane_width=lane_width,
-        junction_radius=default * widened,
-    )
+    made = Intersection(angles, side=draw(st.sampled_from(SIDES)), lane_width=lane_width)
+    return replace(made, junction_radius=made.junction_radius * widened)
 
 
 @st.composite
 def vehicles(draw: st.DrawFn) -> VehicleType:
-    """Passenger cars: 3 … 6 m long, 1.5 … 2 m wide, any ordinary way of driving."""
-    acceleration, deceleration = draw(floats(0.8, 4.0)), draw(floats(1.5, 5.0))
-    needed = VehicleType(
-        acceleration=acceleration, deceleration=deceleration, max_deceleration=100.0
-    ).needed_braking
-    return VehicleType(
+    """Passenger cars: 3 … 6 m long, 1.5 … 2 m wide, driven in any ordinary way."""
+    made = VehicleType(
+        acceleration=draw(floats(0.8, 4.0)),
+        deceleration=draw(floats(1.5, 5.0)),
         length=draw(floats(3.0, 6.0)),
         width=draw(floats(1.5, 2.0)),
-        acceleration=acceleration,
-        deceleration=deceleration,
         headway=draw(floats(0.8, 2.0)),
         min_gap=draw(floats(1.0, 4.0)),
-        max_deceleration=draw(floats(max(6.0, needed), 12.0)),
+        max_deceleration=100.0,
         model=draw(st.sampled_from(["idm", "iidm"])),
     )
+    return replace(made, max_deceleration=draw(floats(max(6.0, made.needed_braking), 12.0)))
 
 
 def movements(intersection: Intersection) -> st.SearchStrategy[Movement]:
@@ -138,7 +130,7 @@ def scenarios(
 
 @st.composite
 def emptying(draw: st.DrawFn) -> Scenario:
-    """A random junction with demand for a minute, then an hour for any rule to serve it."""
+    """A random junction with demand for a minute, and an hour in which to serve it."""
     intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
     demand = draw(demands(intersection.n))
     arrivals = demand.draw(intersection.n, 60.0, seed=draw(st.integers(0, 1000)))

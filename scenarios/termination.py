@@ -1,4 +1,4 @@
-"""SIGTERM as an exception, so that a process that is told to end cleans up first."""
+"""SIGTERM as an exception, so that a process cleans up before it ends."""
 
 from __future__ import annotations
 

@@ -10,12 +10,14 @@ import signal
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from hypothesis import settings
 
 from dim import Dim, NoisyPerception
+from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
     Command,
@@ -32,9 +34,10 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
+from scenarios.paper import Cell, reference_rows
 from scenarios.recipe import Recipe
 from scenarios.scenario import AS_RUN
-from scenarios.sweep.rows import identity_of
+from scenarios.sweep.rows import MEASURED, identity_of
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -74,17 +77,24 @@ class Fixed:
     name: str = "fixed"
 
     def start(self, site: Site) -> Session:
-        return _FixedSession(self.plan, self.first)
+        return ScriptedSession(self.plan, lambda view: () if view.time else self.first)
 
 
-class _FixedSession:
-    def __init__(self, plan: Plan, first: tuple[Command, ...]) -> None:
-        self.plan = plan
-        self.first = first
+@dataclass(frozen=True)
+class Scripted:
+    """A controller whose sessions answer a view by calling `answer`."""
 
-    def decide(self, view: View) -> Iterable[Command]:
-        commands, self.first = self.first, ()
-        return commands
+    answer: Callable[[View], Iterable[Command]]
+    plan: Plan = field(default_factory=Plan)
+    name: str = "scripted"
+
+    def start(self, site: Site) -> Session:
+        return ScriptedSession(self.plan, self.answer)
+
+
+class ScriptedSession(NamedTuple):
+    plan: Plan
+    decide: Callable[[View], Iterable[Command]]
 
 
 @dataclass(frozen=True)
@@ -108,6 +118,11 @@ class Deadly:
         return Unregulated().start(site)
 
 
+def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows without the columns that differ when a run is repeated."""
+    return rows.drop(columns=list(MEASURED))
+
+
 def as_run(scenario: SmallScenario) -> SmallScenario:
     """The same with the vehicle of the published runs, inserted at rest, and steps of 0.02 s."""
     return dataclasses.replace(scenario, vehicle=AS_RUN.vehicle, dt=0.02, depart_speed=0.0)
@@ -125,6 +140,33 @@ def killing(once: str) -> int:
 def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0) -> Observed:
     """One vehicle of 5 m."""
     return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+
+
+def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed:
+    """A vehicle by the name of its movement, such as a1."""
+    return seen(id, ARM_NAMES.index(movement[0]), int(movement[1]), distance, speed)
+
+
+def view(*vehicles: Observed, time: float = 0.0) -> View:
+    """These vehicles, by lane and front to back."""
+    return View(time, tuple(sorted(vehicles, key=lambda v: (v.lane, v.distance))))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A perception that errs in intents as told.
+
+    Attributes:
+        read: a view, an ego and a vehicle -> the manoeuvre that the ego reads.
+    """
+
+    read: Callable[[View, Observed, Observed], int]
+    period: float | None = 0.1
+
+    def start(self, site: Site) -> See:
+        return lambda view, ego: view._replace(
+            vehicles=tuple(v._replace(manoeuvre=self.read(view, ego, v)) for v in view.vehicles)
+        )
 
 
 def said(commands: Iterable[Command]) -> list[str]:
@@ -178,7 +220,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
     # The studies of perception name what errs, not a series; that of humans their share.
-    label, _, share = (experiment.label or "dim").partition("-humans-")
+    label, _, share = (experiment.label or "dim").partition("+humans=")
     base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
     wobble = 1.0 + 0.1 * math.sin(7.0 * experiment.seed)
@@ -245,3 +287,8 @@ def free_flow(seconds: float) -> dict[str, float | None]:
 def share(part: float) -> settings:
     """Decorator: only this share of the profile's examples, for costly properties."""
     return settings(max_examples=max(1, round(part * settings().max_examples)))
+
+
+def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
+    """One published mean [s]."""
+    return float(reference_rows(cell, metric, lane)["value"].item())

@@ -1,8 +1,15 @@
-"""Hypothesis profiles for all tests: the same examples in every run and on every machine."""
+"""For all tests: the same examples and the same stderr in every run and on every machine."""
 
 from __future__ import annotations
 
+import math
+
 from hypothesis import HealthCheck, Phase, settings
+
+from scenarios.cli.shared import terminal
+
+# On a busy machine a command would tell its progress on stderr.
+terminal.SILENCE = math.inf
 
 # No deadline and no `too_slow`: compilation and a busy machine are no failures.
 settings.register_profile(

@@ -8,15 +8,10 @@ from __future__ import annotations
 
 import math
 
-from baselines.signals.heads import full_order, lane_order
-from baselines.signals.phases import (
-    PhaseSession,
-    Verdict,
-    check_greens,
-    following,
-)
+from baselines.signals.heads import lane_order
+from baselines.signals.phases import PhaseSession, Verdict, check_greens
 from minisim.control import Site, View
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -29,14 +24,16 @@ class Actuated:
     """A signal that prolongs a green while vehicles follow each other closely enough.
 
     One phase an approach, in a fixed order; none is left out. Each lane has a loop before the
-    junction. While the last vehicle left it less than `max_gap` ago, the green goes on: for what
-    is left of `detector_gap`, in which that vehicle reaches the line, up to a whole second of the
-    phase, and never beyond `max_green`. A vehicle that stands on the loop leaves no gap. Vehicles
-    beyond the loop at the beginning of a green are not seen: `min_green` is there for them.
+    junction. While the last vehicle left it less than `max_gap` ago, the green goes on for the rest
+    of `detector_gap`, in which that vehicle reaches the line. It is rounded up to a whole second of
+    the phase and never goes beyond `max_green`. A vehicle that stands on the loop leaves no gap.
+    `min_green` is for the vehicles past the loop at the start of a green, which are not seen.
 
     The time of a phase runs from the green that is really shown: a head waits until no vehicle
     crosses its way.
     """
+
+    name = Name("actuated")
 
     max_gap: float = real(
         "gap between two vehicles that ends the green", "s", low=0, high=3600, default=3.0
@@ -58,49 +55,36 @@ class Actuated:
     def __post_init__(self) -> None:
         check_greens(self.min_green, self.max_green)
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `actuated:max_gap=2`."""
-        return spelled("actuated", self)
-
     def detector(self, site: Site) -> float:
         """How far the loops are before the junction entry [m]."""
         waiting = (self.min_green / self.passing_time + 0.5) * PLACE
         return min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
 
-    def start(self, site: Site) -> PhaseSession:
+    def start(self, site: Site) -> GapSession:
         """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
-        rule = GapRule(self, site)
-        return PhaseSession(
-            site,
-            rule,
-            detector_range=rule.detector,
-            marks=(rule.detector - site.vehicle.length,),
-            min_green=self.min_green,
-            amber=self.amber,
-            first=rule.order[0],
-        )
+        return GapSession(self, site)
 
 
-class GapRule:
-    """When the last vehicle left each lane's loop, and whether that was too long ago.
-
-    Attributes:
-        detector: how far the loops are before the junction entry [m].
-        order: the lanes in the order of their greens.
-    """
+class GapSession(PhaseSession):
+    """When the last vehicle left each lane's loop, and whether that was too long ago."""
 
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
-        self._dt = site.dt
-        self.detector = signal.detector(site)
-        self.order = full_order(signal.order, site.intersection.n)
+        self._detector = signal.detector(site)
+        super().__init__(
+            site,
+            detector_range=self._detector,
+            marks=(self._detector - site.vehicle.length,),
+            min_green=signal.min_green,
+            amber=signal.amber,
+            order=signal.order,
+        )
         self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
         """Note vehicles that left a loop since the last view; each passes a mark within a step."""
-        free = self.detector + ROUNDING
+        free = self._detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
             if v.id not in self._passed:
@@ -111,7 +95,7 @@ class GapRule:
         """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal, gap = self._signal, self._gap(view, lane)
         if elapsed >= signal.max_green or gap >= signal.max_gap:
-            return Verdict(following(self.order, lane), 0.0)
+            return self.pass_on(lane)
         more = max(signal.min_green - elapsed, signal.detector_gap - gap, self._dt)
         end = math.ceil(elapsed + more - ROUNDING)
         return Verdict(lane, min(end, signal.max_green) - elapsed)
@@ -119,7 +103,7 @@ class GapRule:
     def _gap(self, view: View, lane: int) -> float:
         """For how long the lane's loop has been free [s]."""
         if any(
-            v.lane == lane and v.distance <= self.detector and v.id not in self._passed
+            v.lane == lane and v.distance <= self._detector and v.id not in self._passed
             for v in view.vehicles
         ):
             return 0.0

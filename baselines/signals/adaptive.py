@@ -6,16 +6,10 @@ documentation cites Oertel & Wagner, TRB 2011).
 
 from __future__ import annotations
 
-from baselines.signals.heads import full_order, lane_order
-from baselines.signals.phases import (
-    PhaseSession,
-    Verdict,
-    check_greens,
-    following,
-    on_detector,
-)
+from baselines.signals.heads import lane_order
+from baselines.signals.phases import PhaseSession, Verdict, check_greens, on_detector
 from minisim.control import Observed, Site, View
-from minisim.parameters import declared, real, spelled, switch
+from minisim.parameters import Name, declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
@@ -27,13 +21,15 @@ class Adaptive:
 
     One phase an approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
-    it takes to the stop line at the speed limit, if that is before `max_green`. While the other
-    lanes are empty, a green goes on too.
+    that it needs to the stop line at the speed limit, if that is before `max_green`. While the
+    other lanes are empty, a green goes on too.
 
     The time of a phase runs from the green that is really shown: a head waits until no vehicle
-    crosses its way. Time lost is that against the speed limit, whatever a driver would like.
+    crosses its way. Time is lost against the speed limit, whatever a driver would like.
     Defaults are SUMO's, greens and amber those of the authors' network.
     """
+
+    name = Name("adaptive")
 
     detector_range: float = real(
         "length of the detectors before the junction", "m", low=1, high=1000, default=100.0
@@ -55,36 +51,25 @@ class Adaptive:
     def __post_init__(self) -> None:
         check_greens(self.min_green, self.max_green)
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `adaptive:max_green=30`."""
-        return spelled("adaptive", self)
-
-    def start(self, site: Site) -> PhaseSession:
+    def start(self, site: Site) -> DelaySession:
         """Begin a run; raises `InputError` if `order` is not all lanes, each once."""
-        rule = DelayRule(self, site)
-        return PhaseSession(
-            site,
-            rule,
-            detector_range=self.detector_range,
-            marks=(self.detector_range,),
-            min_green=self.min_green,
-            amber=self.amber,
-            first=rule.order[0],
-        )
+        return DelaySession(self, site)
 
 
-class DelayRule:
-    """Which vehicles prolong a green, and by how much.
-
-    Attributes:
-        order: the lanes in the order of their greens.
-    """
+class DelaySession(PhaseSession):
+    """Which vehicles prolong a green, and by how much."""
 
     def __init__(self, signal: Adaptive, site: Site) -> None:
+        super().__init__(
+            site,
+            detector_range=signal.detector_range,
+            marks=(signal.detector_range,),
+            min_green=signal.min_green,
+            amber=signal.amber,
+            order=signal.order,
+        )
         self._signal = signal
         self._speed_limit = site.speed_limit
-        self.order = full_order(signal.order, site.intersection.n)
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
@@ -102,16 +87,13 @@ class DelayRule:
         delayed = [v for v in approaching if v.lane == lane and self._is_delayed(v, view.time)]
         times = [v.distance / self._speed_limit for v in delayed]
         in_time = [time for time in times if elapsed + time <= signal.max_green]
-        prolongation = max(in_time, default=0.0)
-        prolongation = max(prolongation, signal.min_green - elapsed)
+        prolongation = max(0.0, signal.min_green - elapsed, *in_time)
         idle = all(v.lane == lane for v in present)
         if idle and (elapsed < signal.max_green or signal.extend_max_green):
             prolongation = max(prolongation, IDLE)
         else:
             prolongation = min(prolongation, signal.max_green - elapsed)
-        if prolongation > 0.0:
-            return Verdict(lane, prolongation)
-        return Verdict(following(self.order, lane), 0.0)
+        return Verdict(lane, prolongation) if prolongation > 0.0 else self.pass_on(lane)
 
     def _is_delayed(self, vehicle: Observed, now: float) -> bool:
         lost = time_loss(*self._entered[vehicle.id], now, vehicle.distance, self._speed_limit)
@@ -119,16 +101,9 @@ class DelayRule:
 
 
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
-    """∫ (1 − v/limit) dt of a vehicle that came onto a detector [s].
+    """∫ (1 − v/limit) dt of a vehicle that came onto a detector at `entered`, `start` m away [s].
 
-    That is the time since then, less what the way since then takes at the limit. So no look is
-    needed in between.
-
-    Args:
-        entered: when it came [s].
-        start: its distance to the junction then [m].
-        now: [s].
-        distance: to the junction now [m].
-        limit: of speed [m/s].
+    That is the time since then, less what the way since then takes at the limit [m/s]. So no look
+    is needed in between.
     """
     return now - entered - (start - distance) / limit

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
+from itertools import accumulate, count
 from numbers import Real
 from typing import Any
 
-from baselines.signals.heads import Heads, Phase, Program, full_order, lane_order, stopping_sight
+from baselines.signals.heads import Colour, Heads, full_order, lane_order, stopping_sight
 from baselines.signals.webster import SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
-from minisim.errors import InputError, instance, number, numbers
-from minisim.parameters import checked, declared, real, spelled, switch
+from minisim.errors import InputError, number, numbers
+from minisim.parameters import Name, checked, declared, real, switch
+
+#: What the head of a lane shows one after the other.
+_STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 
 
 def _greens(title: str, value: Any) -> tuple[float, ...] | float:
-    """Check `FixedTime.greens`."""
     if isinstance(value, Real):
-        return _green(value)
-    return tuple(_green(green) for green in numbers(title, value))
+        return number("green [s]", value, low=0.5, high=3600)
+    return tuple(number("green [s]", one, low=0.5, high=3600) for one in numbers(title, value))
 
 
 @declared
@@ -27,6 +31,8 @@ class FixedTime:
     The cycle is the sum of all greens, ambers and all-reds and starts with the first lane's green.
     With the defaults the ambers are Webster's lost times.
     """
+
+    name = Name("fixed-time")
 
     greens: tuple[float, ...] | float | None = checked(
         "green of each lane, or one number for all; none is Webster's, from the expected demand",
@@ -51,11 +57,6 @@ class FixedTime:
     all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
     order: tuple[int, ...] | None = lane_order()
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `fixed-time:equal_greens=true`."""
-        return spelled("fixed-time", self)
-
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
 
@@ -63,7 +64,6 @@ class FixedTime:
             InputError: as many greens as lanes are needed, `max_cycle` is too short, or `order`
                 is not all lanes, each once.
         """
-        instance("site", site, Site)
         n = site.intersection.n
         if self.greens is None:
             optimum = webster(
@@ -74,10 +74,9 @@ class FixedTime:
                 max_cycle=self.max_cycle,
             )
             greens, capped = optimum.greens, optimum.capped
-        elif isinstance(self.greens, tuple):
-            greens, capped = self.greens, False
         else:
-            greens, capped = (self.greens,) * n, False
+            greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
+            capped = False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens).cycle
@@ -88,10 +87,48 @@ class FixedTime:
         return FixedTimeSession(site, self._program(self.timing(site).greens))
 
     def _program(self, greens: Sequence[float]) -> Program:
-        order = full_order(self.order, len(greens))
-        return Program(
-            tuple(Phase((lane,), greens[lane], self.amber, self.all_red) for lane in order)
-        )
+        return Program(full_order(self.order, len(greens)), greens, self.amber, self.all_red)
+
+
+class Program:
+    """Lanes that are green in turn, over and over; the first turns green at time 0.
+
+    A program remembers nothing: what it shows follows from the time alone.
+
+    Args:
+        order: the lanes in the order of their greens.
+        greens: of each lane [s].
+        amber, all_red: after every green [s].
+    """
+
+    def __init__(
+        self, order: Sequence[int], greens: Sequence[float], amber: float, all_red: float
+    ) -> None:
+        self._order = order
+        stages = [time for lane in order for time in (greens[lane], amber, all_red)]
+        self._starts = list(accumulate(stages[:-1], initial=0.0))  # of stages within a cycle [s]
+        self.cycle = math.fsum(greens[lane] + amber + all_red for lane in order)  # [s]
+
+    def colours(self, time: float) -> list[Colour]:
+        """What the heads of all lanes show from `time` [s] on."""
+        k, stage = divmod(self._stage(time) % len(self._starts), len(_STAGES))
+        shown = [Colour.RED] * len(self._order)
+        shown[self._order[k]] = _STAGES[stage]
+        return shown
+
+    def next_switch(self, time: float) -> float:
+        """The first time after `time` at which a head may change [s]."""
+        return self._start(self._stage(time) + 1)
+
+    def _stage(self, time: float) -> int:
+        """The stage at `time`, counted from time 0 over all cycles; never one without duration."""
+        before = max(math.floor(time / self.cycle) * len(self._starts) - 1, 0)
+        return next(stage for stage in count(before) if self._start(stage + 1) > time)
+
+    def _start(self, stage: int) -> float:
+        # From the number of the cycle, so that no rounding error adds up.
+        cycle, k = divmod(stage, len(self._starts))
+        return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
 
 
 class FixedTimeSession:
@@ -102,7 +139,6 @@ class FixedTimeSession:
         self._program = program
         self._heads = Heads(site)
         self._half_step = site.dt / 2.0
-        self._lanes = site.intersection.n
 
     def decide(self, view: View) -> Iterable[Command]:
         """Turn the heads to what the program shows now.
@@ -110,9 +146,5 @@ class FixedTimeSession:
         Timers ring on whole steps: a switch less than half a step away is due.
         """
         now = view.time + self._half_step
-        wanted = self._program.colours(now, self._lanes)
+        wanted = self._program.colours(now)
         return [*self._heads.show(view, wanted), Wake(self._program.next_switch(now))]
-
-
-def _green(value: object) -> float:
-    return number("green [s]", value, low=0.5, high=3600)

@@ -1,4 +1,4 @@
-"""What signal controllers share: phases, programmes, and signal heads that prevent collisions.
+"""What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle on the junction conflicts with its lane, so safety does not
 depend on the length of an amber. At the end of a green, vehicles that can no longer stop
@@ -7,11 +7,8 @@ comfortably keep their right of way; all others stop.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from enum import Enum
-from functools import cached_property
-from itertools import accumulate, count
 from typing import Any
 
 import numpy as np
@@ -28,8 +25,8 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, instance, integer, items, numbers
-from minisim.parameters import checked, declared, real
+from minisim.errors import InputError, integer, items
+from minisim.parameters import checked
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
@@ -43,86 +40,6 @@ class Colour(Enum):
     RED = "red"
     AMBER = "amber"
     GREEN = "green"
-
-
-#: What the heads of a phase show one after the other.
-_STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
-
-
-def _lanes(title: str, value: Any) -> tuple[int, ...]:
-    """Check `Phase.lanes`."""
-    lanes = numbers(title, value)
-    if not lanes or any(lane < 0 or lane != int(lane) for lane in lanes):
-        raise InputError(f"{title} must be indices of lanes, got {value!r}")
-    return tuple(int(lane) for lane in lanes)
-
-
-@declared
-class Phase:
-    """Lanes that are green together, for how long, and what follows."""
-
-    lanes: tuple[int, ...] = checked(
-        "indices of the lanes", _lanes, "indices", label="lanes of a phase"
-    )
-    green: float = real("green", "s", low=0.5, high=3600)
-    amber: float = real("amber after the green", "s", low=0, high=60, default=2.0)
-    all_red: float = real("all-red after the amber", "s", low=0, high=60, default=0.0)
-
-    @property
-    def duration(self) -> float:
-        """Green, amber and all-red together [s]."""
-        return self.green + self.amber + self.all_red
-
-
-def _phases(title: str, value: Any) -> tuple[Phase, ...]:
-    """Check `Program.phases`."""
-    instance(title, value, (tuple, list))
-    for phase in value:
-        instance("phase", phase, Phase)
-    if not value:
-        raise InputError("a signal program needs at least one phase")
-    return tuple(value)
-
-
-@declared
-class Program:
-    """Phases in a fixed order and time, over and over; the first turns green at time 0.
-
-    A program remembers nothing: what it shows follows from the time alone.
-    """
-
-    phases: tuple[Phase, ...] = checked("the phases", _phases, "phases")
-
-    @cached_property
-    def cycle(self) -> float:
-        """[s]."""
-        return math.fsum(phase.duration for phase in self.phases)
-
-    def colours(self, time: float, n: int) -> list[Colour]:
-        """What the heads of n lanes show from `time` [s] on."""
-        k = self._stage(time) % len(self._starts)
-        phase, colour = self.phases[k // len(_STAGES)], _STAGES[k % len(_STAGES)]
-        return [colour if lane in phase.lanes else Colour.RED for lane in range(n)]
-
-    def next_switch(self, time: float) -> float:
-        """The first time after `time` at which a head may change [s]."""
-        return self._start(self._stage(time) + 1)
-
-    def _stage(self, time: float) -> int:
-        """The stage at `time`, counted from time 0 over all cycles; never one without duration."""
-        before = max(math.floor(time / self.cycle) * len(self._starts) - 1, 0)
-        return next(stage for stage in count(before) if self._start(stage + 1) > time)
-
-    def _start(self, stage: int) -> float:
-        # From the number of the cycle, so that no rounding error adds up.
-        cycle, k = divmod(stage, len(self._starts))
-        return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
-
-    @cached_property
-    def _starts(self) -> tuple[float, ...]:
-        """When the stages of every phase start within a cycle [s]."""
-        stages = [stage for p in self.phases for stage in (p.green, p.amber, p.all_red)]
-        return tuple(accumulate(stages[:-1], initial=0.0))
 
 
 class Heads:
@@ -205,14 +122,10 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
 
 
 def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
-    """The vehicles of one lane, before the junction, to be let go when it is closed.
+    """The vehicles before the junction that keep their right of way when their lane is closed.
 
-    These are the ones that comfortable braking no longer stops, and all before them, for a
-    follower cannot go before its leader does.
-
-    Args:
-        lane: the lane's vehicles, front to back.
-        deceleration: comfortable braking [m/s²].
+    Comfortable braking [m/s²] no longer stops them, or one behind them. `lane` holds the vehicles
+    of one lane, front to back.
     """
     approaching = [v for v in lane if v.distance >= 0.0]
     last = max((i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1)

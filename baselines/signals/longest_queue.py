@@ -11,18 +11,20 @@ import math
 
 from baselines.signals.phases import PhaseSession, Verdict, on_detector
 from minisim.control import Site, View
-from minisim.parameters import declared, real, spelled
+from minisim.parameters import Name, declared, real
 
 
 @declared
 class LongestQueue:
     """A signal that turns to the approach with the most vehicles, every few seconds.
 
-    One phase an approach: while one lane carries all turns, every two approaches of a junction
-    have movements that conflict, so no two can be green together. Among equal queues the one whose
-    last green is the longest ago goes first, then in the order a, b, c…; an empty junction keeps
-    its green. A lane may wait for long while others always have more.
+    One phase an approach: since one lane carries all turns, any two approaches have movements that
+    conflict, and cannot be green together. Among equal queues the one whose last green is the
+    longest ago goes first, then in the order a, b, c…; an empty junction keeps its green. A lane
+    may wait for long while others always have more.
     """
+
+    name = Name("longest-queue")
 
     # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
     # several lanes. A change costs some 3 s, so that single lanes need the upper end.
@@ -37,33 +39,25 @@ class LongestQueue:
     # As for `Adaptive`, and in the code of Genders & Razavi.
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `longest-queue:interval=5`."""
-        return spelled("longest-queue", self)
-
-    def start(self, site: Site) -> PhaseSession:
+    def start(self, site: Site) -> QueueSession:
         """Begin a run."""
-        return PhaseSession(
-            site,
-            QueueRule(self, site),
-            detector_range=self.detector_range,
-            min_green=self.interval,
-            amber=self.amber,
-        )
+        return QueueSession(self, site)
 
 
-class QueueRule:
+class QueueSession(PhaseSession):
     """Which queue is the longest."""
 
     def __init__(self, signal: LongestQueue, site: Site) -> None:
+        super().__init__(
+            site,
+            detector_range=signal.detector_range,
+            min_green=signal.interval,
+            amber=signal.amber,
+        )
         self._signal = signal
         self._last_green = [-math.inf] * site.intersection.n  # [s]
 
-    def see(self, view: View) -> None:
-        """Nothing to remember: queues are counted when a green may end."""
-
-    def judge(self, view: View, lane: int, elapsed: float) -> Verdict:  # noqa: ARG002  (Rule's)
+    def judge(self, view: View, lane: int, elapsed: float) -> Verdict:  # noqa: ARG002  (PhaseSession's)
         """The lane with the longest queue; looks again after another interval."""
         self._last_green[lane] = view.time
         queues = [0] * len(self._last_green)

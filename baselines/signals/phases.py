@@ -1,6 +1,6 @@
-"""What signals have in common whose phases last as long as a rule says: one phase an approach.
+"""What signals share whose phases last as long as a rule says: one phase an approach.
 
-Between two phases the old lane shows amber, and the new one turns green when no vehicle crosses its
+Between two phases the old lane shows amber. The new one turns green when no vehicle crosses its
 way any more (`Heads`). The time of a phase runs from the green that is really shown, so a
 shortest and a longest green mean what drivers see.
 """
@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from baselines.signals.heads import Colour, Heads, stopping_sight
+from baselines.signals.heads import Colour, Heads, full_order, stopping_sight
 from minisim.control import Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError
 
@@ -23,78 +23,72 @@ def check_greens(shortest: float, longest: float) -> None:
 
 
 class Verdict(NamedTuple):
-    """What a rule says of the present phase.
+    """What a rule says of the present phase."""
 
-    Attributes:
-        lane: whose turn it is; another lane than now ends the phase.
-        after: time until the next look [s]; it does not matter when the phase ends.
+    lane: int  #: whose turn it is; another lane than now ends the phase
+    after: float  #: time until the next look [s]; it does not matter when the phase ends
+
+
+class PhaseSession:
+    """Shows green to one lane at a time; a subclass judges when a phase ends.
+
+    It is called when its rule asked for it, when a vehicle clears the junction, and when one
+    passes a mark.
+
+    Args:
+        site: of the run.
+        detector_range: how far before the junction the rule sees [m].
+        marks: how far before the junction the rule must see every front bumper pass [m].
+        min_green: time from the start of a phase until the rule is asked [s].
+        amber: [s].
+        order: the lanes in the order of their greens; None is a, b, c….
+
+    Raises:
+        InputError: `order` is not all lanes, each once.
     """
 
-    lane: int
-    after: float
-
-
-class Rule(Protocol):
-    """When a phase ends, and which is next; it may remember what it has seen."""
+    def __init__(
+        self,
+        site: Site,
+        *,
+        detector_range: float,
+        min_green: float,
+        amber: float,
+        marks: tuple[float, ...] = (),
+        order: tuple[int, ...] | None = None,
+    ) -> None:
+        self.plan = Plan(
+            marks=marks, wake_on_clear=True, sight=max(detector_range, stopping_sight(site))
+        )
+        self._order = full_order(order, site.intersection.n)
+        self._heads = Heads(site)
+        self._dt = site.dt
+        self._min_green, self._amber = min_green, amber
+        self._lane = self._next = self._order[0]
+        self._colour = Colour.GREEN
+        self._began: float | None = None  # when the lane's head turned green
+        self._due = math.inf
 
     def see(self, view: View) -> None:
         """Take note of a view; called at every wake-up."""
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Say how the phase of `lane` goes on, which has been green for `elapsed` seconds."""
+        raise NotImplementedError
 
-
-class PhaseSession:
-    """Shows green to one lane at a time, as a rule says.
-
-    It is called when its rule asked for it, when a vehicle clears the junction, and when one passes
-    a place where the rule must see it.
-
-    Args:
-        site: of the run.
-        rule: when a phase ends, and which is next.
-        detector_range: how far before the junction the rule sees [m].
-        marks: how far before the junction the rule must see every front bumper pass [m].
-        min_green: time from the begin of a phase until the rule is asked [s].
-        amber: [s].
-        first: the lane that is green first.
-    """
-
-    def __init__(
-        self,
-        site: Site,
-        rule: Rule,
-        *,
-        detector_range: float,
-        marks: tuple[float, ...] = (),
-        min_green: float,
-        amber: float,
-        first: int = 0,
-    ) -> None:
-        self.plan = Plan(
-            marks=marks,
-            wake_on_clear=True,
-            sight=max(detector_range, stopping_sight(site)),
-        )
-        self._rule = rule
-        self._heads = Heads(site)
-        self._dt = site.dt
-        self._lanes = site.intersection.n
-        self._min_green, self._amber = min_green, amber
-        self._lane = self._next = first
-        self._colour = Colour.GREEN
-        self._began: float | None = None  # when the lane's head turned green
-        self._due = math.inf
+    def pass_on(self, lane: int) -> Verdict:
+        """End the phase of `lane`; the next lane in the order is green next."""
+        return Verdict(self._order[(self._order.index(lane) + 1) % len(self._order)], 0.0)
 
     def decide(self, view: View) -> Iterable[Command]:
         """End the phase or the amber when it is time, and turn the heads.
 
         Timers ring on whole steps: what is less than half a step away is due.
         """
-        self._rule.see(view)
+        self.see(view)
         if view.time + self._dt / 2.0 >= self._due:
             self._go_on(view)
-        wanted = [Colour.RED] * self._lanes
+        wanted = [Colour.RED] * len(self._order)
         wanted[self._lane] = self._colour
         commands = self._heads.show(view, wanted)
         if self._began is None and self._heads.colours[self._lane] is Colour.GREEN:
@@ -107,7 +101,7 @@ class PhaseSession:
             self._lane, self._colour, self._due = self._next, Colour.GREEN, math.inf
             return
         # Views tell the time to a microsecond.
-        verdict = self._rule.judge(view, self._lane, round(view.time - self._began, 6))
+        verdict = self.judge(view, self._lane, round(view.time - self._began, 6))
         if verdict.lane == self._lane:
             self._due = view.time + max(verdict.after, self._dt)
             return
@@ -117,11 +111,6 @@ class PhaseSession:
             self._due = view.time + max(self._amber, self._dt)
         else:
             self._go_on(view)
-
-
-def following(order: tuple[int, ...], lane: int) -> int:
-    """The lane after this one in a fixed order."""
-    return order[(order.index(lane) + 1) % len(order)]
 
 
 def on_detector(view: View, detector_range: float) -> list[Observed]:

@@ -14,29 +14,21 @@ from minisim.errors import InputError, instance, number, numbers
 
 #: Above this flow ratio the optimum cycle is useless (it is infinite at 1) and is capped.
 MAX_FLOW_RATIO = 0.95
-#: Green of a lane with hardly any traffic [s]: a vehicle at the line gets across it, and Webster's
-#: own greens at the paper's demands, 2.03 s at the least, stay as they are.
+#: Green of a lane with hardly any traffic [s]. A vehicle at the line gets across it, and it leaves
+#: Webster's own greens at the paper's demands, at least 2.03 s, as they are.
 MIN_GREEN = 2.0
 
 
 @dataclass(frozen=True)
 class SignalTiming:
-    """A signal's timing and what it means for a demand.
+    """A signal's timing and what it means for a demand."""
 
-    Attributes:
-        cycle: [s].
-        greens: of each lane [s].
-        flow_ratio: Webster's Y, the sum over the lanes of inflow over saturation flow.
-        saturation: of each lane, the degree of saturation x = qC/(sg); above 1 its queue grows
-            as long as the demand lasts.
-        capped: whether the optimum cycle was cut to a maximum (or does not exist).
-    """
-
-    cycle: float
-    greens: tuple[float, ...]
-    flow_ratio: float
+    cycle: float  #: [s]
+    greens: tuple[float, ...]  #: of each lane [s]
+    flow_ratio: float  #: Webster's Y, the sum over the lanes of inflow over saturation flow
+    #: Degree of saturation x = qC/(sg) of each lane. Above 1 its queue grows while demand lasts.
     saturation: tuple[float, ...]
-    capped: bool = False
+    capped: bool = False  #: whether the optimum cycle was cut to a maximum (or does not exist)
 
 
 def webster(
@@ -52,8 +44,7 @@ def webster(
 
     Where Y > 0.95 the cycle is at most `max_cycle`, also where no optimum exists (Y ≥ 1).
     Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
-    `min_green`; that lengthens the cycle, except where it is capped: there the other lanes
-    share the rest.
+    `min_green`. That lengthens the cycle; in a capped cycle the other lanes share the rest.
 
     Args:
         rates: inflow of each lane [veh/h].
@@ -66,7 +57,11 @@ def webster(
     Raises:
         InputError: a value out of range, or a `max_cycle` without room for the minimal greens.
     """
-    flows = _rates(rates)
+    flows = numbers("rates [veh/h]", rates)
+    if not flows:
+        raise InputError("rates must have at least one lane")
+    for flow in flows:
+        number("rate [veh/h]", flow, low=0, high=1e5)
     n = len(flows)
     number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
     lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=60)
@@ -81,8 +76,7 @@ def webster(
     greens = [total * share / sum(shares) for share in shares]
     if capped:
         greens = _raise_within(greens, min_green)
-    else:
-        greens = [max(green, min_green) for green in greens]
+    greens = [max(green, min_green) for green in greens]
     return timing_of(greens, sum(greens) + lost, flows, saturation_flow, capped=capped)
 
 
@@ -118,15 +112,10 @@ def webster_delay(
 ) -> float:
     """Mean delay of a vehicle on one lane in the long run [s].
 
-    d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with λ = g/C, the degree
-    of saturation x = qC/(sg) and q in veh/s; infinite for x ≥ 1. Near x = 1 it overstates the
-    delay of a finite run, whose queue has not had time to grow.
-
-    Args:
-        rate: inflow q [veh/h].
-        green: g [s].
-        cycle: C [s].
-        saturation_flow: s [veh/h].
+    d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with cycle C [s], green
+    g [s], λ = g/C, inflow `rate` q [veh/h in, veh/s here], saturation flow s [veh/h] and the degree
+    of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates the delay of a finite
+    run, whose queue has not had time to grow.
     """
     number("rate [veh/h]", rate, low=0, high=1e5)
     number("cycle [s]", cycle, above=0, high=1e5)
@@ -144,13 +133,6 @@ def webster_delay(
     scale = math.cbrt(cycle) / math.cbrt(q) ** 2
     correction = 0.65 * scale * math.pow(x, 2.0 + 5.0 * share)
     return uniform + random - correction
-
-
-def _rates(rates: Iterable[float]) -> tuple[float, ...]:
-    flows = numbers("rates [veh/h]", rates)
-    if not flows:
-        raise InputError("rates must have at least one lane")
-    return tuple(number("rate [veh/h]", flow, low=0, high=1e5) for flow in flows)
 
 
 def _raise_within(greens: Sequence[float], low: float) -> list[float]:

@@ -1,57 +1,37 @@
 """Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
-The numbers are those of the Highway Capacity Manual (HCM, 7th edition), chapter 20, for two-way
-stop control, base values of a two-lane major street. They are for drivers that stopped at a stop
+The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20, two-way stop
+control, base values of a two-lane major street. They are for drivers that have stopped at a stop
 sign of the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
-right-hand traffic. An unsignalised junction of equal roads is another case, the all-way stop (HCM
-chapter 21): there all drivers stop, and none accepts a gap in a stream that does not stop. So
-drivers here do both. Among themselves they go in the order of stopping, and they accept gaps
-between vehicles that need not stop.
+right-hand traffic. At an unsignalised junction of equal roads, an all-way stop (HCM chapter 21),
+all drivers stop and none accepts gaps. Drivers here do both: among themselves they go in the order
+of stopping, and they accept gaps between vehicles that need not stop.
 """
 
 from __future__ import annotations
 
 import math
 from statistics import NormalDist
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from minisim.control import Observed, Site
-from minisim.errors import InputError, integer, number, numbers
+from minisim.errors import integer
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.movements import Bools
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
-from minisim.parameters import Check, checked, declared, real, word
+from minisim.parameters import declared, real, reals, word
 from minisim.streams import stream
 
-#: What others believe of a human's way. "motion": only what its place and heading show. "signals":
-#: also an indicator that blinks. "silence": also that a vehicle without one goes straight on, which
-#: is false for the turns that no indicator announces.
+#: What others believe about a human's way. "motion": only what its place and heading show.
+#: "signals": also an indicator that blinks. "silence": also that a vehicle without one goes
+#: straight on, which is false for the turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
 #: Bounds of a uniform draw whose normal quantile is taken.
 TAIL = 1e-9
-
-
-def _several(count: int, each: str, high: float) -> Check:
-    """A check of so many numbers 0 … `high`; `each` says what one of them is."""
-
-    def check(title: str, value: Any) -> tuple[float, ...]:
-        values = numbers(title, value)
-        if len(values) != count:
-            raise InputError(f"{title} must be {count} numbers, got {values}")
-        for one in values:
-            number(each, one, low=0, high=high)
-        return values
-
-    return check
-
-
-_GAPS = _several(3, "critical gap [s]", 60.0)
-_TIMES = _several(3, "follow-up time [s]", 60.0)
-_TURNS = _several(2, "share of unsignalled turns", 1.0)
 
 
 @declared(kw_only=True)
@@ -61,38 +41,38 @@ class Humans:
     Sources: critical gaps HCM exhibit 20-17, follow-up times exhibit 20-18.
     """
 
-    critical_gaps: tuple[float, float, float] = checked(
-        "shortest time until a vehicle that need not stop arrives for which a driver goes first",
-        _GAPS, "three numbers 0 … 60", "s", default=(6.2, 6.5, 7.1),
+    critical_gaps: tuple[float, float, float] = reals(
+        "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
+        count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
     )  # fmt: skip
-    follow_up: tuple[float, float, float] = checked(
-        "shortest time between two drivers of one lane",
-        _TIMES, "three numbers 0 … 60", "s", default=(3.3, 4.0, 3.5),
+    follow_up: tuple[float, float, float] = reals(
+        "shortest time between two drivers of one lane", "s",
+        count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
     )  # fmt: skip
     # Log-normal over drivers, as in the usual maximum-likelihood estimate (Tian et al. 1999,
-    # Transp. Res. A 33:187). The HCM takes all drivers to be alike; a published value for these
-    # junctions was not found.
+    # Transp. Res. A 33:187). In the HCM all drivers are alike; we know of no published value for
+    # these junctions.
     deviation: float = real(
         "standard deviation of a driver's critical gap over its mean; 0 makes all alike",
         low=0, high=1, default=0.0, label="deviation of critical gaps",
     )  # fmt: skip
-    # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, of which
-    # 2.0 s are for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A vehicle that was given the right of way moves off within a few steps; a driver
-    # must look for longer than that, or would not see it coming.
+    # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
+    # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
+    # (AASHTO). A vehicle with the right of way moves off within a few steps. A driver must look for
+    # longer than that to see it coming.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
     )  # fmt: skip
     # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
     # Anal. Prev. 74:1).
-    unsignalled: tuple[float, float] = checked(
+    unsignalled: tuple[float, float] = reals(
         "share of near and of far turns that no indicator announces",
-        _TURNS, "two numbers 0 … 1", default=(0.29, 0.25),
+        count=2, low=0, high=1, default=(0.29, 0.25),
     )  # fmt: skip
     trust: str = word(
-        "what drivers believe of each other, see `TRUSTS`; until they know where another goes, "
-        "they keep out of all ways that it may take",
+        "what drivers believe about each other: motion; also a signal; also that no signal means "
+        "straight on. They keep out of all ways that another may take",
         TRUSTS, default="signals",
     )  # fmt: skip
 
@@ -102,7 +82,7 @@ class Driver(NamedTuple):
 
     Attributes:
         human: whether a human drives; otherwise the vehicle follows DIM.
-        careless: 0 … 1; it leaves out the indicator of a turn where a larger share of drivers does.
+        careless: 0 … 1; it signals no turn for which a larger share of drivers does not.
         gap: factor on the critical gaps.
     """
 
@@ -112,7 +92,7 @@ class Driver(NamedTuple):
 
 
 class Drivers:
-    """The drivers of one run, drawn by vehicle id: the same whatever controller asks, and when.
+    """The drivers of one run. They depend only on seed, share and vehicle id.
 
     A vehicle with a human driver at some share has one at every larger share.
     """
@@ -142,32 +122,31 @@ class Drivers:
 
 
 class Readings:
-    """What indicators and motion leave possible of a vehicle's way, for all that see it.
+    """The ways that a vehicle's indicator and motion leave possible, for all that see it.
 
-    Motion is position: once two ways of a lane are `CLEARANCE` apart, a vehicle's place tells on
-    which of them it is.
+    Where two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
     """
 
     def __init__(self, humans: Humans, site: Site, drivers: Drivers) -> None:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
-        self._drivers = drivers
+        self.drivers = drivers
         self._rows = site.intersection.movements.rows
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:
-        """Of its true movement."""
+        """The index of its true movement."""
         return self._rows[vehicle.lane][vehicle.manoeuvre]
 
     def possible(self, vehicle: Observed, trust: str) -> list[int]:
-        """Movements, by index, that a vehicle may take for all that others see.
+        """Movements, by index, that a vehicle may take as far as others can see.
 
-        Vehicles that follow DIM announce every turn, so that none means straight on.
+        Vehicles that follow DIM announce every turn, so one without a signal goes straight on.
         """
         movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
         alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
-        driver = self._drivers[vehicle.id]
+        driver = self.drivers[vehicle.id]
         turn = self.turns[movement]
         if driver.human:
             shown = Turn.THROUGH if driver.careless < self._silent[turn] else turn

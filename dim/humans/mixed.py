@@ -1,77 +1,64 @@
 """Mixed autonomy: vehicles that follow DIM among human drivers.
 
-DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: nobody who
-follows DIM is let in beside it, but in harmony with all it may do. A human stops at the hold line
-as at an all-way stop (the junction of equal roads), looks, and goes when
+DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: a vehicle of
+DIM enters beside it only in harmony with everything that it may do. A human stops at the hold line
+as at an all-way stop (a junction of equal roads) and looks. After its reaction time it goes when
 
-- every human who stopped before it and is in its way has gone,
+- every human that stopped before it and is in its way has gone,
 - every vehicle inside has left its way,
-- no vehicle of DIM rolls through its yellow zone, and none will arrive within the critical gap,
+- no vehicle of DIM rolls through its yellow zone, and none will arrive within the critical gap.
 
-as soon as it has stood for its reaction time, for it foresees when a way becomes free. It sees
-positions, speeds and indicators, never a right of way.
+It sees positions, speeds and indicators, never a right of way.
 
-Nobody collides, if nobody believes in silence (`dim.humans.drivers.TRUSTS`): when a human starts,
-vehicles of DIM that are in conflict with it stand, or are outside the yellow zone, and no rule
-gives them the right of way until it has left. One that stands has none: it would have moved off in
-the step after it was granted one, with the junction empty, before a driver can look.
+No vehicles collide, unless some believe in silence (`dim.humans.drivers.TRUSTS`). When a human
+starts, the vehicles of DIM in conflict with it stand or are outside the yellow zone, and get no
+right of way until it has left. A standing vehicle of DIM has none: with the junction empty, it
+would have moved off one step after it was granted one, before a driver can look.
 
-Nobody waits for another in a circle: DIM waits for humans, and no human waits for a vehicle of DIM
-that stands. So drivers must know such vehicles when they see them, as marker lamps for automated
-driving intend (SAE J3134); otherwise each would let the other go first.
+No vehicles wait in a circle: DIM waits for humans, and no human waits for a vehicle of DIM that
+stands. So drivers must recognise such vehicles, as with marker lamps for automated driving (SAE
+J3134). Otherwise each would let the other go first.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
-from dim.perception import ROUNDING, UNKNOWN, Perception, See
+from dim.perception import ROUNDING, STANDING, UNKNOWN
 from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
-from minisim.errors import choice, instance, number
 from minisim.junction.conflicts import clearing_distances
 from minisim.junction.movements import Bools, Movements
+from minisim.parameters import declared, part, real, word
 
-#: Slower than this a vehicle stands [m/s]: SUMO's limit of waiting.
-STANDING = 0.1
 #: A driver stands at the line when its front is at most this far before it [m].
 LINE = 1.0
 #: How often a driver at the junction looks at the others [s].
 LOOK = 0.2
 
 
-@dataclass(frozen=True)
+@declared
 class Mixed:
-    """DIM with a share of human drivers.
+    """DIM with a share of human drivers. `Dim(commit="paper")` is not safe here either."""
 
-    Attributes:
-        dim: the rules of all others. `Dim(commit="paper")` is not safe here either.
-        share: of humans among the vehicles, 0 … 1. At 0 runs are those of `dim`.
-        humans: how they drive.
-        trust: what vehicles of DIM believe of a human's way, see `dim.humans.drivers.TRUSTS`.
-
-    Raises:
-        InputError: no share, or an unknown trust.
-    """
-
-    dim: Dim = field(default_factory=Dim)
-    share: float = 0.2
-    humans: Humans = field(default_factory=Humans)
-    trust: str = "motion"
-
-    def __post_init__(self) -> None:
-        instance("dim", self.dim, Dim)
-        number("share of humans", self.share, low=0, high=1)
-        instance("humans", self.humans, Humans)
-        choice("trust", self.trust, TRUSTS)
+    dim: Dim = part("the rules of all others", Dim, default=Dim())
+    share: float = real(
+        "share of humans among the vehicles; at 0 runs are those of `dim`",
+        low=0, high=1, default=0.2, label="share of humans",
+    )  # fmt: skip
+    humans: Humans = part("how they drive", Humans, default=Humans())
+    trust: str = word(
+        "what vehicles of DIM believe about a human's way, as in `Humans.trust`",
+        TRUSTS, default="motion",
+    )  # fmt: skip
 
     @property
     def name(self) -> str:
-        """DIM's, and the share: `dim-humans-0.2`."""
-        return f"{self.dim.name}-humans-{self.share:g}"
+        """That of the DIM, and the share: `dim+humans=0.2`."""
+        return f"{self.dim.name}+humans={self.share:g}"
 
     def start(self, site: Site) -> Session:
         """Begin a run; raises `InputError` as `Dim.start` does."""
@@ -90,14 +77,10 @@ class MixedSession:
 
     def __init__(self, mixed: Mixed, site: Site) -> None:
         drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
-        cautious, take = _Cautious(mixed.dim.perception, mixed), _caution(mixed, site)
-        self._dim = DimSession(
-            replace(mixed.dim, perception=cautious),
-            site,
-            lambda id: not drivers[id].human,
-            truth=lambda view: take(view, view),
-        )
-        self._humans = _Humans(mixed, site, drivers)
+        readings = Readings(mixed.humans, site, drivers)
+        takes = _caution(mixed, site, readings)
+        self._dim = DimSession(mixed.dim, site, lambda id: not drivers[id].human, takes)
+        self._humans = _Humans(mixed, site, readings)
         plan = self._dim.plan
         self.plan: Plan = replace(
             plan,
@@ -111,46 +94,22 @@ class MixedSession:
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What wrong perception did to the vehicles of DIM (`dim.senses.tally`)."""
+        """What wrong perception has done to the vehicles of DIM (`dim.senses.tally`)."""
         return self._dim.counts
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let all vehicles decide, from the same view."""
         commands = [*self._dim.decide(view), *self._humans.decide(view)]
-        wakes = [command.time for command in commands if isinstance(command, Wake)]
+        wakes = [command for command in commands if isinstance(command, Wake)]
         others = [command for command in commands if not isinstance(command, Wake)]
-        return [*others, Wake(min(wakes))] if wakes else others
+        return [*others, min(wakes, key=lambda wake: wake.time)] if wakes else others
 
 
-@dataclass(frozen=True)
-class _Cautious:
-    """What vehicles of DIM see, with humans as they take them.
-
-    Attributes:
-        perception: what they see at all.
-        mixed: what they believe.
-    """
-
-    perception: Perception
-    mixed: Mixed
-
-    @property
-    def period(self) -> float | None:
-        """That of what they see at all; the humans ask for more views while they are there."""
-        return self.perception.period
-
-    def start(self, site: Site) -> See:
-        """Begin a run."""
-        see_all, take = self.perception.start(site), _caution(self.mixed, site)
-        return lambda view, ego: take(view, see_all(view, ego))
-
-
-def _caution(mixed: Mixed, site: Site) -> Callable[[View, View], View]:
-    """What a view, and what a vehicle has seen of it, are taken for."""
-    drivers = Drivers(mixed.humans, mixed.share, site.seed)
-    readings, movements = Readings(mixed.humans, site, drivers), site.intersection.movements
+def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, View], View]:
+    """How a vehicle of DIM takes what it has seen of a true view."""
+    drivers, movements = readings.drivers, site.intersection.movements
     start = mixed.dim.zones.yellow_start + ROUNDING
-    latest: list[View] = []  # what was seen last, and what it was taken for
+    latest: list[View] = []  # what was seen last, and how it was taken
 
     def take(view: View, seen: View) -> View:
         if not latest or latest[0] is not seen:
@@ -175,8 +134,8 @@ def _taken(
 ) -> Iterable[Observed]:
     """The vehicles of a view as DIM takes them.
 
-    The first human of a lane, from the yellow zone on, is taken for one that cannot stop before
-    the junction any more. `ways` are the movements that those may take who are there.
+    A human at the front of a lane, from the yellow zone on, is taken for a vehicle that can no
+    longer stop before the junction. `ways` are the movements that each human there may take.
     """
     lane = -1
     for vehicle in view.vehicles:
@@ -193,28 +152,23 @@ def _taken(
 
 
 class _Humans:
-    """The human drivers of a run: who stands since when, and who went.
+    """The human drivers of a run; they look `sight` [m] far before the junction."""
 
-    Attributes:
-        sight: how far before the junction they look [m].
-    """
-
-    def __init__(self, mixed: Mixed, site: Site, drivers: Drivers) -> None:
+    def __init__(self, mixed: Mixed, site: Site, readings: Readings) -> None:
         humans, zones = mixed.humans, mixed.dim.zones
-        self._humans, self._drivers = humans, drivers
-        self._readings = Readings(humans, site, drivers)
+        self._humans, self._drivers, self._readings = humans, readings.drivers, readings
         self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
         self._line = zones.hold_distance + LINE
         self._yellow = zones.yellow_start + ROUNDING
         self._dt = site.dt
         longest = max(humans.critical_gaps) * (1.0 + 3.0 * humans.deviation)
         self.sight = longest * site.speed_limit
-        self._standing: dict[int, float] = {}  # vehicle: since [s]
+        self._standing: dict[int, float] = {}  # vehicle: since when [s]
         self._gone: set[int] = set()
         self._went: dict[int, float] = {}  # lane: when its last driver went [s]
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Who starts now; asks to be called again while somebody is at the junction."""
+        """Let drivers start; ask to be called again while one is at the junction."""
         now, drivers = view.time, self._drivers
         self._gone.intersection_update([v.id for v in view.vehicles])
         crossing = [v for v in view.vehicles if v.distance < 0.0 or v.id in self._gone]
@@ -246,7 +200,7 @@ class _Humans:
         return [*commands, Wake(now + max(LOOK, self._dt))] if here else commands
 
     def _is_ready(self, vehicle: Observed, now: float) -> bool:
-        """Whether a driver has looked, and followed no sooner than it can; half a step early."""
+        """Whether the reaction and the follow-up time are over, but for half a step."""
         humans, turn = self._humans, self._readings.turns[self._readings.index(vehicle)]
         looked = self._standing[vehicle.id] + humans.reaction
         followed = self._went.get(vehicle.lane, -math.inf) + humans.follow_up[turn]
@@ -259,7 +213,7 @@ class _Humans:
         crossing: Iterable[Observed],
         rolling: Iterable[Observed],
     ) -> bool:
-        """Whether nobody is, or comes too soon, in the way of a driver at the line."""
+        """Whether no vehicle is in the way of a driver at the line, or comes too soon."""
         own = self._readings.index(vehicle)
         gap = self._drivers[vehicle.id].gap * self._humans.critical_gaps[self._readings.turns[own]]
         comes = [v for v in rolling if v.distance <= max(self._yellow, gap * v.speed)]

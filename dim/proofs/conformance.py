@@ -2,9 +2,8 @@
 
     simulate(scenario, Checked(Dim()))
 
-behaves as `Dim()` does, on any host, but raises an error where the host or the session does
-something that `dim.proofs.protocol` does not allow. What was proved of the model then holds for
-the run.
+behaves as `Dim()` on any host, but raises an error where the host or the session does something
+that `dim.proofs.protocol` does not allow. So what was proved about the model holds for the run.
 """
 
 from __future__ import annotations
@@ -44,14 +43,7 @@ class Checked:
 
 
 class CheckedSession:
-    """A session of DIM, and its state in the protocol.
-
-    Attributes:
-        plan: DIM's.
-        protocol: the rules.
-        state: where the run is.
-        steps: events followed so far.
-    """
+    """A session of DIM, its state in the protocol, and the number of events (`steps`) so far."""
 
     def __init__(self, dim: Dim, site: Site) -> None:
         self._session = DimSession(dim, site)
@@ -68,7 +60,7 @@ class CheckedSession:
         """DIM's commands, checked.
 
         Raises:
-            ConformanceError: what happened since the last view, or a command, is not possible.
+            ConformanceError: an event since the last view, or a command, is not possible.
         """
         commands = list(self._session.decide(view))
         self._follow(view)
@@ -78,7 +70,7 @@ class CheckedSession:
         return commands
 
     def _follow(self, view: View) -> None:
-        """Take the model from the last view to this one: what moved on, what left, what came."""
+        """Take the model from the last view to this one: vehicles move on, leave and come."""
         near = [v for v in view.vehicles if v.distance <= self._start]
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
         inside = {v.id: 1 << self.protocol.matrix.index(v.movement) for v in near if v.distance < 0}
@@ -114,7 +106,7 @@ class CheckedSession:
             self._take(view, Event("slow", lane, manoeuvre))
 
     def _go_in(self, view: View, lane: int) -> int:
-        """A front vehicle that has gone into the junction; returns its movement as a bit."""
+        """Take a front vehicle into the junction; return its movement as a bit."""
         front = self.state.fronts[lane]
         if front is None:
             raise ConformanceError(f"at {view.time:.1f} s a vehicle of lane {lane} went unseen")

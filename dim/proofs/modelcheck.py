@@ -33,34 +33,21 @@ Visited = Callable[[int], object]
 
 @dataclass(frozen=True)
 class Exploration:
-    """What a search through the states found.
-
-    Attributes:
-        protocol: what was searched.
-        states, transitions: how many were visited.
-        complete: whether these are all; a search ends with the nearest unsafe states.
-        unsafe: the shortest paths to two conflicting movements inside, one for each such state.
-        stuck: the shortest path to a state in which no vehicle can go on, or None.
-    """
+    """The result of a search through the states. It ends with the nearest unsafe ones."""
 
     protocol: Protocol
     states: int
     transitions: int
-    complete: bool
-    unsafe: tuple[Path, ...]
-    stuck: Path | None
+    complete: bool  # whether all states were visited
+    unsafe: tuple[Path, ...]  # the shortest way to each state with a conflict inside
+    stuck: Path | None  # the shortest way to a state in which no vehicle can go on
 
 
 @dataclass(frozen=True)
 class Lasso:
-    """How one vehicle waits for ever: what leads there, and what then repeats.
+    """How the front vehicle of a lane waits for ever: the events before, and those that repeat.
 
     All vehicles look after each event, and a vehicle that can go on does so at some time.
-
-    Attributes:
-        lane: of the vehicle that waits.
-        stem: the events before.
-        cycle: the events that repeat.
     """
 
     lane: int
@@ -112,11 +99,11 @@ def is_stuck(protocol: Protocol, state: State) -> bool:
 
 
 def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
-    """Of each lane, the shortest way in which its front vehicle waits for ever; None: it cannot.
+    """For each lane, the shortest way in which its front vehicle waits for ever, or None.
 
-    None is a proof over all states. It assumes that all vehicles look between two events, that a
-    vehicle that can go on does so some day, and that a turn of the rotating priority is long enough
-    for a decision.
+    None is a proof over all states that it cannot. The proof assumes that all vehicles look between
+    two events, that a vehicle that can go on does so some day, and that a turn of the rotating
+    priority is long enough for a decision.
     """
     instance("protocol", protocol, Protocol)
     reached = _reached(protocol)
@@ -137,8 +124,7 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
 
 
 def prompt(protocol: Protocol, state: State) -> Iterator[tuple[Event, State]]:
-    """What can happen next if all vehicles look right after each event, and none slows down again:
-    the fairest circumstances."""
+    """What can happen next in the fairest case: all look after each event, and none slows down."""
     for event, after in protocol.successors(state):
         if event.what not in ("look", "slow"):
             yield event, protocol.look(after)
@@ -150,7 +136,7 @@ def _waits(state: State, lane: int) -> bool:
 
 
 def _reached(protocol: Protocol) -> Reached:
-    """All states of `prompt`, nearest first, each with the state that it was first reached from."""
+    """All states of `prompt`."""
     reached: Reached = {protocol.start: None}
     queue = deque([protocol.start])
     while queue:
@@ -205,12 +191,8 @@ def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Ste
 def is_fair(protocol: Protocol, steps: Steps) -> bool:
     """Whether `steps`, repeated for ever, get somewhere and leave no other vehicle out.
 
-    A vehicle enters; one that could go on all the time does; one that is inside all the time leaves
-    (or others follow on the same movement); a turn that could end all the time ends.
-
-    Args:
-        protocol: the rules.
-        steps: states, and what happens in each.
+    A vehicle enters. One that could go on all the time does. One that is inside all the time leaves
+    (or others follow on the same movement). A turn that could end all the time ends.
     """
     events = {event for _, event in steps}
     states = [state for state, _ in steps]

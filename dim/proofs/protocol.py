@@ -2,11 +2,11 @@
 
 The protocol sees little of a vehicle's motion: it comes to the front of its lane, starts to roll,
 gets committed, enters, leaves. So a state holds the front vehicle of each lane before the junction
-(the only one of its lane that decides anything) and the set of movements that are inside. That set
-is enough, however many vehicles follow each other on one movement, so the model is finite without
-a limit on traffic. Time is left out: whatever can happen next may happen, in any order and after
-any delay. Every simulated run is a path of this model (`dim.proofs.conformance` checks it); most
-of its paths are no run.
+(the only one of its lane that decides anything) and the set of movements inside. That set is
+enough, however many vehicles follow each other on one movement, so the model is finite without a
+limit on traffic. There is no time: whatever can happen next may happen, in any order and after any
+delay. Every simulated run is a path of this model (`dim.proofs.conformance` checks it), but few
+paths are runs.
 
 All vehicles look at the same moment, as they do in `dim.controller`, but after any delay.
 """
@@ -29,9 +29,9 @@ from minisim.parameters import declared, part, word
 #: "waiting": the lane whose front vehicle came first, as if every vehicle remembered that for ever.
 PRIORITIES = ("fixed", "rotating", "waiting")
 
-#: Phases of a front vehicle. It has waited since it came; or it has had the right of way and may be
-#: anywhere before the committing point (a phase of its own with commit="paper" only, where it may
-#: roll on without the right of way); or it is committed.
+#: Phases of a front vehicle. It has waited since it came; or, with commit="paper" only, it has had
+#: the right of way and may be anywhere before it is committed, where it may roll on without the
+#: right of way; or it is committed.
 WAITING: Final = 0
 ROLLING: Final = 1
 COMMITTED: Final = 2
@@ -46,22 +46,13 @@ class Front(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the protocol depends on.
+    """What the protocol depends on."""
 
-    Attributes:
-        fronts: of each lane, or None.
-        inside: movements in the junction, bit k for the k-th.
-        turn: with priorities "rotating", the lane whose turn it is; 0 otherwise.
-        decided: with priorities "rotating", whether a decision was made in this turn.
-        came: with priorities "waiting", the lanes that have a front vehicle, the one that came
-            first in front.
-    """
-
-    fronts: tuple[Front | None, ...]
-    inside: int = 0
-    turn: int = 0
-    decided: bool = False
-    came: tuple[int, ...] = ()
+    fronts: tuple[Front | None, ...]  # of each lane
+    inside: int = 0  # movements in the junction, bit k for the k-th
+    turn: int = 0  # "rotating" only: the lane whose turn it is
+    decided: bool = False  # "rotating" only: whether there was a decision in this turn
+    came: tuple[int, ...] = ()  # "waiting" only: lanes with a front vehicle, in order of coming
 
 
 class Event(NamedTuple):
@@ -84,10 +75,7 @@ Step = tuple[Event, State]
 
 @declared
 class Protocol:
-    """The rules, and with them the states and what may happen in them.
-
-    See `dim.Dim` for order, gate and commit, and `PRIORITIES`.
-    """
+    """The rules of `dim.Dim` and `PRIORITIES`, and with them the states and what may happen."""
 
     matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
     order: str = word("which clique is preferred", ORDERS, default="size")
@@ -156,8 +144,8 @@ class Protocol:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as it is,
-        and the gate "harmonious" keeps out those that conflict with a crossing one. Of those that
-        are left only the best clique goes.
+        and the gate "harmonious" keeps out those in conflict with a crossing one. Of the others
+        only the best clique goes.
         """
         n, movements = self.matrix.n, self.matrix.movements
         rows, bits = movements.rows, movements.bits
@@ -208,7 +196,7 @@ class Protocol:
 
     @cached_property
     def _foes(self) -> tuple[int, ...]:
-        """Of each movement, those of other arms that are in conflict with it, as bits."""
+        """For each movement, those of other arms in conflict with it, as bits."""
         movements, values = self.matrix.movements, self.matrix.values
         return tuple(
             sum(

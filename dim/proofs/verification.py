@@ -1,9 +1,9 @@
 """Every case that a junction can decide, checked one by one against brute force.
 
 The paper argues that each of the 255 cases of 4 arms has one solution, the same for every vehicle
-("Deadlock Analysis"). Here all of them are tried, for any matrix. The right decision is worked out
-without a graph library, from the subsets of the participants. It agrees with `dim.decision` only
-if both are right, or wrong in the same way.
+("Deadlock Analysis"). Here all cases of any matrix are tried. The right decision comes from the
+subsets of the participants, without a graph library. It agrees with `dim.decision` only if both are
+right, or wrong in the same way.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import permutations
+from operator import or_
 from typing import NamedTuple
 
 from dim.agent import Agent, Rules
@@ -20,9 +22,9 @@ from dim.harmony import HarmonyMatrix
 from dim.perception import Percept
 from minisim.errors import InputError
 
-#: Up to this number of arms the participants are put into every order; beyond, into the orders that
-#: each of them would use: itself first, then the others around the junction, either way round.
-#: 5 arms have 120 orders a case, 6 arms 720.
+#: Up to this number of arms the participants are listed in every order (120 a case with 5 arms);
+#: beyond (720 with 6), only as each of them would: itself first, then the others around the
+#: junction, either way round.
 ALL_ORDERS = 5
 
 #: A set of lanes, bit i for lane i.
@@ -33,12 +35,7 @@ Progress = Callable[[int, int], object]
 
 
 class Cliques(NamedTuple):
-    """The cliques of a case, from trying every subset.
-
-    Attributes:
-        maximal: cliques that no other participant can join.
-        largest: those of them with the most lanes.
-    """
+    """The cliques of a case that no other participant can join, and the largest of them."""
 
     maximal: tuple[Lanes, ...]
     largest: tuple[Lanes, ...]
@@ -46,21 +43,13 @@ class Cliques(NamedTuple):
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement about every case.
-
-    Attributes:
-        name: in a word.
-        statement: in a sentence.
-        cases: number in which it was tried.
-        failures: number in which it is false.
-        example: the first of these with the fewest participants, or None.
-    """
+    """One statement about every case."""
 
     name: str
     statement: str
-    cases: int
-    failures: int
-    example: Movements | None
+    cases: int  # in which it was tried
+    failures: int  # cases in which it is false
+    example: Movements | None  # the first of these with the fewest participants
 
     @property
     def holds(self) -> bool:
@@ -70,16 +59,13 @@ class Claim:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The result of all cases of a matrix.
+    """The result of all n^n − 1 cases of a matrix, by the rules of `dim.decide`.
 
     Attributes:
-        matrix, order, priorities: the rules, as in `dim.decide`.
-        cases: their number, n^n − 1.
-        claims: what was checked.
         sizes: cases by the number of vehicles that may go.
         ties: cases by the number of cliques of the largest size.
-        worst: of the cases with the most cliques of the largest size, by that size: the first
-            one, and their number.
+        worst: of the cases with the most such cliques, by that size: the first one, and their
+            number.
     """
 
     matrix: HarmonyMatrix
@@ -129,7 +115,7 @@ def analyse(
             f"{matrix.n} arms have {len(table)} cases, too many to try them all "
             f"(at most {MAX_CASES})"
         )
-    tally = _Tally(Case(table))
+    tally = _Tally(table)
     for case, movements in enumerate(table, start=1):
         tally.add(case, movements)
         if progress is not None and (case % 256 == 0 or case == len(table)):
@@ -167,12 +153,8 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
     """The cliques that are left when the paper's words break the tie.
 
-    "The clique with the highest priority lanes": those that hold the first lane, if any does; of
-    these those that hold the second; and so on.
-
-    Args:
-        cliques: sets of lanes.
-        by_priority: the lanes, the highest priority first.
+    "The clique with the highest priority lanes" is one that holds the first lane, if any does, then
+    the second, and so on. `by_priority` are the lanes, the highest priority first.
     """
     left = tuple(cliques)
     for lane in by_priority:
@@ -192,14 +174,9 @@ def node_orders(movements: Movements, n: int) -> Iterator[Movements]:
 
 
 class Case:
-    """The checks of any case, under one set of rules.
+    """The checks of any case, by the rules of one table of decisions."""
 
-    Attributes:
-        table: the decisions that are checked.
-        by_priority: the lanes, the highest priority first.
-    """
-
-    #: Name -> statement; `check` answers in this order.
+    #: Name -> statement, in the order of the answers of `check`.
     CLAIMS: Mapping[str, str] = {
         "exists": "a vehicle may go",
         "harmony": "all that may go are in harmony, and take part",
@@ -223,9 +200,7 @@ class Case:
         decision = self.table.lanes(case)
         present = sum(1 << m.origin for m in movements)
         candidates = cliques.largest if self.table.order == "size" else cliques.maximal
-        offered = 0
-        for clique in candidates:
-            offered |= clique
+        offered = reduce(or_, candidates)
         first = next((lane for lane in self.by_priority if offered >> lane & 1), 0)
         return (
             decision != 0,
@@ -239,7 +214,7 @@ class Case:
         )
 
     def _agents_say(self, case: int, movements: Movements) -> Lanes:
-        """The lanes whose agents go, each asked alone, with no vehicle crossing."""
+        """The lanes whose agents go, each asked on its own while no vehicle crosses."""
         lanes = tuple(m.origin for m in movements)
         percept = Percept(participants=lanes, crossing=(), case=case, occupied=0)
         return sum(1 << lane for lane in lanes if self._agents[lane].decide(percept))
@@ -251,12 +226,12 @@ class Case:
         edges = tuple(int(matrix.values[i, j]) for i in rows for j in rows)
         graph = sum(1 << m.origin for m in movements), edges
         if graph not in self._same_order:
+            chosen = (
+                choose(maximal_cliques(order, matrix), table.order, table.priorities)
+                for order in node_orders(movements, matrix.n)
+            )
             self._same_order[graph] = all(
-                sum(1 << m.origin for m in choose(cliques, table.order, table.priorities))
-                == decision
-                for cliques in (
-                    maximal_cliques(order, matrix) for order in node_orders(movements, matrix.n)
-                )
+                sum(1 << m.origin for m in clique) == decision for clique in chosen
             )
         return self._same_order[graph]
 
@@ -264,25 +239,22 @@ class Case:
 class _Tally:
     """Counts over the cases."""
 
-    def __init__(self, case: Case) -> None:
-        self.case = case
-        self.tried = 0
-        self.failures = dict.fromkeys(case.CLAIMS, 0)
+    def __init__(self, table: DecisionTable) -> None:
+        self.table, self.case = table, Case(table)
+        self.failures: Counter[str] = Counter()
         self.examples: dict[str, Movements] = {}
         self.sizes: Counter[int] = Counter()
         self.ties: Counter[int] = Counter()
         self.worst: dict[int, tuple[Movements, int]] = {}
 
     def add(self, case: int, movements: Movements) -> None:
-        cliques = brute_force(movements, self.case.table.matrix)
+        cliques = brute_force(movements, self.table.matrix)
         answers = self.case.check(case, movements, cliques)
         for name, holds in zip(self.case.CLAIMS, answers, strict=True):
             if not holds:
                 self.failures[name] += 1
-                best = self.examples.get(name, movements)
-                self.examples[name] = min(best, movements, key=len)
-        self.tried += 1
-        self.sizes[self.case.table.lanes(case).bit_count()] += 1
+                self.examples[name] = min(self.examples.get(name, movements), movements, key=len)
+        self.sizes[self.table.lanes(case).bit_count()] += 1
         tied = len(cliques.largest)
         if tied > max(self.ties, default=0):
             self.worst = {}
@@ -293,20 +265,17 @@ class _Tally:
             self.worst[size] = first, count + 1
 
     def result(self) -> Analysis:
-        table = self.case.table
+        table, tried = self.table, self.sizes.total()
+        claims = tuple(
+            Claim(name, text, tried, self.failures[name], self.examples.get(name))
+            for name, text in Case.CLAIMS.items()
+        )
         return Analysis(
-            matrix=table.matrix,
-            order=table.order,
-            priorities=table.priorities,
-            cases=self.tried,
-            claims=tuple(
-                Claim(name, text, self.tried, self.failures[name], self.examples.get(name))
-                for name, text in self.case.CLAIMS.items()
-            ),
+            table.matrix, table.order, table.priorities, tried, claims,
             sizes=dict(sorted(self.sizes.items())),
             ties=dict(sorted(self.ties.items())),
             worst=dict(sorted(self.worst.items())),
-        )
+        )  # fmt: skip
 
 
 def most_cliques(k: int) -> int:

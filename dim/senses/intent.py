@@ -1,8 +1,8 @@
 """How a vehicle's intent is shown, how others read it, and how sure they are.
 
-A driver may turn without a signal, and then no other can know. A shown intent may be misread, by
-each reader on its own or by all alike. Both are tables of probabilities, true manoeuvre × read
-manoeuvre. What a reading is worth follows from them.
+A driver may turn without a signal, which no other vehicle can know. A shown intent may be misread,
+by each reader on its own or by all alike. A table of probabilities, true manoeuvre × read
+manoeuvre, describes both, and gives how likely a reading is right.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from minisim.junction.turns import Turn, lane_turns, straightest
 from minisim.streams import Draws
 
 #: How a shown intent is misread. "missed": a turn's signal is not seen, so the turn is taken for
-#: straight on, and straight on is always read right. "symmetric": any manoeuvre is taken for each
-#: other one alike, as classifiers of manoeuvres err.
+#: straight on; straight on is always read right. "symmetric": a manoeuvre is taken for any other
+#: one alike, as classifiers of manoeuvres err.
 KINDS = ("missed", "symmetric")
 
 #: Probabilities of an error that are worth comparing, from none to that of a missing turn signal.
-#: Published classifiers of manoeuvres err with about 0.15, see `dim.senses.noise.CLASSIFIER`.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
 
 #: What a draw is for.
@@ -35,11 +34,10 @@ class Lane:
 
     Attributes:
         straight: the manoeuvre that needs no signal.
-        silent: for each manoeuvre, the probability that it is driven without a signal.
-        error: probability that a shown intent is misread.
-        kind: how, see `KINDS`.
-        doubt: for each manoeuvre, the share of its readings that are wrong where all manoeuvres
-            are driven alike.
+        silent: of each manoeuvre, the probability that it is driven without a signal.
+        error, kind: how often, and how (see `KINDS`), a shown intent is misread.
+        doubt: of each manoeuvre, the share of its readings that are wrong if all are equally
+            frequent.
     """
 
     straight: int
@@ -63,7 +61,7 @@ class Lane:
     def read(self, draws: Draws, manoeuvre: int, vehicle: int, *when: int) -> int:
         """What is read; the same for the same vehicle and `when`, such as observer and moment.
 
-        The vehicles that a smaller error misreads are among those of a larger one.
+        A vehicle that is misread at a small error is also misread at a larger one.
         """
         shown = manoeuvre
         if draws.uniform(_SIGNAL, vehicle) < self.silent[manoeuvre - 1]:
@@ -73,7 +71,7 @@ class Lane:
     def confidence(
         self, draws: Draws, manoeuvre: int, read: int, vehicle: int, *when: int
     ) -> float:
-        """How sure of that reading its reader is: of many such readings, this share is right."""
+        """How sure the reader is: of many readings with this confidence, this share is right."""
         chances = draws.uniform(_SURE, vehicle, *when), draws.uniform(_MISTAKEN, vehicle, *when)
         return confidence(self.doubt[read - 1], read == manoeuvre, chances)
 
@@ -105,7 +103,7 @@ def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str)
 
 
 def doubts(table: Table) -> tuple[float, ...]:
-    """For each reading, how likely it is wrong, by Bayes' rule for equally frequent manoeuvres."""
+    """How likely each reading is wrong, by Bayes' rule for equally frequent manoeuvres."""
     columns = list(zip(*table, strict=True))
     return tuple(
         1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
@@ -114,14 +112,14 @@ def doubts(table: Table) -> tuple[float, ...]:
 
 
 def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:
-    """How sure a reader is: of all its readings with confidence c, the share c is right.
+    """A calibrated confidence: of all readings with confidence c, the share c is right.
 
-    That is what calibrated means (Guo, Pleiss, Sun, Weinberger, "On calibration of modern neural
-    networks", ICML 2017, eq. 1). Confidences have the density a·c^(a−1) on (0, 1), a = (1−e)/e for
-    a reading that is wrong with probability e: then their mean is 1−e, and they spread, as those
-    of a classifier do. Calibration makes the density a right reading's times c/(1−e) and a wrong
-    one's times (1−c)/e: Beta(a+1, 1) and Beta(a, 2). The first is the distribution of U^e, the
-    second that of U^e·V^(e/(1−e)) for uniform U and V.
+    Calibration: Guo, Pleiss, Sun, Weinberger, "On calibration of modern neural networks", ICML
+    2017, eq. 1. For readings that are wrong with probability e, let confidences have the density
+    a·c^(a−1) on (0, 1), a = (1−e)/e. Their mean is 1−e, and they spread as a classifier's do.
+    Calibration then multiplies the density by c/(1−e) for right readings and by (1−c)/e for wrong
+    ones: Beta(a+1, 1), the distribution of U^e, and Beta(a, 2), that of U^e·V^(e/(1−e)), for
+    uniform U and V.
 
     Args:
         doubt: e, how likely such a reading is wrong.
@@ -138,7 +136,7 @@ def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float
 
 
 def leftover_error(doubt: float, threshold: float) -> float:
-    """Share of readings that are wrong and at least as sure as a threshold.
+    """The share of readings that are wrong and at least as sure as a threshold.
 
     ∫ (1−c)·a·c^(a−1) dc from t to 1 = e − t^a + (1−e)·t^(a+1), see `confidence`.
 

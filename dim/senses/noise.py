@@ -2,8 +2,8 @@
 
     simulate(scenario, Dim(perception=NoisyPerception(intent_error=0.15)))
 
-An ego always sees itself exactly, and the order of the vehicles in a lane. Vehicles that it does
-not see are missing in its view. A view holds no vehicle that is not there, or was not there.
+An ego always sees itself exactly, and the order of the vehicles in a lane. Its view lacks the
+vehicles that it does not see, and never holds one that is not, or was not, there.
 """
 
 from __future__ import annotations
@@ -12,21 +12,19 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from typing import Any
 
 from dim.perception import ROUNDING, UNKNOWN, See, see_all
 from dim.senses.intent import KINDS, Lane
 from dim.senses.sight import Bodies, Body
 from minisim.control import Observed, Site, View
-from minisim.errors import InputError, numbers
-from minisim.parameters import checked, declared, real, switch, word
+from minisim.parameters import declared, real, reals, switch, word
 from minisim.streams import Draws
 
-#: Error of published classifiers of manoeuvres, about 0.15: Phillips, Wheeler, Kochenderfer (IEEE
-#: IV 2017), more than 85 % right on 3 and 4 arms; tail lights, Sensors 24(16), 5162 (2024), 85.2 %.
+#: Error of published classifiers of manoeuvres: Phillips, Wheeler, Kochenderfer (IEEE IV 2017),
+#: more than 85 % right on 3 and 4 arms; tail lights, Sensors 24(16), 5162 (2024), 85.2 %.
 CLASSIFIER = 0.15
 
-#: Shares of turns to the near and to the far side that are driven without a signal: 29 % of right
+#: Shares of near and of far turns that are driven without a signal: 29 % of right
 #: and 25 % of left turns in right-hand traffic (Sullivan, Bao, Goudy, Konet, "Characteristics of
 #: turn signal use at intersections in baseline naturalistic driving", AAP 74, 2015). SAE
 #: 2012-01-0261 (Ponziani) counts 25 % of all turns.
@@ -35,22 +33,11 @@ UNSIGNALLED = (0.29, 0.25)
 #: How often sensors look [s]: 10 Hz, as rotating lidars and V2V safety messages do.
 FRAME = 0.1
 
-#: Stands for all observers alike, and for all time, where draws ask for one.
+#: Stands for all observers, or for all time, where a draw asks for one.
 _ALL = -1
 
 #: What a draw is for; above those of `dim.senses.intent`.
 _POSITION, _SPEED = 8, 9
-
-
-def _shares(title: str, value: Any) -> tuple[float, ...]:
-    """Check `NoisyPerception.unsignalled`."""
-    shares = numbers(title, value)
-    if len(shares) != 2 or not all(0.0 <= share <= 1.0 for share in shares):
-        raise InputError(
-            f"{title} must be the shares of near and far turns without a signal, two numbers "
-            f"from 0 to 1, got {shares}"
-        )
-    return shares
 
 
 @declared
@@ -58,35 +45,34 @@ class NoisyPerception:
     """How vehicles misperceive each other; by default they do not."""
 
     intent_error: float = real(
-        "probability that a shown intent is misread, see `dim.senses.intent.RATES`",
-        low=0, high=1, default=0.0,
-    )  # fmt: skip
+        "probability that a shown intent is misread", low=0, high=1, default=0.0
+    )
     kind: str = word(
-        "how: a turn's signal is not seen, or any manoeuvre is taken for each other one alike",
+        "how: a turn's signal is not seen, or a manoeuvre is taken for any other one alike",
         KINDS, default="missed", label="kind of intent error",
     )  # fmt: skip
     shared: bool = switch(
-        "whether all observers err alike (a dirty lamp, the sun), or each for itself", default=True
+        "whether all observers err alike (a dirty lamp, the sun), or each on its own", default=True
     )
     persistent: bool = switch(
         "whether an error lasts as long as the vehicles meet, or every frame errs anew",
         default=True,
     )
-    unsignalled: tuple[float, float] = checked(
-        "shares of turns to the near and to the far side without a signal, which all others take "
-        "for straight on; `UNSIGNALLED` has published ones",
-        _shares, "two numbers 0 … 1", default=(0.0, 0.0),
+    unsignalled: tuple[float, float] = reals(
+        "shares of near and of far turns without a signal, which all others take for straight on; "
+        "0.29 and 0.25 are published",
+        count=2, low=0, high=1, default=(0.0, 0.0), label="unsignalled shares of turns",
     )  # fmt: skip
     confidence: float | None = real(
-        "an intent read with less confidence is unknown: the vehicle may take any manoeuvre (see "
-        "`dim.senses.intent.confidence`); none takes every reading as it is",
+        "an intent read with less confidence is unknown: the vehicle may take any manoeuvre; none "
+        "takes every reading as it is",
         above=0, high=1, optional=True, default=None,
     )  # fmt: skip
     sensor_range: float | None = real(
         "how far a vehicle sees, from centre to centre; none has no end", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
-    # No view tells of vehicles that have left the junction, so they block nothing.
+    # Views do not hold vehicles that have left the junction, so these block nothing.
     occlusion: bool = switch("whether bodies block the line of sight", default=False)
     delay: float = real("age of what is seen of the others", "s", low=0, high=10, default=0.0)
     position_noise: float = real(
@@ -97,8 +83,8 @@ class NoisyPerception:
         "standard deviation of the others' speeds, drawn anew each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
-    # What a sensor could see only between two looks is lost: a vehicle that becomes committed is
-    # seen so up to a frame later, 0.6 m at 20 km/h.
+    # What happens between two looks is seen late: a vehicle that becomes committed, up to a frame
+    # later, 0.6 m at 20 km/h.
     frame: float = real("time between two looks", "s", low=0.01, high=1, default=FRAME)
 
     @property
@@ -114,7 +100,7 @@ class NoisyPerception:
         return self.frame if errs else None
 
     def start(self, site: Site) -> See:
-        """Begin a run; without any error that is exact perception."""
+        """Begin a run; without any error, perception is exact."""
         return see_all if self.period is None else _Senses(self, site).see
 
 
@@ -149,7 +135,7 @@ class _Senses:
         return View(view.time, sensed)
 
     def _late(self, view: View) -> View:
-        """The newest view that is old enough; without one, an empty junction."""
+        """The newest view that is old enough, or an empty junction."""
         past = self._past
         if not past or past[-1] is not view:
             past.append(view)
@@ -161,7 +147,7 @@ class _Senses:
     def _visible(
         self, seen: View, vehicles: Iterable[Observed], ego: Observed
     ) -> Iterator[Observed]:
-        """Those in range and in line of sight, in their order; the ego always."""
+        """The ego and the vehicles in range and in line of sight, in their order."""
         if seen.time != self._at_time:
             self._at_time = seen.time
             self._at = {v.id: self._bodies.body(v) for v in seen.vehicles}
@@ -211,14 +197,9 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 
 
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """Front to back again, where noise had vehicles of one lane overtake each other.
+    """Vehicles, by lane and in their true order, without the overtaking that noise has caused.
 
-    The order in a lane is seen right, so no vehicle is put before one that it follows. The ego
-    knows where it is and keeps its place.
-
-    Args:
-        vehicles: by lane, each lane in its true order, and the ego among them.
-        ego: as it is.
+    No vehicle is put before one that it follows. The ego keeps its place.
     """
     ordered: list[Observed] = []
     at = next(k for k, v in enumerate(vehicles) if v.id == ego.id)

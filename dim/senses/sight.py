@@ -1,6 +1,6 @@
 """What can be seen from where: bodies near the junction, and lines of sight between them.
 
-It uses plain floats, for every vehicle asks about every other ten times a second.
+It uses plain floats, since every vehicle asks about every other one ten times a second.
 """
 
 from __future__ import annotations
@@ -25,11 +25,7 @@ class Body(NamedTuple):
 
 
 class Bodies:
-    """Where observed vehicles are. Their bodies are seen right, whatever intent is read.
-
-    Args:
-        site: its geometry and vehicles.
-    """
+    """Where observed vehicles are. Bodies are seen right even where the intent is misread."""
 
     def __init__(self, site: Site) -> None:
         self._rows = site.intersection.movements.rows
@@ -52,16 +48,11 @@ class Bodies:
         return Body(x - ux * self.half_length, y - uy * self.half_length, ux, uy)
 
     def hidden(self, eye: Body, target: Body, others: Iterable[Body]) -> bool:
-        """Whether bodies block every line of sight from the middle of one roof to a body.
-
-        The lines go to its centre and to its corners.
-        """
+        """Whether bodies block all lines from the eye's centre to a body's centre and corners."""
         blocking = tuple(others)
         start = (eye.x, eye.y)
-        return all(
-            any(self._crosses(start, end, body) for body in blocking)
-            for end in self._outline(target)
-        )
+        ends = self._outline(target)
+        return all(any(self._crosses(start, end, body) for body in blocking) for end in ends)
 
     def _outline(self, body: Body) -> tuple[Point, ...]:
         x, y, ux, uy = body

@@ -1,26 +1,26 @@
 """What wrong perception does to a run of DIM: counts for its summary.
 
-A session of DIM whose perception errs, among human drivers too, adds to the summary of its run:
+A session of DIM whose perception errs, also among human drivers, adds to the summary of its run:
 
 - `crossings`: vehicles that entered the junction.
 - `false_grants`: how often a vehicle held the right of way where the same rules on the true view
   had it wait, counted once each time it holds it.
-- `disagreement_s`: how long two vehicles that took part had chosen different cliques [s].
-- `deadlock_s`: how long vehicles took part while none was crossing and none had the right of way
+- `disagreement_s`: how long two participants had chosen different cliques [s].
+- `deadlock_s`: how long there were participants, but no vehicle crossed or had the right of way
   [s].
 
-All of it compares with the truth, which no vehicle knows. Where every reading is right, the last
-three are 0.
+They compare with the truth, which no vehicle knows. Where every reading is right, the last three
+are 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from dim.agent import Agent, Rules
 from dim.decision import DecisionTable
 from dim.perception import Percept, Reader
-from minisim.control import Command, Go, Hold, View
+from minisim.control import View
 
 
 class Tally:
@@ -34,8 +34,8 @@ class Tally:
     def __init__(self, rules: Rules, reader: Reader, start: float) -> None:
         self._rules, self._reader, self._start = rules, reader, start
         self._going: set[int] = set()
-        self._blamed: set[int] = set()  # those whose right of way has been counted as false
-        self._before: set[int] = set()  # those that are about to cross
+        self._blamed: set[int] = set()  # whose right of way has been counted as false
+        self._before: set[int] = set()  # which are about to cross
         self._crossings = self._false_grants = 0
         self._disagreement = self._deadlock = 0.0
         self._since = 0.0
@@ -56,15 +56,15 @@ class Tally:
         true: View,
         sights: Mapping[int, View],
         table: DecisionTable,
-        commands: Iterable[Command],
+        going: set[int],
     ) -> None:
         """Count one look around.
 
         Args:
             true: what vehicles would see without an error.
             sights: what each vehicle that follows DIM has seen, by its id.
-            table: in force.
-            commands: what the vehicles decided.
+            table: the present one.
+            going: ids of the vehicles that now have the right of way.
         """
         passed, self._since = true.time - self._since, true.time
         self._disagreement += passed * self._disagree
@@ -74,17 +74,17 @@ class Tally:
         self._before = before
         truth = self._reader.read(true)
         should = self._rightly(true, sights, truth, table)
-        self._carry_out(commands, sights)
-        wrongly = {v for v in self._going if v not in should and v not in truth.crossing}
+        self._going = going
+        wrongly = going - should - set(truth.crossing)
         self._false_grants += len(wrongly - self._blamed)
-        self._blamed = (self._blamed & self._going) | wrongly
+        self._blamed = (self._blamed & going) | wrongly
         self._disagree = len(self._choices(truth, sights, table)) > 1
-        self._stuck = bool(truth.participants) and not truth.crossing and not self._going
+        self._stuck = bool(truth.participants) and not truth.crossing and not going
 
     def _rightly(
         self, true: View, sights: Mapping[int, View], truth: Percept, table: DecisionTable
     ) -> set[int]:
-        """The vehicles that would go from the same state by the same rules on the true view."""
+        """The vehicles that would go by the same rules, and from the same state, on `true`."""
         rightly = set()
         for vehicle in true.vehicles:
             if vehicle.id not in sights:
@@ -95,18 +95,10 @@ class Tally:
                 rightly.add(vehicle.id)
         return rightly
 
-    def _carry_out(self, commands: Iterable[Command], near: Iterable[int]) -> None:
-        for command in commands:
-            if isinstance(command, Go):
-                self._going.add(command.vehicle)
-            elif isinstance(command, Hold):
-                self._going.discard(command.vehicle)
-        self._going.intersection_update(near)
-
     def _choices(
         self, truth: Percept, sights: Mapping[int, View], table: DecisionTable
     ) -> set[int]:
-        """The cliques that those that take part have chosen, as each sees the case."""
+        """The cliques that the participants have chosen, each from the case that it sees."""
         seen = [sights[v] for v in truth.participants]
         if seen and all(sight is seen[0] for sight in seen):
             return set()

@@ -1,7 +1,7 @@
 """Animations of a run: GIF, MP4 or a web page that plays by itself.
 
-The still ground is drawn once; each frame restores it and draws the few things that move, which
-takes a few milliseconds instead of the fifty that a full figure needs.
+The still ground is drawn once. Each frame restores it and draws only what moves, which takes a few
+milliseconds; a full figure needs fifty.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.text import Text
 from PIL import Image
@@ -29,31 +28,24 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats
 from minisim.results.run import Run
 
-#: Picture in inches and its resolution: 720 × 880 pixels, even numbers as video wants them.
+#: Picture in inches and its resolution: 720 × 880 pixels. Video needs even numbers.
 WIDTH, HEIGHT, DPI = 7.2, 8.8, 100
 #: Inches of legend below the junction.
 FOOT = 0.8
-#: What the zones are for, in the legend.
+#: Zones in the legend.
 MEANINGS = {"red": "red: slow down", "yellow": "yellow: decide", "green": "green: buffer"}
-
-Progress = Callable[[int, int], None]
 
 
 def write_animation(
-    run: Run,
-    path: str | os.PathLike[str],
-    *,
-    start: float = 0.0,
-    seconds: float = 60.0,
-    fps: float = 10.0,
-    progress: Progress | None = None,
-) -> None:
+    run: Run, path: str | os.PathLike[str], *, start: float = 0.0, seconds: float = 60.0,
+    fps: float = 10.0, progress: Callable[[int, int], None] | None = None,
+) -> None:  # fmt: skip
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
     Args:
         run: recorded with `record="all"` over the time shown.
-        path: of the file; it is there whole or not at all.
-        start, seconds: what to show [s].
+        path: of the file; it is written whole or not at all.
+        start, seconds: the time shown [s].
         fps: frames a second, at most one a simulation step.
         progress: called with the frames done and their number.
 
@@ -82,7 +74,7 @@ def write_animation(
 
 
 def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
-    """Times of the frames [s]: multiples of the step, as near to 1/fps apart as it allows."""
+    """Times of the frames [s]: multiples of the step, about 1/fps apart."""
     number("start [s]", start, low=0)
     number("seconds", seconds, above=0, high=3600)
     number("fps", fps, low=0.1, high=1.0 / dt)
@@ -95,7 +87,7 @@ class Picture:
 
     Args:
         run: recorded with `record="all"`.
-        start: the served vehicles are counted from this time [s].
+        start: served vehicles are counted from this time on [s].
     """
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
@@ -111,11 +103,12 @@ class Picture:
         drawing.draw_junction(self._axes, intersection, plan, reach)
         self._moving = self._add_moving()
         self._write_still()
-        self._clock = self._text(0.97, 8.5, 18, "right", weight="bold")
+        self._clock = self._text(0.97, 8.5, 18, "right", bold=True)
         self._counts = self._text(0.97, 8.18, 12, "right")
         for artist in (*self._moving, self._clock, self._counts):
             artist.set_animated(True)
-        self._canvas = _canvas_of(self._figure)
+        agg: Any = FigureCanvasAgg  # its methods have no types
+        self._canvas = agg(self._figure)
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
         self._written, self._ground = "", self._still
@@ -131,7 +124,7 @@ class Picture:
         return Image.frombuffer("RGBA", size, self._canvas.buffer_rgba()).convert("RGB")
 
     def palette(self) -> Image.Image:
-        """An image with every colour of the picture: the legend shows them all."""
+        """An indexed image with every colour of the picture, since the legend shows them all."""
         return palette_of(self.draw(self._film.busiest))
 
     def _add_moving(self) -> tuple[Artist, ...]:
@@ -148,15 +141,14 @@ class Picture:
         )
         self._crashes = LineCollection([], colors=style.BLACK, linewidths=3.0, zorder=9)
         self._holds = drawing.draw_hold_lines(axes, run.site.intersection, run.plan)
-        for artist in (self._ways, self._bodies, self._glass, self._lamps, self._crashes):
+        added = (self._bodies, self._glass, self._lamps, self._crashes)
+        for artist in (self._ways, *added):
             axes.add_collection(artist)
-        return (
-            self._ways, self._holds, self._bodies, self._glass, self._lamps, self._crashes,
-        )  # fmt: skip
+        return (self._ways, self._holds, *added)
 
     def _write_still(self) -> None:
         scenario = self.run.scenario
-        self._text(0.03, 8.5, 16, "left", weight="bold").set_text(self.title)
+        self._text(0.03, 8.5, 16, "left", bold=True).set_text(self.title)
         self._text(0.03, 8.18, 12, "left", colour=style.MUTED).set_text(
             f"{scenario.density:.0f} veh/h/lane · profile {scenario.profile_name} · "
             f"seed {self.run.seed}"
@@ -193,9 +185,7 @@ class Picture:
         self, x: float, y: float, size: float, align: str, *, colour: str = style.INK, **font: Any
     ) -> Text:
         """An empty text, `y` inches from below."""
-        return self._figure.text(
-            x, y / HEIGHT, "", fontsize=size, ha=align, va="center", color=colour, **font
-        )
+        return style.write(self._figure, x, y / HEIGHT, "", size, colour=colour, ha=align, **font)
 
     def _move(self, time: float) -> None:
         film, run = self._film, self.run
@@ -220,7 +210,7 @@ class Picture:
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:
-        """Write clock and counters into the ground, only when they change: text is slow."""
+        """Write clock and counters into the ground if they have changed, because text is slow."""
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
         counts = f"waiting {film.waiting(film.at(time))}   served {film.served(time)}"
@@ -237,11 +227,6 @@ class Picture:
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
 
 
-def _canvas_of(figure: Figure) -> Any:
-    """A canvas of pixels; its methods carry no types."""
-    return FigureCanvasAgg(figure)
-
-
 def view_reach(intersection: Intersection, zone: float) -> float:
-    """How far from the centre a picture reaches [m]: all markings and a little more."""
+    """Distance from the centre that a picture shows [m]: all markings and a little more."""
     return max(40.0, intersection.junction_radius + zone + 4.0)

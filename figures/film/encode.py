@@ -1,7 +1,7 @@
 """Frames into files: GIF, MP4 and a web page that plays by itself.
 
-Frames are images of one size and arrive one by one; none is kept longer than the next one needs
-it, so that a long film needs no more memory than a short one.
+Frames are images of one size that arrive one by one. Only the one before is kept, so a long film
+needs no more memory than a short one.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import struct
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +30,7 @@ FORMATS = ("gif", "mp4", "html")
 
 Indices = npt.NDArray[np.uint8]
 
-#: Colours of an indexed frame; in a GIF one more stands for "as before".
+#: Colours of an indexed frame; one more index is transparent and means "as before".
 COLOURS = 127
 
 
@@ -37,7 +38,7 @@ def animation_format(path: str | os.PathLike[str]) -> str:
     """The format of an animation by its suffix.
 
     Raises:
-        InputError: another suffix than `FORMATS`.
+        InputError: the suffix is not in `FORMATS`.
         MissingExtraError: .mp4 without the program ffmpeg.
     """
     suffix = Path(path).suffix.lower().removeprefix(".")
@@ -60,8 +61,8 @@ def palette_of(frame: Image) -> Image:
 def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -> None:
     """Write a GIF that loops for ever.
 
-    Each frame holds only the rectangle that changed, transparent where it did not (GIF89a, §18
-    screen, §20 image, §23 control; the loop is Netscape's extension).
+    Each frame holds only the rectangle that changed, with transparent pixels that did not (GIF89a,
+    §18 screen, §20 image, §23 control; the loop is Netscape's extension).
     """
     size_code = COLOURS.bit_length() - 1
     milliseconds = max(20, round(100.0 / fps) * 10)
@@ -82,7 +83,7 @@ def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -
 
 
 def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
-    """Pipe the frames into ffmpeg; raises `FileError` with what it says when it fails."""
+    """Pipe the frames into ffmpeg; raises `FileError` with ffmpeg's own words if it fails."""
     first = next(frames)
     command = [
         "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
@@ -93,7 +94,10 @@ def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
         tempfile.TemporaryFile() as log,
         subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log) as encoder,
     ):
-        _feed(encoder.stdin, first, frames)
+        assert encoder.stdin is not None
+        with suppress(BrokenPipeError), encoder.stdin as pipe:  # ffmpeg gave up: see its exit code
+            for frame in chain([first], frames):
+                pipe.write(frame.tobytes())
         if encoder.wait() != 0:
             log.seek(0)
             reason = " ".join(log.read().decode(errors="replace").split())
@@ -101,20 +105,18 @@ def write_mp4(frames: Iterator[Image], path: Path, fps: float) -> None:
 
 
 def write_html(frames: Iterator[Image], palette: Image, path: Path, fps: float, title: str) -> None:
-    """Write one web page that needs nothing else: a player with the frames inside.
+    """Write a web page that needs no other file: a player with the frames inside.
 
-    Each frame holds only what differs from the first, so that the page stays small and every
-    frame can be shown without the ones before it.
+    Each frame holds only its differences from the first one. So the page stays small, and each
+    frame can be shown without those before it.
     """
     template = Path(__file__).with_name("player.html").read_text(encoding="utf-8")
     fields = {
-        "title": html.escape(title),
-        "fps": f"{fps:g}",
-        "width": str(palette.width),
-        "height": str(palette.height),
-    }
+        "title": html.escape(title), "fps": f"{fps:g}", "width": palette.width,
+        "height": palette.height,
+    }  # fmt: skip
     for name, value in fields.items():
-        template = template.replace(f"{{{{{name}}}}}", value)
+        template = template.replace(f"{{{{{name}}}}}", str(value))
     before, after = template.split("{{frames}}")
     ground: Indices | None = None
     with path.open("w", encoding="utf-8") as file:
@@ -132,12 +134,12 @@ def _indexed(frame: Image, palette: Image) -> Image:
 
 
 def _colours(palette: Image) -> bytes:
-    """Red, green and blue of every index, the transparent one too."""
+    """Red, green and blue of every index, also of the transparent one."""
     return bytes(palette.getpalette() or ())[: 3 * COLOURS].ljust(3 * (COLOURS + 1), b"\0")
 
 
 def _png(indices: Indices, palette: Image) -> str:
-    """An indexed picture as base64 text; the index `COLOURS` is transparent."""
+    """A PNG as base64 text; the index `COLOURS` is transparent."""
     picture = fromarray(indices, "P")
     picture.putpalette(_colours(palette))
     buffer = io.BytesIO()
@@ -156,16 +158,3 @@ def _changed(indices: Indices, shown: Indices | None) -> tuple[tuple[int, int], 
     box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
     part = np.where(differs[box], indices[box], COLOURS).astype(np.uint8)
     return (int(columns[0]), int(rows[0])), part
-
-
-def _feed(pipe: IO[bytes] | None, first: Image, frames: Iterator[Image]) -> None:
-    """Write frames until they end or the reader has given up (its exit code will tell)."""
-    if pipe is None:
-        return
-    try:
-        pipe.write(first.tobytes())
-        for frame in frames:
-            pipe.write(frame.tobytes())
-        pipe.close()
-    except BrokenPipeError:
-        return

@@ -1,11 +1,10 @@
-"""The recorded trajectories of a run as arrays, asked by time: what `animate` draws."""
+"""What `animate` draws at a time: the recorded trajectories of a run, as arrays."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from dim import Mixed
 from figures.junction import drawing
 from minisim.engine.kernel import WAITING_SPEED
 from minisim.errors import InputError
@@ -18,14 +17,12 @@ Rows = npt.NDArray[np.int64]
 
 #: States of a vehicle.
 DRIVING, STANDING, RELEASED = 0, 1, 2
-#: How long a collision stays marked [s].
-COLLISION_SHOWN = 3.0
-#: Radius of the ring that marks it [m].
-RING = 5.0
+#: A collision is marked for this time [s] by a ring of this radius [m].
+COLLISION_SHOWN, RING = 3.0, 5.0
 
 
 class Frames:
-    """The recorded trajectories as arrays, asked by time."""
+    """The recorded trajectories as arrays, one row a vehicle and step."""
 
     def __init__(self, run: Run, start: float) -> None:
         frame = run.trajectories
@@ -38,7 +35,6 @@ class Frames:
         self.run, self.n = run, site.intersection.n
         self.x, self.y = frame["x_m"].to_numpy(), frame["y_m"].to_numpy()
         self.angle, self.s = frame["angle_deg"].to_numpy(), frame["s_m"].to_numpy()
-        self.speed = frame["speed_mps"].to_numpy()
         self.path = movement_index(frame, site)
         self.lane = site.intersection.movements.origins[self.path]
         paths = site.intersection.paths
@@ -47,16 +43,16 @@ class Frames:
         self.entry = paths[0].entry
         clear = self.exit[self.path] + site.vehicle.length
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
-        still = self.speed <= WAITING_SPEED
-        self.state = np.where(released, RELEASED, np.where(still, STANDING, DRIVING))
-        self.still = still
-        self.human = _human(run)[frame["vehicle"].to_numpy()]
+        self.still = frame["speed_mps"].to_numpy() <= WAITING_SPEED
+        self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
+        human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
+        self.human = human[frame["vehicle"].to_numpy()]
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
         self.ticks, first = np.unique(ticks, return_index=True)
         self.bounds = np.append(first, len(ticks))
         gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
-        # A vehicle that was clear before the first frame was not served in this film.
+        # A vehicle that was clear before the first frame does not count as served.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
         counts = np.diff(self.bounds)
         self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)
@@ -70,7 +66,7 @@ class Frames:
         return slice(int(self.bounds[k]), int(self.bounds[k + 1]))
 
     def rows(self, now: slice, reach: float) -> Rows:
-        """The rows of one step that are in the picture."""
+        """The rows of one step that lie in the picture."""
         rows = np.arange(now.start, now.stop)
         inside = np.maximum(np.abs(self.x[now]), np.abs(self.y[now])) <= reach
         return np.asarray(rows[inside])
@@ -89,15 +85,13 @@ class Frames:
 
     def open_lanes(self, rows: Rows) -> set[int]:
         """Lanes whose first vehicle before the junction has the right of way."""
-        first: dict[int, int] = {}
-        for row in rows[self.s[rows] <= self.entry].tolist():
-            lane = int(self.lane[row])
-            if lane not in first or self.s[row] > self.s[first[lane]]:
-                first[lane] = row
+        before = rows[self.s[rows] <= self.entry]
+        nearest_last = before[np.argsort(self.s[before], kind="stable")].tolist()
+        first = {int(self.lane[row]): row for row in nearest_last}
         return {lane for lane, row in first.items() if self.state[row] == RELEASED}
 
     def ways(self, rows: Rows) -> list[Floats]:
-        """What lies ahead, in the junction, of each vehicle with right of way."""
+        """The rest of the path, up to the exit, of each vehicle with right of way."""
         plan, paths = self.run.plan, self.run.site.intersection.paths
         begin = self.entry - max(plan.hold_distance, 1.0)
         rests = []
@@ -110,16 +104,15 @@ class Frames:
         return rests
 
     def lamps(self, rows: Rows) -> list[Floats]:
-        """Turn indicators of the vehicles that turn and have not left the junction."""
+        """Turn indicators of vehicles that turn and have not left the junction."""
         vehicle = self.run.site.vehicle
         half, size = vehicle.width / 2.0, 0.36
         front = np.array([(0.1, -size), (0.1, size), (-2 * size, size), (-2 * size, -size)])
         rear = front - (vehicle.length - 2 * size + 0.2, 0.0)
         lamps: list[Floats] = []
+        rows = rows[self.s[rows] <= self.exit[self.path[rows]]]
         for side in (-1, 1):
-            shown = rows[
-                (self.turn[self.path[rows]] == side) & (self.s[rows] <= self.exit[self.path[rows]])
-            ]
+            shown = rows[self.turn[self.path[rows]] == side]
             for shape in (front, rear):
                 moved = shape - (0.0, side * half)
                 lamps += list(drawing.place(moved, self.x[shown], self.y[shown], self.angle[shown]))
@@ -142,11 +135,3 @@ class Frames:
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings
-
-
-def _human(run: Run) -> npt.NDArray[np.bool_]:
-    """Which vehicles of a run are driven by humans, by id."""
-    count = len(run.columns.lane)
-    if isinstance(run.controller, Mixed):
-        return run.controller.human(run.seed, count)
-    return np.zeros(count, dtype=bool)

@@ -1,5 +1,4 @@
-"""What trying all cases of a junction showed: how many may go, how often cliques tie, and where
-most of them do."""
+"""All cases of a junction: how many vehicles go, how often cliques tie, and the worst case."""
 
 from __future__ import annotations
 
@@ -9,17 +8,16 @@ from itertools import combinations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from dim import explain
 from dim.decision import Movements
 from dim.proofs.verification import Analysis
 from figures import style
+from figures.junction import drawing
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
-from minisim.junction.paths import Floats
 
-#: One colour for each clique that ties; with more cliques they come again, dashed.
+#: One colour for each tied clique; further ones repeat them, dashed.
 CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 
 
@@ -28,7 +26,7 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
 
     Args:
         analysis: of all cases (`dim.proofs.verification.analyse`).
-        intersection: whose arms give the nodes their places.
+        intersection: its arms give the nodes their places.
     """
     worst = list(analysis.worst.items())
     figure = style.new_figure(4.2 * (2 + len(worst)), 4.4)
@@ -36,11 +34,8 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
     figure.subplots_adjust(left=0.06, right=0.985, top=0.77, bottom=0.14, wspace=0.26)
     false = [claim.name for claim in analysis.claims if not claim.holds]
     verdict = f"false: {', '.join(false)}" if false else "every claim holds in each of them"
-    figure.text(
-        0.06, 0.93,
-        f"{analysis.n} arms, {analysis.cases} cases, order {analysis.order}: {verdict}",
-        fontsize=12.5, fontweight="bold", color=style.INK, va="center",
-    )  # fmt: skip
+    title = f"{analysis.n} arms, {analysis.cases} cases, order {analysis.order}: {verdict}"
+    style.write(figure, 0.06, 0.93, title, 12.5, bold=True)
     _draw_counts(panels[0], analysis.sizes, "Who goes", "vehicles with the right of way")
     _draw_counts(panels[1], analysis.ties, "Ties", "cliques of the largest size")
     for axes, (size, (movements, count)) in zip(panels[2:], worst, strict=True):
@@ -65,8 +60,7 @@ def _draw_counts(axes: Axes, counts: Mapping[int, int], title: str, xlabel: str)
 def _draw_worst(
     axes: Axes, analysis: Analysis, movements: Movements, intersection: Intersection
 ) -> None:
-    """The harmony graph of a case with every largest clique in a colour of its own; the thick one
-    has the right of way."""
+    """The harmony graph of a case, one colour a tied clique; the thick one has the right of way."""
     explanation = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
     places = {m: np.array(intersection.arms[m.origin].outward) for m in movements}
     axes.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
@@ -83,18 +77,5 @@ def _draw_worst(
             )  # fmt: skip
     for movement in movements:
         goes = movement in explanation.right_of_way
-        _draw_node(
-            axes, places[movement], f"{ARM_NAMES[movement.origin]}{movement.manoeuvre}", goes
-        )
-
-
-def _draw_node(axes: Axes, place: Floats, label: str, goes: bool) -> None:
-    x, y = place
-    axes.add_patch(Circle(
-        (x, y), 0.19, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
-        edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
-    ))  # fmt: skip
-    axes.text(
-        x, y - 0.01, label, ha="center", va="center", fontsize=12, zorder=4,
-        color=style.PAPER if goes else style.WAITING,
-    )  # fmt: skip
+        label = f"{ARM_NAMES[movement.origin]}{movement.manoeuvre}"
+        drawing.draw_node(axes, places[movement], 0.19, label, 12, 0.01, goes=goes)

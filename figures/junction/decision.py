@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Patch, Rectangle
+from matplotlib.patches import Patch, Rectangle
 
 from dim import Explanation
 from figures import style
@@ -27,7 +27,7 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
     Args:
         explanation: of the decision (`dim.explain`).
         site: the junction and the vehicles' type.
-        plan: whose markings and hold line are drawn (`Dim().start(site).plan`).
+        plan: its markings and hold line are drawn (`Dim().start(site).plan`).
     """
     figure = style.new_figure(10.0, 6.0)
     left = figure.add_axes((0.02, 0.13, 0.462, 0.77))
@@ -39,14 +39,11 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
         (right, "B", "Harmony graph"),
     ):
         x = axes.get_position().x0
-        figure.text(x, 0.945, letter, fontsize=15, fontweight="bold", color=style.INK, va="center")
-        figure.text(x + 0.028, 0.945, title, fontsize=12, color=style.INK, va="center")
-    names = ", ".join(map(str, explanation.right_of_way))
-    figure.text(
-        0.02, 0.08, f"Right of way: {names}", fontsize=12.5, fontweight="bold",
-        color=style.RIGHT_OF_WAY, va="center",
-    )  # fmt: skip
-    figure.text(0.02, 0.035, explanation.reason, fontsize=10, color=style.INK, va="center")
+        style.write(figure, x, 0.945, letter, 15, bold=True)
+        style.write(figure, x + 0.028, 0.945, title, 12)
+    words = f"Right of way: {', '.join(map(str, explanation.right_of_way))}"
+    style.write(figure, 0.02, 0.08, words, 12.5, bold=True, colour=style.RIGHT_OF_WAY)
+    style.write(figure, 0.02, 0.035, explanation.reason, 10)
     _zone_legend(figure, plan)
     return figure
 
@@ -85,7 +82,7 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
 
 
 def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
-    """Nodes lie as their lanes do around the junction."""
+    """Draw the nodes where their lanes are around the junction."""
     places = {
         m.origin: np.array(intersection.arms[m.origin].outward) for m in explanation.participants
     }
@@ -100,32 +97,21 @@ def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection
             linewidth=7.0 if strong else 2.2, solid_capstyle="round", zorder=2 if strong else 1,
         )  # fmt: skip
     for movement in explanation.participants:
-        x, y = places[movement.origin]
+        label = rf"$V^{{{ARM_NAMES[movement.origin]}}}_{{{movement.manoeuvre}}}$"
         goes = movement.origin in chosen
-        axes.add_patch(Circle(
-            (x, y), 0.2, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
-            edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
-        ))  # fmt: skip
-        axes.text(
-            x, y - 0.005, rf"$V^{{{ARM_NAMES[movement.origin]}}}_{{{movement.manoeuvre}}}$",
-            ha="center", va="center", fontsize=15, zorder=4,
-            color=style.PAPER if goes else style.WAITING,
-        )  # fmt: skip
+        drawing.draw_node(axes, places[movement.origin], 0.2, label, 15, 0.005, goes=goes)
     pairs = math.comb(len(explanation.participants), 2)
+    tied = len(explanation.tied)
+    cliques = "1 clique" if tied == 1 else f"{tied} cliques"
     axes.text(
         0.0, -1.46, f"{len(explanation.edges)} of {pairs} pairs in harmony (lines); "
-        f"{_count(len(explanation.tied))} of the largest size, {len(explanation.tied[0])}",
+        f"{cliques} of the largest size, {len(explanation.tied[0])}",
         ha="center", va="bottom", fontsize=9.5, color=style.MUTED,
     )  # fmt: skip
 
 
-def _count(cliques: int) -> str:
-    return "1 clique" if cliques == 1 else f"{cliques} cliques"
-
-
 def _beside(intersection: Intersection, arm: int, before: float, room: float) -> Floats:
     """A point `room` metres off an approach lane, `before` metres before the junction."""
-    strip = drawing.lane_strip(intersection, arm, before, before)
-    middle, kerb = strip[0], strip[1]
+    middle, kerb, *_ = drawing.lane_strip(intersection, arm, before, before)
     across = (kerb - middle) / intersection.lane_width
     return np.asarray(kerb + across * room)

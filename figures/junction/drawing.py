@@ -1,6 +1,6 @@
-"""The junction from above: asphalt, lanes, zones, hold lines, vehicles and their way.
+"""The junction from above, and the nodes of its harmony graph.
 
-All coordinates are metres, x east and y north, as in `minisim.junction.geometry`.
+Coordinates are in metres, x east and y north, as in `minisim.junction.geometry`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import FancyArrowPatch, Polygon
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 from matplotlib.path import Path as Outline
 
 from figures import style
@@ -25,16 +25,14 @@ KERB_POINTS = 24
 
 
 def outline(intersection: Intersection, reach: float) -> Floats:
-    """Edge of the asphalt, shape (k, 2) [m]: every arm as far as `reach` from the centre."""
-    width = intersection.lane_width
-    arms = intersection.arms
-    points: list[Floats] = []
+    """Edge of the asphalt, shape (k, 2) [m]; the arms are `reach` long from the centre."""
+    width, arms = intersection.lane_width, intersection.arms
+    points = []
     for arm, following in zip(arms, (*arms[1:], arms[0]), strict=True):
         ahead, clockwise = _axes_of(arm)
-        ends = [ahead * reach - clockwise * width, ahead * reach + clockwise * width]
-        points.append(np.array(ends))
-        points.append(_kerb(arm, following, width, intersection.junction_radius))
-    return np.concatenate(points)
+        points += [ahead * reach - clockwise * width, ahead * reach + clockwise * width]
+        points += list(_kerb(arm, following, width, intersection.junction_radius))
+    return np.array(points)
 
 
 def lane_strip(intersection: Intersection, arm: int, start: float, end: float) -> Floats:
@@ -47,7 +45,7 @@ def lane_strip(intersection: Intersection, arm: int, start: float, end: float) -
 
 
 def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: float) -> None:
-    """Draw everything that does not move, `reach` metres around the centre."""
+    """Draw all that does not move, `reach` metres around the centre."""
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_axis_off()
     far = 1.5 * reach
@@ -67,12 +65,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
         axes.plot(*middle.T, color=style.PAINT, linewidth=1.2, dashes=(6, 5), zorder=3)
         entry = lane_strip(intersection, i, 0.15, -0.15)
         axes.add_patch(Polygon(entry, facecolor=style.PAINT, linewidth=0, zorder=3))
-    draw_lane_names(axes, intersection, reach)
-
-
-def draw_lane_names(axes: Axes, intersection: Intersection, reach: float) -> None:
-    """The lane identifiers, each beside its approach lane and inside the picture."""
-    for arm in intersection.arms:
+    for arm in intersection.arms:  # their names, beside the approach lanes
         ahead, clockwise = _axes_of(arm)
         beside = clockwise * _keep(intersection) * (intersection.lane_width + 0.055 * reach)
         edge = 0.93 * reach - np.abs(beside)
@@ -87,11 +80,8 @@ def draw_lane_names(axes: Axes, intersection: Intersection, reach: float) -> Non
 
 def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
     """Where vehicles without right of way stop: one line a lane, shape (n, 2, 2) [m]."""
-    strips = [
-        lane_strip(intersection, i, plan.hold_distance, plan.hold_distance)
-        for i in range(intersection.n)
-    ]
-    return np.array(strips)[:, :2]
+    at = plan.hold_distance
+    return np.array([lane_strip(intersection, i, at, at)[:2] for i in range(intersection.n)])
 
 
 def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
@@ -123,7 +113,7 @@ def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.Arra
 
 
 def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour: str) -> None:
-    """Draw one vehicle with its front bumper at `s` on its path."""
+    """Draw a vehicle with its front bumper at `s` on its path."""
     x, y = path.position(s)
     _, heading = path.pose(s, vehicle.length)
     angle = math.degrees(math.atan2(heading[0], heading[1]))
@@ -135,7 +125,7 @@ def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour:
 def draw_way(
     axes: Axes, path: Path, start: float, end: float, colour: str, *, strong: bool
 ) -> None:
-    """Draw the way of a movement between two `s` as an arrow."""
+    """Draw a path from `start` to `end` as an arrow."""
     points = path.position(np.linspace(start, end, 48))
     axes.add_patch(FancyArrowPatch(
         path=Outline(points), arrowstyle="-|>,head_length=7,head_width=4", color=colour,
@@ -146,13 +136,26 @@ def draw_way(
 
 
 def draw_hold_lines(axes: Axes, intersection: Intersection, plan: Plan) -> LineCollection:
-    """Draw the hold lines; recolour the answer to show which lanes are open."""
+    """Draw the hold lines; recolour what is returned to show which lanes are open."""
     lines = LineCollection(
         list(hold_lines(intersection, plan)), colors=style.INK, linewidths=3.0, zorder=4,
         capstyle="butt",
     )  # fmt: skip
     axes.add_collection(lines)
     return lines
+
+
+def draw_node(
+    axes: Axes, place: Floats, radius: float, label: str, size: float, below: float, *, goes: bool
+) -> None:
+    """Draw a vehicle of a harmony graph, its label of `size` points a little `below` the middle."""
+    x, y = place
+    axes.add_patch(Circle(
+        (x, y), radius, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
+        edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
+    ))  # fmt: skip
+    colour = style.PAPER if goes else style.WAITING
+    axes.text(x, y - below, label, ha="center", va="center", fontsize=size, zorder=4, color=colour)
 
 
 def _axes_of(arm: Arm) -> tuple[Floats, Floats]:
@@ -162,15 +165,15 @@ def _axes_of(arm: Arm) -> tuple[Floats, Floats]:
 
 
 def _keep(intersection: Intersection) -> float:
-    """+1 where the approach lane lies clockwise of the middle of its arm (left-hand traffic)."""
+    """+1 if the approach lane is clockwise of the middle of its arm (left-hand traffic), or −1."""
     return 1.0 if intersection.side == "left" else -1.0
 
 
 def _kerb(arm: Arm, following: Arm, width: float, radius: float) -> Floats:
     """The kerb from one arm to the next clockwise, shape (k, 2): an arc tangent to both.
 
-    It meets both road edges at the distance `radius` from the centre; where the edges cross
-    farther out than that, it is their crossing.
+    It meets both road edges at the distance `radius` from the centre. If the edges cross farther
+    out, it is their crossing.
     """
     ahead, clockwise = _axes_of(arm)
     next_ahead, next_clockwise = _axes_of(following)

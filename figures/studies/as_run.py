@@ -1,22 +1,12 @@
-"""Every value of the paper beside ours, for both studies of its grid, and why they differ."""
+"""Every value of the paper beside ours, for both studies of its grid, and the causes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from figures import style
-from figures.studies.shared.paper_values import (
-    EXPLAINED,
-    HEADINGS,
-    agreement,
-    inside,
-    marked,
-    range_words,
-    two_digits,
-)
+from figures.studies.shared import paper_values as paper
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.studies.shared.archive import Archive, missing_note
@@ -28,18 +18,19 @@ from scenarios.studies.shared.paper_comparison import (
     labels,
     score,
 )
+from scenarios.studies.shared.study import Results
 
 #: Series -> why its published rules collide.
-COLLIDING: Mapping[str, str] = MappingProxyType({
+COLLIDING = {
     "dim": "the published five-arm table has pairs in harmony, such as c3 and e4, whose ways pass "
            "1.48 m apart, less than a vehicle is wide; and by the published rule a decision may "
            "still take the right of way from a vehicle that can no longer stop",
     "v2ic": "the published conflict matrix is that of right-hand traffic (cause 14)",
-})  # fmt: skip
+}  # fmt: skip
 
 #: Discrepancy -> the run or file here that shows it. The others are known from the authors' code
-#: and files, and no run here isolates them.
-SHOWN: Mapping[int, str] = MappingProxyType({
+#: and files; no run here isolates them.
+SHOWN = {
     2: "as-run beside text, which changes vehicle, speeds and zones all at once",
     9: "the last arrivals of the published trips, last_arrival_s in scenarios/data/reference.csv",
     10: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
@@ -48,29 +39,20 @@ SHOWN: Mapping[int, str] = MappingProxyType({
     13: "the published arrivals in scenarios/data/arrivals; as-run has such inflow",
     14: "as-run, which has that matrix: see its collisions",
     15: "as-run, which has these speeds",
-})  # fmt: skip
+}
 
 
-def comparison_table(archive: Archive, study: str) -> Table:
-    """Every value that the paper plots or prints, beside ours.
-
-    Args:
-        archive: of the study.
-        study: "as-run" or "text".
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need(study)
-    table = compare(results.good)
+def comparison_table(results: Results) -> Table:
+    """Every value that the paper plots or prints, beside ours."""
+    table, study = compare(results.good), results.study.name
     return Table(
-        f"The paper's values and ours, {HEADINGS[study]} [s]",
+        f"The paper's values and ours, {paper.HEADINGS[study]} [s]",
         ("controller", "arms", "inflow", "metric", "veh/h/lane", "paper", "ours", "sd",
          "95 % prediction", "paper inside", "causes"),
         tuple(_compared(row, study) for row in table.to_dict("records")), labels=4,
         notes=(
-            f"{missing_note([results])}  Inside: {score(table)} comparable values, "
-            f"{score(table, comparable=False)} of the others. {EXPLAINED}",
+            f"{missing_note(results)}  Inside: {score(table)} comparable values, "
+            f"{score(table, comparable=False)} of the others. {paper.EXPLAINED}",
         ),
     )  # fmt: skip
 
@@ -80,8 +62,8 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
     return (
         style.look(row["series"]).label, f"{row['arms']}", row["split"],
         row["metric"].removesuffix("_time_s") + lane,
-        f"{row['density']:g}", marked(row), two_digits(row["mean"]),
-        two_digits(row["sd"]), range_words(row), inside(row),
+        f"{row['density']:g}", paper.marked(row), paper.two_digits(row["mean"]),
+        paper.two_digits(row["sd"]), paper.range_words(row), paper.inside(row),
         " ".join(dict.fromkeys(labels()[known.cause] for known in causes(study, row))),
     )  # fmt: skip
 
@@ -89,7 +71,7 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
 def ending(archive: Archive) -> str:
     """The known causes of differences, each once: where it holds, and what shows it."""
     holding: dict[tuple[int, str], list[str]] = {}
-    for known in sorted(discrepancies()):
+    for known in discrepancies():
         holding.setdefault((known.number, known.cause), []).append(_where(known))
     listed = [
         f"- **{labels()[cause]}** {cause} ({'; '.join(where)}.) "
@@ -107,9 +89,9 @@ def ending(archive: Archive) -> str:
     return "\n".join([
         "## Causes of the differences\n",
         f"{ran}The numbers are those of the column “causes”. Every cause is an attribution, read "
-        "from the authors' code, networks and result files: that it holds for a cell does not mean "
-        "that it explains all of the difference. Where a run or a file here shows it, that is "
-        "named. A cell that is outside and has no cause is not explained.\n",
+        "from the authors' code, networks and result files; it need not explain all of the "
+        "difference. If a run or a file here shows it, the list names it. A cell that is outside "
+        "and has no cause is not explained.\n",
         *listed,
         *collisions,
     ])  # fmt: skip
@@ -131,13 +113,9 @@ def _where(known: Discrepancy) -> str:
 SECTION = Section(
     "The paper's values and ours, cell by cell",
     tuple(
-        Item(
-            f"comparison-{study}", f"every value of the paper beside ours, {study}",
-            partial(comparison_table, study=study), (study,),
-        )
-        for study in HEADINGS
+        Item(f"comparison-{study}", f"every value of the paper beside ours, {study}",
+             comparison_table, (study,))
+        for study in paper.HEADINGS
     ),
-    partial(agreement, name="as-run"),
-    ending,
-    appendix=True,
+    paper.agreement, ending, appendix=True,
 )  # fmt: skip

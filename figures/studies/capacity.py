@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,36 +12,32 @@ from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import RIVALS
 from scenarios.studies.capacity import STUDY, Capacity, capacities
-from scenarios.studies.shared.archive import Archive, MissingRunsError
+from scenarios.studies.shared.archive import MissingRunsError
+from scenarios.studies.shared.study import Results
 
-#: Arms -> how a capacity is drawn.
-LOOKS: Mapping[int, style.Look] = MappingProxyType({
-    arms: style.Look(f"{arms} arms", colour, marker, "-")
-    for arms, colour, marker in (
-        (3, style.GREEN, "^"), (4, style.BLUE, "s"), (5, style.VERMILLION, "p"), (6, style.INK, "h")
-    )
-})  # fmt: skip
+#: Arms -> look.
+LOOKS = {
+    3: style.Look("3 arms", style.GREEN, "^", "-"),
+    4: style.Look("4 arms", style.BLUE, "s", "-"),
+    5: style.Look("5 arms", style.VERMILLION, "p", "-"),
+    6: style.Look("6 arms", style.INK, "h", "-"),
+}
 
 
-def needed_capacities(archive: Archive) -> list[Capacity]:
-    """Every capacity that is known.
-
-    Raises:
-        MissingRunsError: none is.
-    """
-    (results,) = archive.need("capacity")
+def needed_capacities(results: Results) -> list[Capacity]:
+    """Every capacity that is known; raises `MissingRunsError` if there is none."""
     known = capacities(results)
     if not known:
         raise MissingRunsError(
             "the store has no search for a capacity that ran to its end; make it with: "
-            f"{archive.effort.command('capacity')}"
+            f"{results.effort.command('capacity')}"
         )
     return known
 
 
-def capacity_figure(archive: Archive) -> Figure:
-    """Capacities with their intervals; errors as `needed_capacities`."""
-    known = needed_capacities(archive)
+def capacity_figure(results: Results) -> Figure:
+    """Capacities with their intervals."""
+    known = needed_capacities(results)
     figure = style.new_figure(9.2, 5.2)
     axes = figure.add_axes((0.2, 0.15, 0.78, 0.67))
     ends = [end for c in known for bracket in c.brackets for end in bracket if end < math.inf]
@@ -59,18 +53,18 @@ def capacity_figure(archive: Archive) -> Figure:
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
     axes.set_xlim(0.0, highest)
     plots.heading(figure, "Capacity: the largest demand served without a growing queue")
-    plots.looks_legend(figure, LOOKS.values(), 0.012, 0.91, lines=False)
-    note = f"{_extent(archive)}; profile fair.  Pale line: a bound is all that is known."
+    plots.looks_legend(figure, LOOKS.values(), 0.91, lines=False)
+    note = f"{_extent(results)}; profile fair.  Pale line: a bound is all that is known."
     if len(known) < len(STUDY.points):
         missing = len(STUDY.points) - len(known)
-        note += f"  Not drawn, for there is no run: {missing} of {len(STUDY.points)} cases."
+        note += f"  Not drawn, since there is no run: {missing} of {len(STUDY.points)} cases."
     plots.footnote(figure, note)
     return figure
 
 
-def capacity_table(archive: Archive) -> Table:
-    """Capacities in numbers [veh/h/lane]; errors as `needed_capacities`."""
-    known = needed_capacities(archive)
+def capacity_table(results: Results) -> Table:
+    """Capacities in numbers [veh/h/lane]."""
+    known = needed_capacities(results)
     texts = {(c.series, c.arms): str(c) for c in known}
     arms = sorted({c.arms for c in known})
     return Table(
@@ -81,23 +75,23 @@ def capacity_table(archive: Archive) -> Table:
             for name in dict.fromkeys(c.series for c in known)
         ),
         notes=(
-            f"{_extent(archive)}; “<” and “>”: every demand tried was too much for a seed, or none "
+            f"{_extent(results)}; “<” and “>”: every demand tried was too much for a seed, or none "
             "was. Served means that the queue grows by less than 2 % of the arrivals.",
         ),
     )  # fmt: skip
 
 
-def _extent(archive: Archive) -> str:
-    search = archive.effort.search
+def _extent(results: Results) -> str:
+    search = results.effort.search
     return (
-        f"{archive.effort.warning}Mean and 95 % interval over {search.seeds} seeds of "
+        f"{results.effort.warning}Mean and 95 % interval over {search.seeds} seeds of "
         f"{search.horizon:g} s, with the {search.step / 2.0:g} veh/h/lane by which the search "
         "rounds"
     )
 
 
 def _draw_capacity(axes: Axes, capacity: Capacity, highest: float) -> None:
-    """Mean and interval; a pale line where only a bound is known."""
+    """Mean and interval, or a pale line if only a bound is known."""
     look = LOOKS[capacity.arms]
     place = RIVALS.index(capacity.series) + 0.17 * (capacity.arms - 4.5)
     low, high = capacity.above, capacity.below

@@ -1,4 +1,4 @@
-"""What misread intents do, over the confidence below which an intent is taken for unknown."""
+"""Effects of misread intents, if vehicles believe only readings above some confidence."""
 
 from __future__ import annotations
 
@@ -9,17 +9,12 @@ from figures import plots
 from figures.studies.shared import outcomes
 from figures.studies.shared.section import Item, Section
 from scenarios.studies.confidence import THRESHOLDS
-from scenarios.studies.shared.archive import Archive, missing_note
-from scenarios.studies.shared.delay import with_total_delay
+from scenarios.studies.shared.archive import missing_note
+from scenarios.studies.shared.study import Results, with_total_delay
 
 
-def confidence_figure(archive: Archive) -> Figure:
-    """Collisions, false grants and delay over the threshold of confidence.
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need("confidence")
+def confidence_figure(results: Results) -> Figure:
+    """Collisions, false grants and delay over the threshold of confidence."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
         11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.735,
@@ -35,8 +30,8 @@ def confidence_figure(archive: Archive) -> Figure:
         outcomes.dress(axes, outcome, outcome, "least confidence that is believed", ticks)
     plots.heading(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents "
                           "misread by all alike, lasting")  # fmt: skip
-    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.012, 0.93, 3)
-    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note([results])}")
+    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.93, 3)
+    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note(results)}")
     return figure
 
 

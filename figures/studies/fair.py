@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from itertools import chain, product
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,20 +12,13 @@ from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import RIVALS
-from scenarios.studies.fair import GATES, OTHERS, losses
-from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
-from scenarios.studies.shared.crossing import Crossing, tried
-from scenarios.studies.shared.delay import MEASURES, with_total_delay
-from scenarios.studies.shared.study import Results
+from scenarios.studies.fair import GATES, MEASURES, OTHERS, Crossing, losses, tried
+from scenarios.studies.shared.archive import MissingRunsError, missing_note
+from scenarios.studies.shared.study import Results, with_total_delay
 
 
-def fair_figure(archive: Archive) -> Figure:
-    """Every controller with one vehicle and speed limit: three measures over demand.
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need("fair")
+def fair_figure(results: Results) -> Figure:
+    """Every controller with one vehicle and speed limit: three measures over demand."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
         11.5, 5.4, len(MEASURES), left=0.058, right=0.99, top=0.735, bottom=0.135, wspace=0.06
@@ -37,34 +30,33 @@ def fair_figure(archive: Archive) -> Figure:
         plots.density_axis(axes, rows["density"])
     plots.ylabel(panels[0], f"mean of all vehicles [s], {plots.scale_words(0.1)}")
     plots.heading(figure, "Every controller on four arms, profile fair")
-    plots.series_legend(figure, RIVALS, 0.012, 0.93, ncols=4)
-    plots.marks_legend(figure, 0.012, 0.842, paper=False)
+    plots.series_legend(figure, RIVALS, 0.93, ncols=4)
+    plots.marks_legend(figure, 0.842)
     plots.footnote(figure, (
-        f"{missing_note([results])}  Waiting is standing on the road: it leaves out the queue "
+        f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
         "before a full road, and V2I-C's vehicles crawl."
     ))  # fmt: skip
     return figure
 
 
-def needed_losses(archive: Archive) -> tuple[Results, Mapping[tuple[str, str, str], Crossing]]:
-    """The study, and from which demand on DIM does worse.
+def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
+    """From which demand on DIM does worse; see `losses`.
 
     Raises:
         MissingRunsError: no pair has two demands in common.
     """
-    (results,) = archive.need("fair")
-    known = losses(results.good)
+    known = {} if results.good.empty else losses(results.good)
     if not known:
         raise MissingRunsError(
             "the store has no two demands at which DIM and another controller ran with two common "
-            f"seeds; make them with: {archive.effort.command('fair')}"
+            f"seeds; make them with: {results.effort.command('fair')}"
         )
-    return results, known
+    return known
 
 
-def crossing_figure(archive: Archive) -> Figure:
-    """Demand from which on DIM loses to each rival, with both gates; see `needed_losses`."""
-    results, known = needed_losses(archive)
+def crossing_figure(results: Results) -> Figure:
+    """The demands at which DIM does worse than each rival, with both gates."""
+    known = needed_losses(results)
     figure, panels = plots.panels(
         11.0, 4.7, len(MEASURES), left=0.14, right=0.985, top=0.745, bottom=0.155, wspace=0.06
     )
@@ -79,34 +71,29 @@ def crossing_figure(archive: Archive) -> Figure:
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
     plots.heading(figure, "Demands at which DIM does worse than …")
-    plots.series_legend(figure, GATES, 0.012, 0.925)
-    figure.text(
-        0.012, 0.845, "pale bar: demands at which DIM does worse     marker and line: where that "
-        "begins, with its 95 % interval", fontsize=8.5, color=style.INK, va="center",
-    )  # fmt: skip
-    plots.footnote(figure, missing_note([results]))
+    plots.series_legend(figure, GATES, 0.925)
+    words = "pale bar: demands at which DIM does worse     marker and line: where that begins, with"
+    style.write(figure, plots.LEFT, 0.845, f"{words} its 95 % interval", 8.5)
+    plots.footnote(figure, missing_note(results))
     return figure
 
 
-def loss_table(archive: Archive) -> Table:
-    """From which demand on DIM does worse than each rival; errors as `needed_losses`."""
-    results, known = needed_losses(archive)
+def loss_table(results: Results) -> Table:
+    """From which demand on DIM does worse than each rival."""
+    known = needed_losses(results)
     low, high = tried(known.values())
     rows = []
-    for rival in OTHERS:
-        for measure in MEASURES:
-            cells = [known.get((measure, gate, rival)) for gate in GATES]
-            if any(cells):
-                rows.append((
-                    style.look(rival).label, measure,
-                    *(text for c in cells for text in ((c.point, c.interval) if c else ("–", "–"))),
-                ))  # fmt: skip
+    for rival, measure in product(OTHERS, MEASURES):
+        cells = [known.get((measure, gate, rival)) for gate in GATES]
+        if any(cells):
+            texts = ((cell.point, cell.interval) if cell else ("–", "–") for cell in cells)
+            rows.append((style.look(rival).label, measure, *chain.from_iterable(texts)))
     return Table(
         "Demand from which on DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
         tuple(rows), labels=2,
         notes=(
-            f"{missing_note([results])}  "
+            f"{missing_note(results)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
             f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
             "b only, for beyond the capacity of both their order may turn again. “all”: at every "
@@ -117,10 +104,10 @@ def loss_table(archive: Archive) -> Table:
     )  # fmt: skip
 
 
-def answer(archive: Archive) -> str:
-    """The question that the paper leaves open, answered in sentences."""
+def answer(results: Results) -> str:
+    """The answer to the question that the paper leaves open."""
     try:
-        _, known = needed_losses(archive)
+        known = needed_losses(results)
     except MissingRunsError as error:
         return f"From which demand on DIM loses is not known: {error}."
     low, high = tried(known.values())

@@ -1,9 +1,8 @@
-"""Which lanes wait under fixed, rotating and longest-waiting priority."""
+"""Waiting by lane under fixed, rotating and longest-waiting priority."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -11,22 +10,15 @@ from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from minisim.junction.movements import ARM_NAMES
 from scenarios.studies.fairness import LANE_WAIT, PRIORITIES, lane_waits
-from scenarios.studies.shared.archive import Archive, missing_note
+from scenarios.studies.shared.archive import missing_note
+from scenarios.studies.shared.study import Results
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-#: The demand at which lanes are compared, or the nearest that was run [veh/h/lane].
+#: Lanes are compared at this demand, or the nearest one that was run [veh/h/lane].
 LANE_DENSITY = 300.0
 
 
-def fairness_figure(archive: Archive) -> Figure:
-    """Waiting by lane, in the worst lane, and how unequal it is.
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need("fairness")
+def fairness_figure(results: Results) -> Figure:
+    """Waiting by lane, in the worst lane, and how unequal it is."""
     rows = lane_waits(results.good, 4)
     figure, (by_lane, worst, spread) = plots.panels(
         11.0, 4.7, 3, sharey=False, left=0.055, right=0.985, top=0.745, bottom=0.15, wspace=0.22
@@ -45,9 +37,9 @@ def fairness_figure(archive: Archive) -> Figure:
     spread.set_ylim(0.0, 0.8)
     by_lane.set_ylim(bottom=0.0)
     plots.heading(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
-    plots.series_legend(figure, PRIORITIES, 0.012, 0.925)
-    plots.marks_legend(figure, 0.012, 0.865, paper=False)
-    plots.footnote(figure, missing_note([results]))
+    plots.series_legend(figure, PRIORITIES, 0.925)
+    plots.marks_legend(figure, 0.865)
+    plots.footnote(figure, missing_note(results))
     return figure
 
 

@@ -6,18 +6,13 @@ from matplotlib.figure import Figure
 
 from figures import plots, style
 from figures.studies.shared.section import Item, Section
-from scenarios.studies.fair import GATES
-from scenarios.studies.shared.archive import Archive, missing_note
-from scenarios.studies.shared.delay import MEASURES
+from scenarios.studies.fair import GATES, MEASURES
+from scenarios.studies.shared.archive import missing_note
+from scenarios.studies.shared.study import Results
 
 
-def gate_figure(archive: Archive) -> Figure:
-    """Both gates on three, four and five arms.
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need("gate")
+def gate_figure(results: Results) -> Figure:
+    """Both gates on three, four and five arms."""
     figure, panels = plots.panels(
         11.0, 4.7, 3, left=0.06, right=0.985, top=0.745, bottom=0.15, wspace=0.06
     )
@@ -29,9 +24,9 @@ def gate_figure(archive: Archive) -> Figure:
         plots.paper_densities(axes)
     plots.ylabel(panels[0], f"mean waiting [s], {plots.scale_words(0.1)}")
     plots.heading(figure, "Two gates: a clear junction, or harmony with all vehicles that cross")
-    plots.series_legend(figure, GATES, 0.012, 0.925)
-    plots.marks_legend(figure, 0.012, 0.865, paper=False)
-    plots.footnote(figure, missing_note([results]))
+    plots.series_legend(figure, GATES, 0.925)
+    plots.marks_legend(figure, 0.865)
+    plots.footnote(figure, missing_note(results))
     return figure
 
 

@@ -1,13 +1,11 @@
-"""What misread intents do, over the probability of an error."""
+"""Effects of misread intents, over the probability of an error."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from itertools import product
-from types import MappingProxyType
-from typing import TYPE_CHECKING
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from dim.senses.intent import KINDS, RATES
@@ -17,37 +15,25 @@ from figures.studies.shared import outcomes
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.statistics import mean_interval
-from scenarios.studies.shared.archive import Archive, missing_note
-from scenarios.studies.shared.delay import TOTAL_DELAY, with_total_delay
+from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.intent_errors import CROSSINGS, DENSITY, MANNERS, MISREADERS, rate_of
-
-if TYPE_CHECKING:
-    import pandas as pd
+from scenarios.studies.shared.study import TOTAL_DELAY, Results, with_total_delay
 
 #: (shared, persistent) -> look.
-LOOKS: Mapping[tuple[bool, bool], style.Look] = MappingProxyType({
+LOOKS = {
     (True, True): style.Look(MANNERS[True, True], style.BLUE, "o", "-"),
     (True, False): style.Look(MANNERS[True, False], style.SKY, "p", "-"),
     (False, True): style.Look(MANNERS[False, True], style.VERMILLION, "s", "--"),
     (False, False): style.Look(MANNERS[False, False], style.ORANGE, "^", "-."),
-})  # fmt: skip
+}
 #: Turns that are not signalled, at the published rates.
 SILENT = style.Look("turns without signal, published rates", style.INK, "", ":")
 
 
-def perception_figure(archive: Archive, series: str) -> Figure:
-    """Collisions, false grants and delay over the probability of an intent error.
-
-    Args:
-        archive: of the runs.
-        series: the controller whose vehicles misread.
-
-    Raises:
-        MissingRunsError: nothing was run.
-    """
-    (results,) = archive.need("perception")
+def perception_figure(results: Results, series: str) -> Figure:
+    """Collisions, false grants and delay under a controller, over the probability of an error."""
     rows = outcomes.select(with_total_delay(results.good), series=series)
-    parts = list(product(KINDS, outcomes.OUTCOMES.items()))
+    parts = list(product(KINDS, outcomes.OUTCOMES))
     figure, panels = plots.panels(
         11.5, 7.4, len(parts), rows=len(KINDS), sharey=False, left=0.062, right=0.988, top=0.815,
         bottom=0.095, wspace=0.22, hspace=0.42,
@@ -55,15 +41,15 @@ def perception_figure(archive: Archive, series: str) -> Figure:
     silent = rows[rows["unsignalled"].astype(bool)]
     signalled = rows[~rows["unsignalled"].astype(bool)]
     exact = outcomes.select(signalled, rate=0.0)
-    for axes, (kind, (outcome, estimate)) in zip(panels, parts, strict=True):
-        for place, (manner, look) in enumerate(LOOKS.items()):
-            line = outcomes.select(signalled, kind=kind, shared=manner[0], persistent=manner[1])
+    for axes, (kind, outcome) in zip(panels, parts, strict=True):
+        for place, ((shared, persistent), look) in enumerate(LOOKS.items()):
+            line = outcomes.select(signalled, kind=kind, shared=shared, persistent=persistent)
             cells = [exact, *(outcomes.select(line, rate=rate) for rate in RATES[1:])]
-            # Side by side, so that bars do not cover each other; rates are far from even.
+            # Side by side, so that bars do not cover each other. The ticks are even, the rates not.
             places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
             outcomes.draw(axes, places, cells, outcome, look)
-        level = None if kind != "missed" or silent.empty else estimate(silent)
-        if level is not None:
+        level = outcomes.estimated(silent, outcome)
+        if kind == "missed" and level is not None:
             axes.axhline(level.value, color=SILENT.colour, linestyle=SILENT.dashes,
                          linewidth=1.4)  # fmt: skip
         outcomes.dress(axes, outcome, f"{outcome}, {outcomes.KIND_LOOKS[kind].label}",
@@ -72,32 +58,30 @@ def perception_figure(archive: Archive, series: str) -> Figure:
     plots.heading(
         figure, f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
     )
-    plots.looks_legend(figure, [*LOOKS.values(), SILENT], 0.012, 0.93, 3)
-    note = missing_note([results], lambda point: point.series == series)
+    plots.looks_legend(figure, [*LOOKS.values(), SILENT], 0.93, 3)
+    note = missing_note(results, wanted=lambda point: point.series == series)
     plots.footnote(figure, f"{outcomes.NOTE}  {note}")
     return figure
 
 
-def perception_table(archive: Archive) -> Table:
-    """All outcomes at the error rate of published classifiers; errors as above."""
-    (results,) = archive.need("perception")
+def perception_table(results: Results) -> Table:
+    """All outcomes at the error rate of published classifiers."""
     rows = with_total_delay(results.good)
     chosen = rows[rows["rate"].isin([0.0, CLASSIFIER])]
     keys = ["series", "rate", "unsignalled", "kind", "shared", "persistent"]
     listed = []
     for (series, rate, silent, kind, shared, persistent), cell in chosen.groupby(keys, sort=False):
-        error = "exact" if rate == 0.0 else outcomes.KIND_LOOKS[str(kind)].label
-        manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
-        label = style.look(str(series)).label
+        error = outcomes.KIND_LOOKS[str(kind)].label if rate else "exact"
         error = "turns without signal" if silent else error
-        listed.append((label, error, manner, *_outcomes(cell)))
+        manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
+        listed.append((style.look(str(series)).label, error, manner, *_outcomes(cell)))
     return Table(
         f"What misread intents do, {CLASSIFIER:.0%} of them misread, on four arms, {DENSITY:g} "
         "veh/h/lane",
         ("controller", "error", "manner", "crossings", f"collisions / {CROSSINGS:,} crossings",
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
          "unfinished [%]", "delay [s]"),
-        tuple(listed), labels=3, notes=(f"{outcomes.NOTE}  {missing_note([results])}",),
+        tuple(listed), labels=3, notes=(f"{outcomes.NOTE}  {missing_note(results)}",),
     )  # fmt: skip
 
 
@@ -119,7 +103,7 @@ def _outcomes(cell: pd.DataFrame) -> tuple[str, ...]:
 
 def _count(rows: pd.DataFrame, events: str) -> str:
     rate = rate_of(rows, events)
-    return f"{rate.rate:.0f} ({rate.low:.0f} … {rate.high:.0f})" if rate else "–"
+    return f"{rate.value:.0f} ({rate.low:.0f} … {rate.high:.0f})" if rate else "–"
 
 
 SECTION = Section(

@@ -1,8 +1,8 @@
 """Vehicles under cruise control: the law of the published runs, SUMO's CC model.
 
-Everything that is special about this law stands here: its leaders, what it remembers of each
-vehicle, and how it chooses accelerations. The kernel calls `accelerate` in place of its own, and
-`look` after every step. The equations are in `minisim.carfollowing`.
+All that is special about this law is in this module: its leaders, what it remembers of each vehicle
+and how it chooses accelerations. The kernel calls `accelerate` in place of its own, and `look`
+after every step. The equations are in `minisim.carfollowing`.
 
 A vehicle obeys the hardest braking that any of its leaders asks for
 (`MSVehicle::planMoveInternal`, with the model's radar). The leaders are:
@@ -218,7 +218,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
-                # One beside it, still on another way, is left to the radar (`adaptToLeader`).
+                # A vehicle beside it on another way is left to the radar (`adaptToLeader`).
                 beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
                 if not beside:
                     tail = follow(v, gap - law.min_gap, ahead["v"], cruise)

@@ -23,12 +23,12 @@ MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
 #: SUMO's limit below which a vehicle counts as waiting [m/s].
 WAITING_SPEED = 0.1
 
-#: What a law of motion brings along that has leaders of its own. There is one such law.
+#: The data of a law of motion that has leaders of its own. There is one such law.
 Motion = cruise.Cruise
 
 
 def build_motion(site: Site, vehicles: Records, teleports: bool = False) -> Motion | None:
-    """What the law of motion of these vehicles brings along; None where it brings nothing."""
+    """The data that the law of these vehicles needs beside `Law`, or None."""
     return cruise.build_cruise(site, len(vehicles), teleports)
 
 

@@ -1,7 +1,7 @@
 """The car-following models of a run, and the bounds that limits and hold lines set.
 
-What depends on `Law.model` stands here. The equations are in `minisim.carfollowing`, and the table
-of models in `minisim.vehicle`.
+All that depends on `Law.model` is in this module. The equations are in `minisim.carfollowing`, the
+table of models in `minisim.vehicle`.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def follow(v: float, v0: float, z: float, law: Law) -> float:
     """Acceleration of the car-following law.
 
-    For a desired speed of 0 the IDM is taken to its limit from above: comfortable braking, and the
-    leader's share on top of it.
+    For a desired speed of 0 this is the IDM's limit from above: comfortable braking plus the
+    leader's share.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf

@@ -1,8 +1,8 @@
 """The arrays that a run consists of.
 
 Vehicles are one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-simply the row before. Lanes are another. What never changes during a run is in `Road` and `Law`.
-Few arguments keep a call into the compiled kernel cheap: unboxing arrays is most of its cost.
+the row before. Lanes are another array. `Road` and `Law` hold what never changes during a run. Few
+arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
 
 #: A held vehicle aims at this distance before its hold line [m]. It may stop up to 0.3 m before the
-#: line, and beyond `minisim.control.COMMIT_MARGIN` it never looks unable to stop.
+#: line. This is more than `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
 STOP_MARGIN = 0.25
 
 #: Values of the field `status`.

@@ -19,8 +19,8 @@ place = njit_inline(locate)
 def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
-    It tests rectangles a little larger than the bodies, exactly, by separating axes. So it never
-    misses what pymunk would find.
+    It tests rectangles a little larger than the bodies by separating axes, which is exact. So it
+    never misses a touch that pymunk would find.
     """
     ends, shape, headings = road.ends, road.shape, road.headings
     count = 0

@@ -1,46 +1,47 @@
 """Where two vehicles on their paths come too near: the coordination space of two movements.
 
-Two vehicles on given paths are one point in the plane of their positions, and a region of it is
-forbidden (the coordination space of O'Donnell and Lozano-Pérez, ICRA 1989). Two intervals, one on
-each path, would be the box around that region; the region also tells which vehicle has passed the
+Two vehicles on given paths are one point in the plane of their positions. A region of that plane
+is forbidden (the coordination space of O'Donnell and Lozano-Pérez, ICRA 1989). An interval on each
+path would only be the box around that region. The region also shows which vehicle has passed the
 other.
 """
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from minisim.junction.conflicts import CLEARANCE, Shapes, bodies, by_size
+from minisim.junction.conflicts import CLEARANCE, Shapes, bodies
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools
-from minisim.junction.paths import Floats, Path, Size
+from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between a body and another that passes it at a crawl, or is seen to stand [m]: the buffer
-#: of 0.25 m around one of the two (see `CLEARANCE`).
+#: Room between two bodies of which one stands or crawls [m]: the buffer of 0.25 m around one of the
+#: two (see `CLEARANCE`).
 CLOSE = 0.25
 
-#: Room that must do where two vehicles would otherwise stand for ever, and the step in which it is
-#: measured [m].
+#: Least room, where two vehicles would otherwise stand for ever, and the step of its measurement
+#: [m].
 TIGHT = 0.1
 
 
 class Region(NamedTuple):
     """The forbidden region of two movements, on a grid of `STEP` from the junction entry on.
 
-    Rows are positions of the first vehicle's front past the entry, columns of the second's. A
-    position before the entry counts as the entry; one past the grid is out of the region.
+    Rows are positions of the first vehicle's front past the entry; columns are those of the
+    second's. A position before the entry counts as the entry. One past the grid is out of the
+    region.
 
     Attributes:
-        close: whether the bodies come closer than `CLOSE`, anywhere within one step of the grid
-            point.
+        close: whether the bodies come closer than `CLOSE` within one step of the grid point.
         ever: whether they come closer than `CLEARANCE` at this or a later position of the second.
     """
 
@@ -48,7 +49,7 @@ class Region(NamedTuple):
     ever: Bools
 
     def room(self, first: float, second: float) -> float:
-        """How far the first may still go, however far the second goes [m]; may be infinite."""
+        """How far the first may still go, wherever the second goes [m]; may be infinite."""
         return _free(self.ever, first, second)
 
     def way(self, first: float, second: float) -> float:
@@ -56,13 +57,13 @@ class Region(NamedTuple):
         return _free(self.close, first, second)
 
     def touches(self, first: Floats, second: Floats) -> bool:
-        """Whether the bodies come close at any of these moments (positions past the entry)."""
-        rows, columns = _index(first), _index(second)
+        """Whether the bodies come close at any of these moments (positions past the entry [m])."""
+        rows, columns = (np.maximum(s // STEP, 0.0).astype(int) for s in (first, second))
         inside = (rows < len(self.close)) & (columns < self.close.shape[1])
         return bool(self.close[rows[inside], columns[inside]].any())
 
     def ends(self, second: float) -> float:
-        """From where on the first is out of the region for a second this far or further [m]."""
+        """From where on the first is out of the region, if the second is here or further on [m]."""
         column = max(int(second / STEP), 0)
         if column >= self.ever.shape[1]:
             return 0.0
@@ -70,9 +71,11 @@ class Region(NamedTuple):
         return float(rows[-1] + 1) * STEP if len(rows) else 0.0
 
 
-@by_size(4096)
-def region(intersection: Intersection, vehicle: Size, first: int, second: int) -> Region | None:
-    """The forbidden region of two movements by index; None where bodies never come near."""
+@lru_cache(maxsize=4096)
+def region(
+    intersection: Intersection, vehicle: VehicleType, first: int, second: int
+) -> Region | None:
+    """The forbidden region of two movements, by index; None where bodies never come near."""
     near, close = _grids(intersection, vehicle, min(first, second), max(first, second))
     if not near.any():
         return None
@@ -82,12 +85,12 @@ def region(intersection: Intersection, vehicle: Size, first: int, second: int) -
 
 
 def passes(
-    intersection: Intersection, vehicle: VehicleType | Size, first: int, x: float,
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float,
     second: int, y: float,
 ) -> bool:  # fmt: skip
-    """Whether a vehicle on one path gets past another that stands on another.
+    """Whether a vehicle on one path can pass a vehicle that stands on another path.
 
-    The room that it needs all the way is `CLOSE` by the grid or, measured, more than `TIGHT`.
+    All the way it needs a room of `CLOSE` by the grid or, measured, of more than `TIGHT`.
 
     Args:
         intersection, vehicle: where, and how large both are.
@@ -100,25 +103,19 @@ def passes(
     return _squeezes(intersection, vehicle, first, round(x, 2), second, round(y, 2))
 
 
-def _index(position: Floats) -> np.typing.NDArray[np.intp]:
-    return np.maximum(np.floor(position / STEP), 0.0).astype(np.intp)
-
-
 def _free(blocked: Bools, first: float, second: float) -> float:
     row, column = max(int(first / STEP), 0), max(int(second / STEP), 0)
     if row >= blocked.shape[0] or column >= blocked.shape[1]:
         return math.inf
     ahead = np.flatnonzero(blocked[row:, column])
-    if len(ahead) == 0:
-        return math.inf
-    return max(int(row + ahead[0]) * STEP - first, 0.0)
+    return max(int(row + ahead[0]) * STEP - first, 0.0) if len(ahead) else math.inf
 
 
-@by_size(4096)
+@lru_cache(maxsize=4096)
 def _squeezes(
-    intersection: Intersection, vehicle: Size, first: int, x: float, second: int, y: float
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
 ) -> bool:
-    """`passes`, measured: the grid is too coarse to tell the last decimetres."""
+    """`passes`, measured; the grid is too coarse for the last decimetres."""
     one, other = intersection.paths[first], intersection.paths[second]
     stands = bodies(other, np.array([other.entry + y]), vehicle)
     past = np.arange(x, one.crossing + vehicle.length, TIGHT)
@@ -126,9 +123,9 @@ def _squeezes(
     return bool((shapely.distance(moves, stands) > TIGHT).all())
 
 
-@by_size(4096)
+@lru_cache(maxsize=4096)
 def _grids(
-    intersection: Intersection, vehicle: Size, first: int, second: int
+    intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
     """Whether the bodies come closer than `CLEARANCE`, and than `CLOSE`, near each grid point."""
     one, other = (_until_clear(intersection.paths[k], vehicle) for k in (first, second))
@@ -136,14 +133,14 @@ def _grids(
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
 
 
-def _until_clear(path: Path, vehicle: Size) -> Shapes:
+def _until_clear(path: Path, vehicle: VehicleType) -> Shapes:
     """The body with its front at each grid point, until its rear has left the junction."""
     past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
     return bodies(path, path.entry + past, vehicle)
 
 
 def _widened(near: Bools) -> Bools:
-    """With a step more on either side in both directions: bodies move between grid points."""
+    """Widened by a step on each side, since bodies move between grid points."""
     wide = np.pad(near, 1)
     rows = wide[:-2] | wide[1:-1] | wide[2:]
     return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])

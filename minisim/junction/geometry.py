@@ -1,9 +1,9 @@
 """The junction on paper: arms, and the path of every movement.
 
-x east, y north, metres. An approach lane ends at its entry, `junction_radius` from the centre;
-between entry and exit every movement is one circular arc. That needs no curve fitting: the two
-lane centre lines are mirror images of each other in the bisector of their arms, so entry and exit
-are equally far from where the lines meet and one arc is tangent to both.
+x points east, y north, in metres. An approach lane ends at its entry, `junction_radius` from the
+centre. Between entry and exit every movement is one circular arc. No curve fitting is needed: the
+two lane centre lines mirror each other in the bisector of their arms, so entry and exit are equally
+far from where the lines meet, and one arc is tangent to both.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -27,8 +26,8 @@ from minisim.parameters import checked, declared, real, word
 MIN_ANGLE = 30.0
 #: Kerb radius between neighbouring arms [m]; netconvert's default `radius` is 4 m too.
 KERB_RADIUS = 4.0
-#: Tightest path a car can follow [m]: passenger cars turn within 5–6 m (AASHTO Green Book,
-#: design vehicle P: centre-line radius 6.4 m); the authors' 5-arm network goes down to 4.5 m.
+#: Smallest radius of a path that a car can follow [m]: passenger cars turn within 5–6 m (AASHTO
+#: Green Book, design vehicle P: centre-line radius 6.4 m); the authors' 5-arm network has 4.5 m.
 MIN_PATH_RADIUS = 4.0
 
 
@@ -67,13 +66,6 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
     return bearings
 
 
-def _radius(name: str, value: Any) -> Any:
-    """Check the radius of the junction; NaN, where it is not given, passes."""
-    if not (isinstance(value, Real) and value != value):
-        number(name, value, above=0)
-    return value
-
-
 def _ways(name: str, value: Any) -> Any:
     """Check that the curves are a tuple, which can be hashed."""
     instance(name, value, tuple)
@@ -89,9 +81,9 @@ def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
 class Intersection:
     """A junction of n ≥ 3 arms, one lane in and one lane out on each.
 
-    The arms are named a, b, c… in the order of their bearings. The default radius is the smallest
-    that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (lane_width + KERB_RADIUS) /
-    tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
+    The arms are named a, b, c… in the order of their bearings. Without a `junction_radius` it is
+    the smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (lane_width +
+    KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
     """
 
     bearings: tuple[float, ...] = checked(
@@ -102,29 +94,33 @@ class Intersection:
         "of the road that traffic keeps to", ("left", "right"), default="left"
     )
     lane_width: float = real("width of every lane", "m", default=3.2, low=2, high=6)
-    junction_radius: float = checked(
-        "distance of every entry and exit from the centre", _radius,
-        "> 0, < arm_length − 10, no path tighter than a car can follow", "m", default=math.nan,
+    junction_radius: float = real(
+        "distance of every entry and exit from the centre; none is the smallest with a kerb of "
+        f"{KERB_RADIUS:g} m",
+        "m", above=0, optional=True, default=None,
     )  # fmt: skip
     arm_length: float = real(
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
     ways: tuple[Way, ...] | None = checked(
-        "how each movement crosses the junction, in the order of `movements`, where that is given "
-        "(another simulator's curves); none is the arcs",
+        "another simulator's curves through the junction, in the order of `movements`; none is the "
+        "arcs",
         _ways, "a Way a movement", optional=True, default=None,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        if math.isnan(self.junction_radius):  # not given
-            object.__setattr__(self, "junction_radius", self._default_radius)
+        smallest = (self.lane_width + KERB_RADIUS) / math.tan(
+            math.radians(min(_gaps(self.bearings))) / 2.0
+        )
+        if self.junction_radius is None:
+            object.__setattr__(self, "junction_radius", smallest)
         number("junction_radius [m]", self.junction_radius, above=0, below=self.arm_length - 10)
-        tightest = min(self._arc_radius(m, self.junction_radius) for m in self.movements)
+        tightest = min(map(self._arc_radius, self.movements))
         if tightest < MIN_PATH_RADIUS - 1e-9:
             raise InputError(
                 f"junction_radius {self.junction_radius:g} m leaves a path of radius "
                 f"{max(tightest, 0):.2g} m; a car needs {MIN_PATH_RADIUS:g} m "
-                f"(the default here is {self._default_radius:.3g} m)"
+                f"(the default here is {smallest:.3g} m)"
             )
         self._check_ways()
 
@@ -153,11 +149,11 @@ class Intersection:
         return self.movements.number(movement)
 
     def parse(self, text: str) -> Movement:
-        """Read a movement such as `a1`; raises `InputError` with what is allowed."""
-        return self.movements[self.movements.number(text)]
+        """Read a movement such as `a1`; raises `InputError`, which says what is allowed."""
+        return self.movements[self.index(text)]
 
     def exit_arm(self, movement: Movement) -> int:
-        """Index of the arm by which a movement leaves."""
+        """Index of the arm that a movement leaves by."""
         return int(self.movements.exits[self.index(movement)])
 
     def path(self, movement: Movement) -> Path:
@@ -178,63 +174,49 @@ class Intersection:
             return speed
         return math.sqrt(lateral * self.path(movement).radius)
 
-    @property
-    def _default_radius(self) -> float:
-        half = math.radians(min(_gaps(self.bearings))) / 2.0
-        return (self.lane_width + KERB_RADIUS) / math.tan(half)
-
     def _half_angle(self, movement: Movement) -> float:
         """Half the clockwise angle from the arm of origin to the arm of exit [rad]."""
         to = self.bearings[self.exit_arm(movement)]
         return math.radians((to - self.bearings[movement.origin]) % 360.0) / 2.0
 
-    def _tangent(self, movement: Movement, radius: float) -> float:
-        """From the entry to where the two lane centre lines meet [m]."""
-        half = self._half_angle(movement)
-        offset = self.lane_width / 2.0 / math.tan(half)
-        return radius - offset if self.side == "left" else radius + offset
-
-    def _arc_radius(self, movement: Movement, radius: float) -> float:
-        slope = abs(math.tan(self._half_angle(movement)))
-        return self._tangent(movement, radius) * min(slope, 1e6)
+    def _arc_radius(self, movement: Movement) -> float:
+        slope = math.tan(self._half_angle(movement))
+        offset = self.lane_width / 2.0 / slope
+        # From the entry to where the two lane centre lines meet.
+        tangent = self.junction_radius + (-offset if self.side == "left" else offset)
+        return tangent * min(abs(slope), 1e6)
 
     def _build_path(self, movement: Movement) -> Path:
-        arm_in = self.arms[movement.origin]
-        arm_out = self.arms[self.exit_arm(movement)]
-        keep = 1.0 if self.side == "left" else -1.0
-        heading_in = -np.array(arm_in.outward)
-        heading_out = np.array(arm_out.outward)
-        left_in = np.array([-heading_in[1], heading_in[0]])
-        left_out = np.array([-heading_out[1], heading_out[0]])
-        offset = keep * self.lane_width / 2.0
+        heading_in = -np.array(self.arms[movement.origin].outward)
+        heading_out = np.array(self.arms[self.exit_arm(movement)].outward)
+        left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
+        offset = self.lane_width / 2.0 if self.side == "left" else -self.lane_width / 2.0
         start = -heading_in * self.junction_radius + left_in * offset
         end = heading_out * self.junction_radius + left_out * offset
 
         # Clockwise turn: 0 for straight on, positive to the right.
         turn = 2.0 * self._half_angle(movement) - math.pi
-        radius = self._arc_radius(movement, self.junction_radius)
         straight = abs(turn) < 1e-4
-        length = float(np.linalg.norm(end - start)) if straight else radius * abs(turn)
+        radius = math.inf if straight else self._arc_radius(movement)
         t = np.linspace(0.0, 1.0, ARC_SEGMENTS + 1)[:, None]
-        if straight:
-            points = start + (end - start) * t
-        else:
-            sign = math.copysign(1.0, turn)
-            angle = t * abs(turn)
-            forward, inward = np.sin(angle), 1.0 - np.cos(angle)
-            points = start + radius * (forward * heading_in - sign * inward * left_in)
-            points[-1] = end
-        entry = self.approach_length
         if self.ways is not None:
             way = self.ways[self.index(movement)]
             length, points = way.length, way.resampled(ARC_SEGMENTS + 1)
+        elif straight:
+            length, points = float(np.linalg.norm(end - start)), start + (end - start) * t
+        else:
+            length, angle = radius * abs(turn), t * abs(turn)
+            inward = math.copysign(1.0, turn) * (1.0 - np.cos(angle))
+            points = start + radius * (np.sin(angle) * heading_in - inward * left_in)
+            points[-1] = end
+        entry = self.approach_length
         return Path(
             movement=movement,
             exit_arm=self.exit_arm(movement),
             entry=entry,
             exit=entry + length,
-            length=entry + length + self.approach_length,
-            radius=math.inf if straight else radius,
+            length=entry + length + entry,
+            radius=radius,
             points=points,
             heading_in=heading_in,
             heading_out=heading_out,

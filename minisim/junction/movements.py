@@ -1,4 +1,4 @@
-"""Movements and their indices: the one way from a lane and a manoeuvre to an index, and back."""
+"""Movements and their indices. Only this module works out an index from lane and manoeuvre."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ class Movement(NamedTuple):
 class Movements(tuple[Movement, ...]):
     """The m = n(n−1) movements of a junction of n arms: a1, a2, …, b1, b2, …
 
-    The place of a movement in this order is its index: its row and column in every table, and its
-    bit in every integer that stands for a set of movements. Make one with `movements_of`.
+    A movement's place in this order is its index: its row and column in every table, and its bit
+    in every integer that stands for a set of movements. `movements_of` makes them.
 
     Attributes:
         n: number of arms.
-        names: of the movements.
+        names: such as a1.
         origins, manoeuvres, exits: arm of origin, manoeuvre and arm of exit by index, shape (m,).
         apart: whether two movements come from different arms, shape (m, m).
-        index_of: the index by lane and manoeuvre, shape (n, n); −1 for manoeuvre 0.
+        index_of: index by lane and manoeuvre, shape (n, n); −1 for manoeuvre 0.
         rows: the same as nested tuples, which are quicker for one look-up at a time.
-        bits: the bit of a movement by lane and manoeuvre; manoeuvre 0, which stands for an unknown
-            one, has the bits of all movements of its lane.
+        bits: bit by lane and manoeuvre. Manoeuvre 0 stands for an unknown one and has the bits of
+            all movements of its lane.
     """
 
     n: int

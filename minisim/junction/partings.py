@@ -3,71 +3,77 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 import shapely
 
-from minisim.junction.conflicts import by_size
 from minisim.junction.geometry import Intersection
-from minisim.junction.paths import Floats, Size
+from minisim.junction.paths import Floats, Path
+from minisim.vehicle import VehicleType
 
 #: Extra lateral room before a vehicle that turns off no longer obstructs the lane [m].
 BRANCH_ROOM = 0.5
 
 
-@by_size(256)
-def branch(intersection: Intersection, vehicle: Size) -> Floats:
+@lru_cache(maxsize=256)
+def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """Where movements from one arm part, shape (m, m) [m].
 
-    `[p, q]` is the smallest `s` on path p from which a rear bumper no longer obstructs path q;
-    infinite on the same path, 0 between different arms.
+    `[p, q]` is the smallest `s` on path p at which a rear bumper no longer obstructs path q.
+    It is infinite on the same path, and 0 between different arms.
     """
-    paths, apart = intersection.paths, intersection.movements.apart
-    result = np.zeros(apart.shape)
-    for p, path in enumerate(paths):
+
+    def last_near(path: Path, other: Path) -> float:
         s = np.arange(path.entry, path.exit + 60.0, 0.25)
-        points = shapely.points(path.position(s))
-        for q in np.flatnonzero(~apart[p]).tolist():
-            near = shapely.distance(points, paths[q].line) < vehicle.width + BRANCH_ROOM
-            blocked = np.flatnonzero(near)
-            result[p, q] = np.inf if p == q else s[blocked[-1]] + 0.25
-    result.setflags(write=False)
-    return result
+        gaps = shapely.distance(shapely.points(path.position(s)), other.line)
+        return float(s[np.flatnonzero(gaps < vehicle.width + BRANCH_ROOM)[-1]]) + 0.25
+
+    return _by_lane(intersection, 0.0, last_near)
 
 
 @lru_cache(maxsize=64)
 def showing(intersection: Intersection, tolerance: float) -> Floats:
-    """From where on a vehicle is seen not to take another manoeuvre of its lane, shape (m, m) [m].
+    """From where on a vehicle visibly does not take another manoeuvre of its lane, (m, m) [m].
 
-    `[p, q]`: from so far past the entry on, the middle of the front bumper of a vehicle on path p
+    `[p, q]`: from this far past the entry on, the middle of the front bumper of a vehicle on path p
     is more than `tolerance` [m] beside path q. Infinite on the path itself, 0 between lanes.
     """
-    paths, apart = intersection.paths, intersection.movements.apart
-    result = np.zeros(apart.shape)
-    for p, path in enumerate(paths):
+
+    def first_beside(path: Path, other: Path) -> float:
         s = np.arange(0.0, path.crossing + 10.0, 0.05)
-        points = shapely.points(path.position(path.entry + s))
-        for q in np.flatnonzero(~apart[p]).tolist():
-            beside = np.flatnonzero(shapely.distance(points, paths[q].line) > tolerance)
-            result[p, q] = np.inf if p == q else s[beside[0]]
-    result.setflags(write=False)
-    return result
+        gaps = shapely.distance(shapely.points(path.position(path.entry + s)), other.line)
+        return float(s[np.argmax(gaps > tolerance)])
+
+    return _by_lane(intersection, 0.0, first_beside)
 
 
 def parting(intersection: Intersection, room: float) -> Floats:
     """How far past the entry two movements of a lane are first `room` apart, shape (m, m) [m].
 
-    Two vehicles are compared that have come equally far. Infinite for a movement and itself, and
-    where they never are so far apart; minus infinity for movements of different lanes.
+    The two vehicles compared have come equally far. Infinite for a movement and itself, and where
+    two are never so far apart; minus infinity for movements of different lanes.
     """
+
+    def first_apart(path: Path, other: Path) -> float:
+        s = np.arange(0.0, path.crossing + 10.0, 0.1)
+        gaps = np.linalg.norm(
+            path.position(path.entry + s) - other.position(other.entry + s), axis=-1
+        )
+        far = np.flatnonzero(gaps > room)
+        return float(s[far[0]]) if len(far) else math.inf
+
+    return _by_lane(intersection, -math.inf, first_apart)
+
+
+def _by_lane(
+    intersection: Intersection, different: float, measure: Callable[[Path, Path], float]
+) -> Floats:
+    """`measure` of every two movements of a lane; `different` for other lanes."""
     paths, apart = intersection.paths, intersection.movements.apart
-    result = np.full(apart.shape, -math.inf)
-    for p, path in enumerate(paths):
-        driven = np.arange(0.0, path.crossing + 10.0, 0.1)
-        places = path.position(path.entry + driven)
-        for q in np.flatnonzero(~apart[p]).tolist():
-            gaps = np.linalg.norm(places - paths[q].position(paths[q].entry + driven), axis=-1)
-            far = np.flatnonzero(gaps > room)
-            result[p, q] = driven[far[0]] if len(far) else math.inf
+    result = np.full(apart.shape, different)
+    for p, q in np.argwhere(~apart).tolist():
+        result[p, q] = math.inf if p == q else measure(paths[p], paths[q])
+    result.setflags(write=False)
     return result

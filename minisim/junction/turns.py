@@ -1,4 +1,4 @@
-"""Kinds of turns: to the near side, straight on, to the far side."""
+"""Kinds of turns: to the near side, straight on, or to the far side."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from enum import IntEnum
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Path
 
-#: Less than this off straight ahead is no turn, and needs no indicator [°].
+#: A smaller angle is no turn and needs no indicator [°].
 STRAIGHT = 30.0
 
-#: Two ways whose bearings are this close to each other are equally straight [°].
+#: Ways whose bearings differ by less are equally straight [°].
 SAME_ANGLE = 1e-6
 
 
 class Turn(IntEnum):
-    """Kind of a manoeuvre, alike on both sides of the road: near is left in left-hand traffic."""
+    """Kind of a manoeuvre; the near side is the left in left-hand traffic."""
 
     NEAR = 0
     THROUGH = 1
@@ -38,28 +38,20 @@ def turns(intersection: Intersection, straight: float = STRAIGHT) -> tuple[Turn,
 def lane_turns(intersection: Intersection, lane: int) -> tuple[Turn, ...]:
     """The kinds of a lane's manoeuvres 1, 2, …, by their order.
 
-    The straightest is straight on here, whatever its angle: every lane has one way that needs no
-    indicator.
+    The straightest manoeuvre is straight on, whatever its angle, so that every lane has one that
+    needs no indicator.
     """
     straight = straightest(intersection, lane)
-    left, right = Turn.NEAR, Turn.FAR
-    if intersection.side == "right":
-        left, right = right, left
-    return tuple(
-        Turn.THROUGH if m == straight else left if m < straight else right
-        for m in range(1, intersection.n)
-    )
+    kinds = tuple(Turn)[:: 1 if intersection.side == "left" else -1]  # from left to right
+    return tuple(kinds[1 + (m > straight) - (m < straight)] for m in range(1, intersection.n))
 
 
 def straightest(intersection: Intersection, lane: int) -> int:
-    """The manoeuvre of a lane that leaves straightest.
-
-    Where two are equally straight, as on three arms 120° apart, it is the one on the left.
-    """
+    """The straightest manoeuvre of a lane; of two equal ones, as at 120°, the left one."""
     bearings, movements = intersection.bearings, intersection.movements
 
-    def bend(manoeuvre: int) -> float:
+    def bend(manoeuvre: int) -> int:
         there = bearings[int(movements.exits[movements.rows[lane][manoeuvre]])]
-        return abs((there - bearings[lane]) % 360.0 - 180.0)
+        return round(abs((there - bearings[lane]) % 360.0 - 180.0) / SAME_ANGLE)
 
-    return min(range(1, intersection.n), key=lambda m: (round(bend(m) / SAME_ANGLE), m))
+    return min(range(1, intersection.n), key=bend)

@@ -1,12 +1,12 @@
 """The table of metrics: what is measured of a run, in what unit, by which equation.
 
-A metric gives one value a trip or one number a run. A value a trip is averaged, by lane, movement
-and kind of vehicle too, in two forms. SUMO's, which the paper used, is over the trips that ended
-before the horizon. The complete one counts all demanded trips: what a trip that has not ended has
-waited, lost and travelled up to the horizon, and the departure delay of a vehicle that never got
-on the road.
+A metric has one value a trip or one number a run. Values of trips are averaged over the whole run
+and over each group of trips, in two forms. SUMO's form, which the paper used, is the mean over the
+trips that ended before the horizon. The complete form is the mean over all demanded trips: an
+unfinished trip counts with its waiting, loss and travel up to the horizon, and a vehicle that
+never got on the road counts with its departure delay.
 
-To add a metric, add an entry to `TABLE`. A caller's own is a `Metric` too:
+To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
     def stops(run):
         ...
@@ -30,14 +30,14 @@ from minisim.results.trips import Floats, Trips
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Keys of summaries and columns of sweeps that no metric may be called.
+#: Keys of summaries and columns of sweeps, which are no names for a metric.
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "error", "growing",
     "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre", "movements", "profile",
     "scenario", "seed", "side", "split", "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
 
-#: Of a trip: from insertion to leaving, and from demand to insertion.
+#: Phases of a trip: from insertion to leaving, and from demand to insertion.
 PHASES: Final = ("drive", "queue")
 
 
@@ -60,36 +60,26 @@ def _function(title: str, value: Any) -> Any:
 class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
-    The function takes the `Trips` where that is all it needs, and the `Run` otherwise. A number
-    that needs trips only is also taken by lane, movement and kind.
-
-    Raises:
-        InputError: a name that a column cannot have, or no function.
+    The function takes the `Trips` where `needs` is "trips", else the `Run`. A number that needs
+    only trips is also measured for each lane, movement and kind.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
     of: Callable[[Any], Any] = checked(
-        "measures it: an array with one value a trip (NaN where there is none), or one number "
-        "(None where there is none)",
-        _function,
-        "function",
-        label="function of a metric",
-    )
+        "measures it: returns an array with one value a trip (NaN where there is none), or one "
+        "number (None where there is none)",
+        _function, "function", label="function of a metric",
+    )  # fmt: skip
     unit: str = text("such as s", default="")
-    per: str = word("what has a value", ("trip", "run"), default="run", label="per")
+    per: str = word("what has a value", ("trip", "run"), default="run")
     needs: str = word(
-        "what it is measured from",
-        ("trips", "run", "trajectories", "counts"),
-        default="run",
-        label="needs",
+        "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
     )
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
-        PHASES,
-        default="drive",
-        label="phase",
-    )
-    title: str = text("for headings and axes; its name unless told", default="")
+        PHASES, default="drive",
+    )  # fmt: skip
+    title: str = text("for headings and axes; empty is its name", default="")
     symbol: str = text("in equations", default="")
     meaning: str = text("in one line", default="")
     equation: str = text("with its source", default="")
@@ -97,24 +87,23 @@ class Metric:
 
     @property
     def grouped(self) -> bool:
-        """Whether lanes, movements and kinds have a value of their own."""
+        """Whether each lane, movement and kind has a value of its own."""
         return self.per == "trip" or self.needs == "trips"
 
     @property
     def heading(self) -> str:
         """Title and unit, such as "waiting [s]"."""
-        words = self.title or self.name
-        return f"{words} [{self.unit}]" if self.unit else words
+        return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
 
     def values(self, subject: Run | Trips, count: int) -> Floats:
         """One value a trip, shape (count,), NaN where there is none.
 
         Raises:
-            InputError: the function gave something else.
+            InputError: the function returned something else.
         """
         given = self._measured(subject)
         if METRICS.get(self.name) is self:
-            return given  # type: ignore[no-any-return]  # tested, and asked for by every summary
+            return given  # type: ignore[no-any-return]  # ours are tested; each summary asks
         values = np.asarray(given)
         if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
             raise InputError(
@@ -127,14 +116,12 @@ class Metric:
         """One number, or None where there is none.
 
         Raises:
-            InputError: the function gave something else.
+            InputError: the function returned something else.
         """
         given = self._measured(subject)
-        if type(given) is int:
-            return given
         plain = given.item() if isinstance(given, np.generic) else given
-        if plain is None:
-            return None
+        if plain is None or type(plain) is int:
+            return plain
         if not isinstance(plain, Real) or math.isinf(plain):
             hint = '; per="trip" takes an array' if isinstance(given, np.ndarray) else ""
             raise InputError(
@@ -153,26 +140,25 @@ class Metric:
 
 
 def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
-    """How many more vehicles were there in the last quarter of a run than in the second.
+    """How many more vehicles were present in the last quarter of a run than in the second.
 
-    *There* is from demand to arrival, so that queues before the road count too; the numbers are
-    means over the quarter, each trip adding the part of it that it was there. No trajectories are
-    needed, and the swing of a signal's cycle averages out. `scenarios.statistics.growing` tells
-    what is more than chance.
+    A vehicle is present from demand to arrival, so queues before the road count too. The numbers
+    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
+    needed. `scenarios.statistics.growing` tells which growth is more than chance.
 
     Args:
         demand_time, leave: of the trips [s], shape (k,); `leave` is infinite where not reached.
         end: of the run [s].
-        start: end of the warm-up [s]. The quarters are of the time after it.
+        start: end of the warm-up [s]; the quarters divide the time after it.
     """
     length = (end - start) / 4.0
-    if length <= 0.0:  # a run that was stopped before its warm-up was over
+    if length <= 0.0:  # the run was stopped during its warm-up
         return 0.0
 
     def present(quarter: int) -> float:
         first = start + length * quarter
-        there = np.minimum(leave, first + length) - np.maximum(demand_time, first)
-        return float(np.clip(there, 0.0, None).sum()) / length
+        time = np.minimum(leave, first + length) - np.maximum(demand_time, first)
+        return float(np.maximum(time, 0.0).sum()) / length
 
     return present(3) - present(1)
 
@@ -193,7 +179,7 @@ def _safety(name: str) -> Callable[[Run], float | None]:
 _TRIPINFO = "(SUMO, Simulation/Output/TripInfo)"
 _SSM = "(SUMO, Simulation/Output/SSM Device)"
 
-#: Numbers of encroachments -> shorter than so many seconds.
+#: Metric that counts short encroachments -> what they are shorter than [s].
 PETS: Final = {"pets_below_1_s": 1.0, "pets_below_1_5_s": 1.5, "pets_below_2_s": 2.0}
 
 #: Every metric of ours, in the order of tables.
@@ -204,7 +190,7 @@ TABLE: Final = (
     ),
     Metric(
         "unfinished", lambda trips: int(np.count_nonzero(~trips.arrived)), needs="trips",
-        title="unfinished", meaning="those of them that had not arrived at the end", usual=True,
+        title="unfinished", meaning="those that had not arrived at the end", usual=True,
     ),
     Metric(
         "waiting_time_s", lambda trips: trips.waiting_time, "s", "trip", "trips",
@@ -233,7 +219,7 @@ TABLE: Final = (
     ),
     Metric(
         "queue_growth", _growth, needs="trips", title="queue growth", symbol="ΔN",
-        meaning="vehicles more in the last quarter than in the second",
+        meaning="more vehicles in the last quarter than in the second",
         equation="N̄(4th quarter) − N̄(2nd quarter), N from demand to arrival (ours)",
     ),
     Metric(
@@ -290,54 +276,45 @@ METRICS: Final = {metric.name: metric for metric in TABLE}
 #: What every summary has.
 USUAL: Final = tuple(metric for metric in TABLE if metric.usual)
 
-#: Names of the usual metrics with a value a trip: what trip tables and means have.
+#: Names of the usual metrics with a value a trip: columns of trip tables, and means.
 MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
 
 #: Names of the metrics of `minisim.results.safety`.
 SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajectories")
 
-#: Both forms of every mean, as columns of a sweep: over the trips that ended, and over all.
+#: Both forms of every mean, as columns of a sweep: over the trips that ended, then over all.
 AVERAGED: Final = (*MEANS, *(f"complete_{name}" for name in MEANS))
 
-#: What is added to the name of a metric for its percentiles (numpy's linear method) and maximum.
+#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
 SPREAD: Final = ("p50", "p95", "max")
 
 
-def metric_named(metric: str | Metric) -> Metric:
-    """Look a metric up by name; a caller's own passes through.
-
-    Raises:
-        InputError: an unknown name (with the nearest one), or an own metric called like ours.
-    """
-    if not isinstance(metric, Metric):
-        return METRICS[choice("metric", metric, METRICS)]
-    if METRICS.get(metric.name, metric) is not metric:
-        raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
-    return metric
-
-
 def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
-    """The metrics that a caller asks for, each once.
+    """The metrics that a caller asks for, by name or as its own `Metric`, each once.
 
     Raises:
-        InputError: as `metric_named`, no sequence, or two metrics of one name.
+        InputError: no sequence, an unknown name, or two metrics of one name.
     """
     asked: dict[str, Metric] = {}
-    for metric in map(metric_named, items("metrics", metrics, "names and Metrics")):
+    for metric in items("metrics", metrics, "names and Metrics"):
+        if not isinstance(metric, Metric):
+            metric = METRICS[choice("metric", metric, METRICS)]
+        if METRICS.get(metric.name, metric) is not metric:
+            raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
         if asked.setdefault(metric.name, metric) != metric:
             raise InputError(f"two metrics are called {metric.name!r}")
     return tuple(asked.values())
 
 
 def named_metrics(metrics: Iterable[str | Metric]) -> tuple[str | Metric, ...]:
-    """The same, with ours by their names, as recipes of runs keep them; errors as there."""
+    """`asked_metrics` with ours as names, which is how recipes of runs keep them."""
     return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
 
 
 def recording(metrics: Iterable[str | Metric]) -> str | None:
     """What a run has to record for these metrics: "junction", or None for nothing."""
-    asked = asked_metrics(metrics)
-    return "junction" if any(metric.needs == "trajectories" for metric in asked) else None
+    needs = {metric.needs for metric in asked_metrics(metrics)}
+    return "junction" if "trajectories" in needs else None
 
 
 def heading(column: str) -> str:

@@ -12,18 +12,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from minisim.arrivals import Arrivals
-from minisim.control import (
-    Controller,
-    Plan,
-    Site,
-)
+from minisim.control import Controller, Plan, Site
 from minisim.engine.collision import Collision
-from minisim.engine.state import (
-    Records,
-)
-from minisim.errors import (
-    InputError,
-)
+from minisim.engine.state import Records
+from minisim.errors import InputError
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.metrics import Metric
 from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
@@ -35,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class ScenarioLike(Protocol):
-    """What a run needs of a scenario (`scenarios.Scenario` is one)."""
+    """What a run needs of a scenario; `scenarios.Scenario` is one."""
 
     @property
     def name(self) -> str:
@@ -55,11 +48,11 @@ class ScenarioLike(Protocol):
 
     @property
     def warmup(self) -> float:
-        """Trips demanded before it do not count in any mean or number of trips [s]."""
+        """Trips demanded before this time do not count in any mean or number of trips [s]."""
 
     @property
     def depart_speed(self) -> float | None:
-        """At insertion [m/s]; None is the highest safe one."""
+        """Speed at insertion [m/s]; None is the highest safe one."""
 
     def site(self, seed: int) -> Site:
         """What the controller may know."""
@@ -70,12 +63,9 @@ class ScenarioLike(Protocol):
 
 @cache
 def environment() -> Mapping[str, str]:
-    """What a run of now is made with, for its provenance."""
-    return {
-        "minisim": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
+    """The versions that runs of this process are made with, for their provenance."""
+    python, numpy = platform.python_version(), np.__version__
+    return {"minisim": __version__, "python": python, "numpy": numpy}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +77,11 @@ class Run:
         site, plan: what the controller knew and asked for.
         collisions: each pair of vehicles once.
         columns: all trips as arrays.
-        record: what was recorded of the trajectories.
+        record: what was recorded of the trajectories: "junction", "all" or None.
         trace, rows: the recording, and each row's vehicle id and path.
         counts: what the controller's session counted.
-        kinds: of the vehicles, by id, where they are of several kinds.
-        host: what moved the vehicles, for the provenance: `host` and what else to name.
+        kinds: kind of each vehicle by id; empty where all are of one kind.
+        host: what moved the vehicles, for the provenance: `host`, and perhaps its version.
         environment: versions, for the provenance.
     """
 
@@ -117,12 +107,12 @@ class Run:
 
     @cached_property
     def counted_rows(self) -> slice:
-        """Indices of the trips that count: demanded after the warm-up, up to the end."""
+        """Indices of the trips that count: those demanded after the warm-up, up to the end."""
         return self.columns.counted(self.scenario.warmup)
 
     @cached_property
     def counted(self) -> Trips:
-        """The trips that count; every mean and number of trips is of them."""
+        """The trips that count in every mean and number of trips."""
         rows, start = self.counted_rows, float(self.scenario.warmup)
         if start == 0.0 and rows == slice(0, len(self.columns.lane)):
             return self.columns
@@ -130,20 +120,15 @@ class Run:
 
     @cached_property
     def safety(self) -> Mapping[str, float | int | None]:
-        """The closest calls (`minisim.results.safety.safety_summary`).
-
-        They are those in and near the junction, whatever else was recorded.
-        """
+        """The closest calls in and near the junction; see `minisim.results.safety`."""
         from minisim.results.safety import near_junction, safety_summary
 
-        frame = self.trajectories
-        near = frame if self.record == "junction" else near_junction(frame, self.site)
-        return safety_summary(near, self.site)
+        return safety_summary(near_junction(self.trajectories, self.site), self.site)
 
     def summary(
         self, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
     ) -> dict[str, Any]:
-        """What was run and its numbers; see `minisim.results.summary.summarise`."""
+        """What was run, and its numbers; see `minisim.results.summary.summarise`."""
         return {
             "controller": self.controller.name,
             "scenario": self.scenario.name,
@@ -158,7 +143,7 @@ class Run:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """Version, environment and parameters: all that is needed to run it again."""
+        """Versions and parameters: all that is needed to run it again."""
         return {
             **self.environment,
             "scenario": repr(self.scenario),
@@ -172,7 +157,7 @@ class Run:
 
         Raises:
             MissingExtraError: pyarrow is not installed.
-            InputError: a site that is not made of our classes.
+            InputError: the site is not made of our classes.
             FileError: the file cannot be written; nothing is left behind.
         """
         from minisim.results.saved import save
@@ -185,7 +170,7 @@ class Run:
 
         Raises:
             MissingExtraError: pyarrow is not installed.
-            FileError: no such file, no saved run, a damaged one, or one of a newer version.
+            FileError: no such file, no saved run, a damaged one, or one of another layout.
         """
         from minisim.results.saved import load
 
@@ -212,30 +197,25 @@ class Run:
 
         if self.record is None:
             raise InputError("no trajectories: simulate with record='junction' or record='all'")
-        vehicle = self.rows["id"][self.trace["row"]]
-        order = np.lexsort((vehicle, self.trace["tick"]))
-        trace, vehicle = self.trace[order], vehicle[order]
-        paths, arms = self.site.intersection.paths, self.site.intersection.arms
-        path_of = self.rows["path"][trace["row"]]
-        front = np.zeros((len(trace), 2))
-        heading = np.zeros((len(trace), 2))
+        trace = self.trace
+        trace = trace[np.lexsort((self.rows["id"][trace["row"]], trace["tick"]))]
+        rows = self.rows[trace["row"]]
+        intersection, length = self.site.intersection, self.site.vehicle.length
+        movements, path_of = intersection.movements, rows["path"]
+        front, heading = np.zeros((2, len(trace), 2))
         for p in np.unique(path_of).tolist():
-            chosen = np.flatnonzero(path_of == p)
-            s = trace["s"][chosen]
-            front[chosen] = paths[p].position(s)
-            heading[chosen] = paths[p].pose(s, self.site.vehicle.length)[1]
-        movements = self.site.intersection.movements
+            here = path_of == p
+            front[here] = intersection.paths[p].position(trace["s"][here])
+            heading[here] = intersection.paths[p].pose(trace["s"][here], length)[1]
+        lanes = pd.Index(list(ARM_NAMES[: intersection.n]))
         columns = (
             np.round(trace["tick"] * self.site.dt, 6),
-            vehicle,
-            pd.Categorical.from_codes(
-                movements.origins[path_of], pd.Index([arm.name for arm in arms])
-            ),
+            rows["id"],
+            pd.Categorical.from_codes(movements.origins[path_of], lanes),
             movements.manoeuvres[path_of],
             trace["s"],
-            front[:, 0],
-            front[:, 1],
-            np.degrees(np.arctan2(heading[:, 0], heading[:, 1])) % 360.0,
+            *front.T,
+            np.degrees(np.arctan2(*heading.T)) % 360.0,
             trace["v"],
             trace["a"],
             trace["released"] != 0,

@@ -11,7 +11,7 @@ from minisim.results.metrics import MEANS, METRICS
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Longer names are cut, so that a line stays a line.
+#: Names are cut to this length, so that each stays on its line.
 LONGEST = 60
 
 
@@ -25,15 +25,10 @@ def as_text(run: Run) -> str:
 
 
 def as_html(run: Run) -> str:
-    """What was run, and a table of means by lane.
-
-    It sets no colours, so that it is readable in light and dark notebooks.
-    """
+    """What was run, and a table of means by lane; without colours, for light and dark notebooks."""
     summary = run.summary()
-    head = "".join(
-        f"<th>{escape(words)}</th>"
-        for words in ("lane", "trips", "unfinished", *(METRICS[name].heading for name in MEANS))
-    )
+    headings = ("lane", "trips", "unfinished", *(METRICS[name].heading for name in MEANS))
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     lanes = "".join(_html_row(lane, means) for lane, means in summary["lanes"].items())
     return (
         f"<div><p><strong>{escape(_what(summary))}</strong><br>{escape(_trips(summary))}</p>"
@@ -43,18 +38,14 @@ def as_html(run: Run) -> str:
 
 
 def _html_row(name: str, means: Mapping[str, Any]) -> str:
-    cells = (
-        name,
-        str(means["trips"]),
-        str(means["unfinished"]),
-        *(_number(means[metric]) for metric in MEANS),
-    )
+    counts = str(means["trips"]), str(means["unfinished"])
+    cells = (name, *counts, *(_number(means[metric]) for metric in MEANS))
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
 
 
 def _what(summary: Mapping[str, Any]) -> str:
-    scenario, controller, profile = map(
-        _short, (summary["scenario"], summary["controller"], summary["profile"])
+    scenario, controller, profile = (
+        _short(summary[name]) for name in ("scenario", "controller", "profile")
     )
     host = "" if summary["host"] == "minisim" else f", host {summary['host']}"
     return (

@@ -1,4 +1,4 @@
-"""A run's numbers, put together by the table of metrics, and its trip table."""
+"""The numbers of a run, from the table of metrics, and its table of trips."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from minisim.errors import InputError, choice, items
-from minisim.junction.movements import ARM_NAMES, Movement
-from minisim.results.metrics import MEANS, METRICS, PHASES, SPREAD, USUAL, Metric, asked_metrics
+from minisim.junction.movements import ARM_NAMES
+from minisim.results.metrics import MEANS, METRICS, SPREAD, USUAL, Metric, asked_metrics
 from minisim.results.trips import Floats, Ints, Trips
 
 if TYPE_CHECKING:
@@ -18,25 +18,18 @@ if TYPE_CHECKING:
 
     from minisim.results.run import Run
 
-#: Columns of the trip table, the same in CSV. Times in seconds, NaN where not reached. After
-#: `vehicle` comes `kind` where vehicles have one.
+#: Columns of the trip table, the same in CSV. Times are in seconds, NaN where not reached. Where
+#: vehicles have kinds, `kind` follows `vehicle`.
 TRIP_COLUMNS: Final = (
-    "vehicle",
-    "demand_time_s",
-    "depart_s",
-    "arrival_s",
-    "lane",
-    "manoeuvre",
-    "exit_lane",
-    *MEANS,
-)
+    "vehicle", "demand_time_s", "depart_s", "arrival_s", "lane", "manoeuvre", "exit_lane", *MEANS,
+)  # fmt: skip
 
-#: What trips are grouped by -> the key of a summary that holds the groups.
+#: What trips can be grouped by -> the key of the groups in a summary.
 GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
 
 
 def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
-    """All trips as a DataFrame with `TRIP_COLUMNS`; what has not ended is NaN."""
+    """All trips as a DataFrame with `TRIP_COLUMNS`; values not reached are NaN."""
     import pandas as pd
 
     names = np.array(list(ARM_NAMES))
@@ -54,41 +47,40 @@ def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
         metric = METRICS[name]
         over = trips.arrived if metric.phase == "drive" else trips.departed
         columns[name] = np.where(over, metric.values(trips, len(over)), np.nan)
-    return pd.DataFrame({
-        name: np.round(column, 6) if column.dtype.kind == "f" else column
-        for name, column in columns.items()
-    })  # fmt: skip
+    return pd.DataFrame(columns).round(6)
 
 
 def summarise(
     run: Run, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """The usual numbers of a run, and what is asked for besides.
+    """The usual numbers of a run, and the metrics asked for.
 
-    SUMO's form of the means is at the top and by group, the complete form under `complete`. There
-    are groups by lane (`lanes`) and, where vehicles have one, by kind (`kinds`).
+    The means at the top and in each group are SUMO's form; those under `complete` are the complete
+    form. Trips are grouped by lane (`lanes`) and, where vehicles have kinds, by kind (`kinds`).
 
     Args:
-        run: what to measure. Trips demanded before its scenario's warm-up do not count.
+        run: what to measure. Trips demanded during its scenario's warm-up do not count.
         metrics: names of `minisim.results.metrics.METRICS`, or `Metric`s. A mean that is asked for
-            gets its median, 95th percentile and maximum too (`SPREAD`, numpy's linear method).
+            also gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
         by: more groups, "movement".
 
     Raises:
         InputError: an unknown metric or group; a metric that needs trajectories where none were
-            recorded; a metric whose function gives the wrong thing.
+            recorded; a metric whose function returns the wrong type or shape.
     """
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
-    table = (*USUAL, *(metric for metric in asked if not metric.usual))
     _check_recorded(run, asked)
+    table = (*USUAL, *(metric for metric in asked if not metric.usual))
     measured = _Measured(run, table, asked)
-    top = measured.all()
+    top = measured.of(np.arange(len(run.counted.lane)))
     complete = top.pop("complete")
-    groups = dict.fromkeys(("lanes", *(("kinds",) if run.kinds else ()), *keys))
     return {
         **top,
-        **{key: measured.by(*_groups(run, key)) for key in groups},
+        **{
+            key: {name: measured.of(rows) for name, rows in _groups(run, key).items()}
+            for key in ("lanes", *(["kinds"] if run.kinds else []), *keys)
+        },
         "complete": complete,
         **{m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"},
         **run.counts,
@@ -96,86 +88,43 @@ def summarise(
 
 
 class _Measured:
-    """The metrics of a run, to be had for all trips that count and for groups of them."""
+    """The metrics of a run, measured once and then summed up for any of its trips."""
 
     def __init__(self, run: Run, table: tuple[Metric, ...], asked: tuple[Metric, ...]) -> None:
         self._trips = run.counted
         self._spread = {metric.name for metric in asked}
-        self._numbers = [m for m in table if m.per == "run" and m.needs == "trips"]
-        self._phases = [
-            [m for m in table if m.per == "trip" and m.phase == phase] for phase in PHASES
-        ]
-        # Shape (metrics, trips), by phase.
-        self._values = [
-            np.array([_trip_values(run, metric) for metric in metrics]) for metrics in self._phases
-        ]
+        self._values = [(m, _trip_values(run, m)) for m in table if m.per == "trip"]
+        # The two numbers that every group has are counted in `of`.
+        self._numbers = [m for m in table if m.per == "run" and m.needs == "trips" and not m.usual]
 
-    def all(self) -> dict[str, Any]:
-        """Numbers and means of all trips."""
+    def of(self, rows: Ints) -> dict[str, Any]:
+        """Numbers and means of the trips at these indices."""
         trips = self._trips
-        ended, complete = (
-            self._means(trips, self._values, None, 1, form) for form in (False, True)
-        )
-        return {**self._counted(trips), **ended[0], "complete": complete[0]}
-
-    def by(self, names: list[str], codes: Ints) -> dict[str, Any]:
-        """Numbers and means of each group; `codes` are the trips' indices into `names`."""
-        order = codes.argsort(kind="stable")
-        codes, trips = codes[order], self._trips.taken(order)
-        values = [every.take(order, axis=1) for every in self._values]
-        ends = _ends(codes, len(names))
-        ended = self._means(trips, values, codes, len(names), complete=False)
-        complete = self._means(trips, values, codes, len(names), complete=True)
-        return {
-            name: {
-                **self._counted(trips.taken(slice(ends[k], ends[k + 1]))),
-                **ended[k],
-                "complete": complete[k],
-            }
-            for k, name in enumerate(names)
-        }
-
-    def _counted(self, trips: Trips) -> dict[str, float | int | None]:
-        """Numbers that are made of trips only."""
-        return {metric.name: metric.number(trips) for metric in self._numbers}
-
-    def _means(
-        self, trips: Trips, every: list[Floats], codes: Ints | None, groups: int, complete: bool
-    ) -> list[dict[str, float | None]]:
-        """Means of each group, of the trips that ended or of all; trips are sorted by group."""
-        results: list[dict[str, float | None]] = [{} for _ in range(groups)]
-        begun = (trips.departed if complete else trips.arrived).nonzero()[0]
-        for metrics, values, phase in zip(self._phases, every, PHASES, strict=True):
-            if not complete or phase == "drive":
-                values, own = values.take(begun, axis=1), None if codes is None else codes[begun]
-            else:
-                own = codes
-            ends = [0, values.shape[1]] if own is None else _ends(own, groups)
-            for metric, data in zip(metrics, values.tolist(), strict=True):
-                name = metric.name
-                for k, result in enumerate(results):
-                    part = data[ends[k] : ends[k + 1]]
-                    result[name] = _mean(part)
-                    if name in self._spread:
-                        result |= _spread(name, part)
-        return results
-
-
-def _ends(codes: Ints, groups: int) -> list[int]:
-    """Where each group starts in sorted codes, and the last one ends."""
-    ends: list[int] = codes.searchsorted(np.arange(groups + 1)).tolist()
-    return ends
+        arrived, departed = rows[trips.arrived[rows]], rows[trips.departed[rows]]
+        numbers: dict[str, Any] = {"trips": len(rows), "unfinished": len(rows) - len(arrived)}
+        if self._numbers:
+            part = trips.taken(rows)
+            numbers |= {metric.name: metric.number(part) for metric in self._numbers}
+        complete: dict[str, float | None] = {}
+        for metric, values in self._values:
+            begun = departed if metric.phase == "drive" else rows
+            for form, chosen in ((numbers, arrived), (complete, begun)):
+                there = values[chosen].tolist()
+                form[metric.name] = _mean(there)
+                if metric.name in self._spread:
+                    form |= _spread(metric.name, there)
+        return {**numbers, "complete": complete}
 
 
 def _trip_values(run: Run, metric: Metric) -> Floats:
-    """A value for each trip that counts."""
+    """The metric's value for each trip that counts."""
     if metric.needs == "trips":
-        return metric.values(run.counted, len(run.counted.demand_time))
-    return metric.values(run, len(run.columns.demand_time))[run.counted_rows]
+        return metric.values(run.counted, len(run.counted.lane))
+    return metric.values(run, len(run.columns.lane))[run.counted_rows]
 
 
 def _mean(values: list[float]) -> float | None:
-    """Mean of the values that there are."""
+    """Mean without NaNs."""
     total = math.fsum(values)
     if total != total:
         return _mean([value for value in values if value == value])
@@ -183,23 +132,24 @@ def _mean(values: list[float]) -> float | None:
 
 
 def _spread(name: str, values: list[float]) -> dict[str, float | None]:
-    """Median, 95th percentile and maximum of the values that there are, as columns."""
+    """Median, 95th percentile and maximum without NaNs, as columns."""
     there = [value for value in values if value == value]
-    spread = (*np.percentile(there, (50.0, 95.0)).tolist(), max(there)) if there else (None,) * 3
+    spread = np.percentile(there, (50, 95, 100)).tolist() if there else [None] * 3
     return {f"{name}_{what}": value for what, value in zip(SPREAD, spread, strict=True)}
 
 
-def _groups(run: Run, key: str) -> tuple[list[str], Ints]:
-    """Names of groups, and for each trip that counts the index of its group."""
-    trips, intersection = run.counted, run.site.intersection
+def _groups(run: Run, key: str) -> dict[str, Ints]:
+    """Name of each group -> indices of its trips, among those that count."""
+    trips, movements = run.counted, run.site.intersection.movements
+    names: Iterable[str]
     if key == "lanes":
-        return list(ARM_NAMES[: intersection.n]), trips.lane
-    if key == "movements":
-        index = {movement: k for k, movement in enumerate(intersection.movements)}
-        pairs = zip(trips.lane.tolist(), trips.manoeuvre.tolist(), strict=True)
-        return [str(m) for m in index], np.array([index[Movement(*p)] for p in pairs], np.int64)
-    names, codes = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
-    return names.tolist(), codes[run.counted_rows]
+        names, group = ARM_NAMES[: movements.n], trips.lane
+    elif key == "movements":
+        names, group = movements.names, movements.index_of[trips.lane, trips.manoeuvre]
+    else:
+        kinds, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
+        names, group = kinds.tolist(), group[run.counted_rows]
+    return {name: (group == k).nonzero()[0] for k, name in enumerate(names)}
 
 
 def _check_recorded(run: Run, asked: Iterable[Metric]) -> None:

@@ -33,18 +33,8 @@ ACCELERATION: Final = "acceleration_mps2"
 RIGHT_OF_WAY: Final = "right_of_way"
 
 TRAJECTORY_COLUMNS: Final = (
-    "time_s",
-    "vehicle",
-    "lane",
-    "manoeuvre",
-    "s_m",
-    "x_m",
-    "y_m",
-    "angle_deg",
-    "speed_mps",
-    "acceleration_mps2",
-    "right_of_way",
-)
+    TIME, VEHICLE, LANE, MANOEUVRE, S, X, Y, ANGLE, SPEED, ACCELERATION, RIGHT_OF_WAY,
+)  # fmt: skip
 
 _FCD_HEAD: Final = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -66,9 +56,9 @@ def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> Non
 
 
 def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write `run.trips` as CSV or Parquet; raises as `write_trajectories`.
+    """Write `run.trips` as CSV or Parquet, with empty cells for what an unfinished trip lacks.
 
-    What is not known of an unfinished trip is an empty cell.
+    Raises as `write_trajectories`.
     """
     _check_columns(frame, TRIP_COLUMNS)
     write_table(frame, path)
@@ -77,8 +67,8 @@ def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
 def write_fcd(frame: pd.DataFrame, path: str | os.PathLike[str], site: Site) -> None:
     """Write `run.trajectories` as SUMO floating-car data (fcd-export), which SUMO's tools read.
 
-    As SUMO has it: x, y are the middle of the front bumper [m], the angle is in degrees clockwise
-    from north, `pos` is the front bumper's distance from the start of its lane [m]. Lanes are
+    As in SUMO, x and y are the middle of the front bumper [m], the angle is in degrees clockwise
+    from north, and `pos` is the front bumper's distance from the start of its lane [m]. Lanes are
     named `a_in_0` (approach), `:C_a1_0` (inside the junction, by movement) and `b_out_0` (exit).
 
     Raises:
@@ -107,19 +97,19 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
     """
     n = site.intersection.n
     codes, names = frame[LANE].factorize()
-    known = dict(zip(ARM_NAMES[:n], range(n), strict=True))
-    indices = np.array([known.get(str(name), -1) for name in names], dtype=np.int64)
-    if len(frame) and (codes.min() < 0 or indices.min() < 0):
-        unknown = [str(name) for name in names if str(name) not in known] or ["(missing)"]
-        raise InputError(f"lane {unknown[0]} is not in the geometry (a … {ARM_NAMES[n - 1]})")
+    index = {name: k for k, name in enumerate(ARM_NAMES[:n])}
+    unknown = [str(name) for name in names if str(name) not in index]
+    if unknown or (codes < 0).any():
+        lane = unknown[0] if unknown else "(missing)"
+        raise InputError(f"lane {lane} is not in the geometry (a … {ARM_NAMES[n - 1]})")
     manoeuvre = frame[MANOEUVRE].to_numpy(dtype=np.int64)
     outside = (manoeuvre < 1) | (manoeuvre >= n)
     if outside.any():
         raise InputError(
             f"manoeuvre {manoeuvre[outside][0]} does not exist with {n} arms (1 … {n - 1})"
         )
-    lane = indices[codes] if len(frame) else np.empty(0, dtype=np.int64)
-    return np.asarray(site.intersection.movements.index_of[lane, manoeuvre])
+    lanes = np.array([index[str(name)] for name in names], dtype=np.int64)
+    return np.asarray(site.intersection.movements.index_of[lanes[codes], manoeuvre])
 
 
 def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
@@ -132,16 +122,15 @@ def _check_columns(frame: pd.DataFrame, columns: Iterable[str]) -> None:
 
 
 def _fcd_lines(frame: pd.DataFrame, site: Site, movement: npt.NDArray[np.int64]) -> Iterator[str]:
-    """The timesteps, one string a step; rows are sorted by time."""
+    """The lines of the timesteps; rows are sorted by time."""
     names, positions = _sumo_lanes(frame[S].to_numpy(dtype=float), movement, site)
-    # Rounded as they are printed, so that 359.999 becomes 0.00 and −0.001 does not become −0.00.
+    # Rounded here as they are printed, so that 359.999 becomes 0.00, and −0.001 not −0.00.
     numbers = [frame[c].to_numpy(dtype=float).round(2) + 0.0 for c in (X, Y, ANGLE, SPEED)]
     numbers[2] %= 360.0
-    columns = [c.tolist() for c in (*numbers, positions)]
-    times, vehicles = frame[TIME].tolist(), frame[VEHICLE].tolist()
+    columns = [column.tolist() for column in (*numbers, positions)]
     now: float | None = None
     for time, vehicle, x, y, angle, speed, pos, lane in zip(
-        times, vehicles, *columns, names, strict=True
+        frame[TIME], frame[VEHICLE], *columns, names, strict=True
     ):
         if time != now:
             closing = "" if now is None else "    </timestep>\n"

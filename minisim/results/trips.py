@@ -1,8 +1,6 @@
-"""All trips of a run as arrays, with SUMO's definitions so that they compare.
+"""All trips of a run as arrays. The definitions are SUMO's, so that results can be compared.
 
-Waiting time: Σ dt with v ≤ 0.1 m/s. Time loss: Σ (1 − v/v_allowed) dt, v_allowed the limit where
-the vehicle is. Travel time: from insertion to leaving. Departure delay: from demand to insertion.
-(SUMO, Simulation/Output/TripInfo.)
+They are those of SUMO's Simulation/Output/TripInfo; `minisim.results.metrics.TABLE` has them.
 """
 
 from __future__ import annotations
@@ -22,9 +20,8 @@ Ints = npt.NDArray[np.int64]
 class Trips(NamedTuple):
     """All trips of a run as columns in demand order, shape (k,) each; times in seconds.
 
-    `waiting_time`, `travel_time`, `time_loss` and `depart_delay` of a trip that has not ended
-    are what it has gathered up to `end`; `arrived` and `departed` tell which have. Means are of
-    trips demanded from `start` on.
+    For a trip that has not ended, `waiting_time`, `travel_time`, `time_loss` and `depart_delay`
+    hold what it has gathered up to `end`. Means are over the trips demanded from `start` on.
     """
 
     demand_time: Floats
@@ -45,11 +42,11 @@ class Trips(NamedTuple):
     def taken(self, rows: Ints | slice) -> Trips:
         """Some of the trips, by index."""
         columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in TRIP_ARRAYS}
-        return Trips(**columns, end=self.end, start=self.start)
+        return self._replace(**columns)
 
     def counted(self, start: float) -> slice:
         """Indices of the trips demanded from `start` [s] up to the end."""
-        first = int(self.demand_time.searchsorted(start, "left"))
+        first = int(self.demand_time.searchsorted(start))
         return slice(first, int(self.demand_time.searchsorted(self.end, "right")))
 
 
@@ -61,8 +58,7 @@ def collect_trips(
     vehicles: Records, demand_time: Floats, movements: Movements, dt: float, end: float
 ) -> Trips:
     """Build the trips of a run that has reached `end` [s] from its vehicle array."""
-    order = np.argsort(vehicles["id"], kind="stable")
-    rows = vehicles[order]
+    rows = vehicles[np.argsort(vehicles["id"], kind="stable")]
     departed = rows["status"] != WAITING
     arrived = rows["status"] == ARRIVED
     depart = np.where(departed, rows["depart_tick"] * dt, np.nan)

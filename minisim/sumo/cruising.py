@@ -1,7 +1,7 @@
 """SUMO's `CC`, the model of `minisim.vehicle.CruiseVehicle`: its vehicle type, and its steering.
 
-Such a vehicle obeys no limit and no marking. It gets the advised speed, and a command for a hold
-line only while that asks for more braking than the model itself.
+Such a vehicle obeys no limit and no marking. It is told the advised speed. It gets a command for a
+hold line only while the line asks for more braking than the model does.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from minisim.vehicle import CruiseVehicle
 #: Spacing and radar, numbers in SUMO's code (`MSCFModel_CC`) [m].
 FIXED = (2.0, 250.0)
 
-#: The published runs' speed mode: nothing but the model. With a safe gap (1) SUMO would cut what
-#: the engine does by what its controller asks for, and with that the lag.
+#: The published runs' speed mode: the model alone. With a safe gap (1) SUMO would limit the engine
+#: to what its controller asks for, and the lag would vanish.
 CRUISING = 0
 
 #: SUMO's number of the controller that is a cruise control with ACC (`Plexe::ACC`).
@@ -31,11 +31,7 @@ ACC = 1
 
 
 def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
-    """What is special about its `vType`.
-
-    Raises:
-        InputError: SUMO's code fixes another value.
-    """
+    """The attributes of its `vType` alone; raises `InputError` where SUMO's code fixes a value."""
     if (vehicle.spacing, vehicle.radar) != FIXED:
         spacing, radar = FIXED
         raise InputError(

@@ -105,8 +105,8 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
 def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
     """SUMO's trips of a run that has reached `end` [s], in demand order.
 
-    Only the time loss is ours (`Ended.time_loss`). Since version 1.28 SUMO's own leaves out what a
-    vehicle loses while it accelerates for a higher limit, and it knows no markings.
+    Only the time loss is ours (`Ended.time_loss`). Since version 1.28 SUMO's own time loss leaves
+    out what a vehicle loses while it accelerates to a higher limit, and SUMO knows no markings.
 
     Raises:
         SumoError: there are no trips, or not those of the arrivals.
@@ -119,7 +119,7 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
             values[int(trip.attrib["id"])] = [float(trip.attrib[name]) for name in _ATTRIBUTES]
     except (OSError, ET.ParseError, LookupError, ValueError) as error:
         raise SumoError(f"SUMO's trips cannot be read: {error}") from error
-    # Nor those that would have come later.
+    # It does not report vehicles that would have come later either.
     missing = np.isnan(values).any(axis=1) & (arrivals.time < end - job.law.dt)
     if missing.any():
         raise SumoError(f"SUMO's trips lack vehicle {int(missing.argmax())}")

@@ -16,41 +16,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from minisim.control import Command, Controller, View
 from minisim.engine.kernel import build_motion
 from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
-from minisim.errors import (
-    FileError,
-    InputError,
-    MissingExtraError,
-    SumoError,
-    choice,
-    instance,
-)
+from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
-from minisim.hosting import (
-    AFTERMATH,
-    REACTIONS,
-    RECORDS,
-    Beginning,
-    ask,
-    begin,
-    checked_window,
-    collision_error,
-    counts_of,
-    kinds_of,
-)
+from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
-from minisim.sumo.files import (
-    CONFIGURATION,
-    FCD,
-    read_trips,
-    write_configuration,
-    write_routes,
-)
-from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
+from minisim.sumo.files import CONFIGURATION, FCD, read_trips, write_configuration, write_routes
+from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
 from minisim.vehicle import MODELS as CAR_FOLLOWING
 from minisim.vehicle import VehicleType
@@ -86,8 +62,8 @@ def simulate(
 ) -> Run:
     """Run a scenario under a controller in SUMO, as `minisim.simulate` does in minisim.
 
-    The same arrivals, vehicles, geometry, limits and commands; SUMO follows leaders, integrates,
-    inserts, measures the trips and finds collisions. libsumo runs in a process of its own.
+    Arrivals, vehicles, geometry, limits and commands are the same. SUMO follows leaders,
+    integrates, inserts, measures the trips and finds collisions, in a process of its own.
 
     Args:
         scenario: what to simulate.
@@ -99,9 +75,9 @@ def simulate(
             minisim's paths, which SUMO's network repeats.
         record_window: from and to [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
-            "teleport" is what SUMO does by default, and did in the published runs: a vehicle that
-            runs into the one ahead, or waits for 300 s, is put on the next road, or has arrived
-            where there is none; touching inside the junction does not count.
+            "teleport" is SUMO's default, as in the published runs: a vehicle that runs into the one
+            ahead or waits for 300 s is put on the next road, or has arrived where there is none.
+            Touching inside the junction does not count.
         keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
             and its trips; by default they are temporary. They also stay when the run fails, and
             the exception has a note that names the folder.
@@ -157,48 +133,34 @@ def _run(request: _Request) -> Run:
     home = sumo_home()
     if request.model is not None:
         choice("SUMO model", request.model, MODELS)
-    if request.record is not None:
-        choice("record", request.record, RECORDS)
-    choice("on_collision", request.on_collision, REACTIONS)
     if request.gui:
         _check_display()
-    beginning = begin(request.scenario, request.controller, request.seed)
+    hosted = begin(
+        request.scenario, request.controller, request.seed, record=request.record,
+        record_window=request.record_window, on_collision=request.on_collision, reactions=REACTIONS,
+    )  # fmt: skip
     with _folder(request.keep_files) as folder:
-        job = _prepare(request, beginning, folder, home)
-        version, ended = _host(job, home, _session(request, beginning, job))
+        job = _prepare(request, hosted, folder, home)
+        version, ended = _host(job, home, _session(request, hosted, job))
         if ended.collisions and job.stop_on_collision:
-            raise collision_error(
-                ended.collisions, request.scenario, request.controller, int(request.seed),
-                partial(request.replay, ended.collisions[0].time),
-            )  # fmt: skip
+            replay = partial(request.replay, ended.collisions[0].time)
+            raise hosted.collided(ended.collisions, replay)
         end = (job.horizon if ended.done else ended.tick) * job.law.dt
-        columns = read_trips(folder, beginning.arrivals, job, ended, end)
+        columns = read_trips(folder, hosted.arrivals, job, ended, end)
         if request.fcd is not None:
             with replacing(request.fcd) as target:
                 shutil.copyfile(folder / FCD, target)
-    return Run(
-        scenario=request.scenario,
-        controller=request.controller,
-        seed=int(request.seed),
-        site=beginning.site,
-        plan=beginning.plan,
+    return hosted.result(
         collisions=ended.collisions,
         columns=columns,
-        record=request.record,
         trace=ended.trace,
         rows=job.vehicles[["id", "path"]].copy(),
-        counts=counts_of(beginning.session),
-        kinds=kinds_of(beginning.session, len(beginning.arrivals)),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 
 
 def sumo_home() -> Path:
-    """SUMO's folder.
-
-    Raises:
-        MissingExtraError: SUMO is not installed, with the command that installs it.
-    """
+    """SUMO's folder; raises `MissingExtraError` with the command that installs SUMO."""
     for package in ("sumo", "libsumo"):
         if importlib.util.find_spec(package) is None:
             raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
@@ -216,7 +178,7 @@ def _check_display() -> None:
 
 @contextmanager
 def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """Where SUMO's files go: a folder to keep, made where it is missing, or one that vanishes."""
+    """The folder for SUMO's files: the one to keep, made if it is missing, or a temporary one."""
     if keep is None:
         with tempfile.TemporaryDirectory(prefix="minisim-sumo-") as name:
             yield Path(name)
@@ -239,9 +201,9 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         raise
 
 
-def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) -> Job:
+def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job:
     """Write all of SUMO's files, and put together what its process needs."""
-    site, arrivals, _, plan = beginning
+    site, plan = hosted.site, hosted.plan
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
     model = _model(request.model, site.vehicle)
@@ -251,9 +213,9 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         plan,
         depart_speed=depart_speed,
         record=request.record,
-        record_window=checked_window(request.record_window),
+        record_window=hosted.record_window,
     )
-    vehicles = build_vehicles(site, arrivals)
+    vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
     network = build_network(site.intersection, site.speed_limit, folder, home)
     job = Job(
@@ -274,12 +236,12 @@ def _prepare(request: _Request, beginning: Beginning, folder: Path, home: Path) 
         stop_on_collision=request.on_collision == "stop",
         teleport=request.on_collision == "teleport",
     )
-    write_configuration(folder, job, int(request.seed), request.fcd is not None)
+    write_configuration(folder, job, hosted.seed, request.fcd is not None)
     return job
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
-    """SUMO's model that is to drive the vehicles; raises `InputError` where it cannot."""
+    """The model of SUMO that drives the vehicles; raises `InputError` where none can."""
     own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
     fitting = [model for model in MODELS if model == own or model in stand_ins]
     model = own if asked is None else asked
@@ -295,7 +257,7 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
 
 
 def _vehicle_for(asked: str) -> str:
-    """What to change about the vehicle for one of SUMO's models to drive it."""
+    """The vehicle that one of SUMO's models can drive."""
     if asked == "CC":
         return "a CruiseVehicle: use --profile as_run"
     models = [name for name, it in CAR_FOLLOWING.items() if asked in (it.sumo, *it.stand_ins)]
@@ -308,18 +270,13 @@ def _command(gui: bool) -> tuple[str, ...]:
     return ("sumo", "-c", CONFIGURATION)
 
 
-def _session(request: _Request, beginning: Beginning, job: Job) -> Callable[[Asked], list[Command]]:
-    """What answers the worker: the controller's session."""
-    dt = beginning.site.dt
+def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], list[Command]]:
+    """The function that answers the worker with the session's commands."""
 
     def answer(asked: Asked) -> list[Command]:
         if request.progress is not None:
             request.progress(asked.tick, job.horizon)
-        view = View(time_of(asked.tick, dt), asked.vehicles)
-        return ask(
-            beginning.session, view, asked.tick,
-            controller=request.controller, site=beginning.site, vehicles=len(job.vehicles),
-        )  # fmt: skip
+        return hosted.ask(View(time_of(asked.tick, job.law.dt), asked.vehicles), asked.tick)
 
     return answer
 
@@ -340,15 +297,18 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
             [sys.executable, "-P", "-c", CHILD], env=environment,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints,
         )  # fmt: skip
+        assert child.stdin is not None
+        assert child.stdout is not None
+        channel = Channel(child.stdout, child.stdin)
         try:
-            _send(child, job)
+            channel.send(job)
             while True:
-                match _receive(child):
+                match channel.receive():
                     case Started(version):
                         pass
                     case Asked(tick) as asked:
                         time = tick * job.law.dt
-                        _send(child, answer(asked))
+                        channel.send(answer(asked))
                     case Failed(reason):
                         said = _last_words(complaints)
                         raise SumoError(f"SUMO failed{_when(version, time)}: {reason}{said}")
@@ -366,19 +326,6 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
             child.communicate()
 
 
-def _send(child: subprocess.Popen[bytes], message: object) -> None:
-    if child.stdin is None:
-        raise EOFError
-    pickle.dump(message, child.stdin)
-    child.stdin.flush()
-
-
-def _receive(child: subprocess.Popen[bytes]) -> Any:
-    if child.stdout is None:
-        raise EOFError
-    return pickle.load(child.stdout)
-
-
 def _when(version: str, time: float) -> str:
     return f" after {time:.1f} s of simulated time" if version else " before the first step"
 
@@ -393,7 +340,7 @@ def _cause(code: int) -> str:
 
 
 def _last_words(complaints: IO[bytes]) -> str:
-    """The last lines that it wrote, as one line."""
+    """The last lines that the process wrote, as one line."""
     complaints.seek(0)
     lines = complaints.read().decode(errors="replace").split("\n")
     words = "; ".join(line.strip() for line in lines[-8:] if line.strip())

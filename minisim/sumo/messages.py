@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import pickle
+from typing import IO, Any, NamedTuple
 
 from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
@@ -16,8 +17,7 @@ class Job(NamedTuple):
     """All that the process needs.
 
     Attributes:
-        command: that starts SUMO.
-        folder: to start it in.
+        command, folder: what starts SUMO, and where.
         temporary: whether the process removes the folder when its caller has gone.
         model: car-following model, one of `minisim.sumo.MODELS`.
         plan: of the session.
@@ -26,8 +26,6 @@ class Job(NamedTuple):
         top_speed: no vehicle is faster [m/s].
         network: lengths in SUMO.
         vehicles: as `minisim.engine.state.build_vehicles` has them.
-        lanes: how many.
-        movements: of the intersection.
         horizon: tick at which to stop.
         stop_on_collision: whether the first collision ends the run.
         teleport: whether SUMO takes vehicles off the road, as it does by default.
@@ -49,6 +47,22 @@ class Job(NamedTuple):
     horizon: int
     stop_on_collision: bool
     teleport: bool
+
+
+class Channel:
+    """The pipes to the other process."""
+
+    def __init__(self, source: IO[bytes], target: IO[bytes]) -> None:
+        self._source, self._target = source, target
+
+    def receive(self) -> Any:
+        """The next object; `EOFError` when the other process has gone."""
+        return pickle.load(self._source)
+
+    def send(self, message: object) -> None:
+        """Send one object."""
+        pickle.dump(message, self._target)
+        self._target.flush()
 
 
 class Started(NamedTuple):

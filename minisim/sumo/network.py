@@ -1,11 +1,11 @@
 """The junction as a SUMO network, built by netconvert, with our geometry to the millimetre.
 
-netconvert would cut the roads and bend the turns by its own rules. Given the shape of the
-junction and of every turn, it takes ours: entries, exits and arcs lie where minisim has them. What
-is left is read back (`Network`), so a position in SUMO is exact in `s` in any case.
+By itself netconvert cuts the roads and bends the turns by its own rules. We give it the shape of
+the junction and of every turn, so entries, exits and arcs lie where minisim has them. Lengths that
+still differ are read back (`Network`), so positions in SUMO are exact in `s`.
 
-A junction whose ways are netconvert's own (`Intersection.ways`: those of the published runs) is
-left to netconvert, with its waiting positions and its right of way; the lengths must come out as
+If the ways are netconvert's own (`Intersection.ways`: those of the published runs), netconvert
+draws the junction, with its waiting positions and its right of way. The lengths must come out as
 the ways have them. Between equal roads, rounding decides which has priority and which vehicles wait
 inside. So coordinates begin at the lower left corner there, which is netconvert's default.
 """
@@ -32,7 +32,7 @@ NETWORK = "minisim.net.xml"
 #: Decimals of what is written and read [m].
 DIGITS = 6
 
-#: What netconvert's own lengths are known to [m]: it writes two decimals.
+#: Rounding of netconvert's own lengths [m]: it writes two decimals.
 ROUNDED = 0.0151
 
 
@@ -58,14 +58,8 @@ def build_network(
     place to wait inside the junction). Turns have the road's speed limit, since the host slows
     vehicles for them.
 
-    Args:
-        intersection: its geometry.
-        speed_limit: of the roads [m/s].
-        folder: where to write.
-        home: SUMO's folder, with `bin/netconvert`.
-
     Raises:
-        SumoError: netconvert refuses, with its own words, or draws other ways than the given.
+        SumoError: netconvert refuses, in its own words, or draws other ways than the given ones.
     """
     ours = intersection.ways is None
     write_xml(folder / NODES, "nodes", _nodes(intersection))
@@ -85,7 +79,7 @@ def build_network(
 
 
 def _as_given(intersection: Intersection, network: Network) -> Network:
-    """The lengths of the intersection, which netconvert's are but for its rounding.
+    """The lengths of the intersection; netconvert's may differ only by rounding.
 
     One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance.
     Positions follow from what vehicles have driven since their insertion, so errors do not add up.

@@ -1,9 +1,9 @@
 """How vehicles in SUMO are told what the road ahead and the controller ask of them.
 
-`Follower` steers SUMO's IDM and Krauss. What a held vehicle, a marking or a turn asks for is
-computed by minisim's own functions (`minisim.engine.laws`) and told to SUMO as a speed: a desired
-one (`setMaxSpeed`) where a lower limit holds, a commanded one (`setSpeed`) while a vehicle has to
-brake for what is ahead. SUMO still drives slower than that behind a leader.
+`Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.engine.laws`) compute what a
+hold line, a marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`)
+where a lower limit holds, a commanded speed (`setSpeed`) while a vehicle has to brake for what is
+ahead. Behind a leader SUMO still drives slower than that.
 
 `minisim.sumo.cruising` steers SUMO's `CC`.
 """
@@ -21,12 +21,12 @@ from minisim.engine.state import STOP_MARGIN, Law, Records
 from minisim.junction.movements import Movements
 from minisim.sumo.messages import Job
 
-#: SUMO keeps a safe gap (1) and the maximal acceleration (2) but knows no right of way (no 8), and
-#: braking (no 4) is limited by minisim. (SUMO, TraCI/Change Vehicle State, speed mode.) In the
-#: junction a vehicle follows those that come from its lane or leave by its exit. In this mode it
-#: also yields to those that cross, although the controller alone decides which vehicle goes. So it
-#: ignores all vehicles in the junction (32) as long as one of them shares neither lane nor exit
-#: with it. The one that it would follow into its exit it then follows by minisim's law.
+#: SUMO keeps a safe gap (1) and the maximal acceleration (2). It knows no right of way (no 8), and
+#: minisim limits the braking (no 4). (SUMO, TraCI/Change Vehicle State, speed mode.) Inside the
+#: junction a vehicle follows those that come from its lane or leave by its exit. It also yields to
+#: those that cross, although the controller alone decides which vehicle goes. So it ignores all
+#: vehicles in the junction (32) as long as one of them shares neither lane nor exit with it.
+#: Meanwhile it follows the vehicle ahead into its exit by minisim's law.
 FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
 
 #: SUMO knows no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
@@ -127,14 +127,14 @@ class Follower:
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def load(self, cars: Iterable[Car]) -> None:
-        """Do nothing: the vehicle type says it all."""
+        """Do nothing: the vehicle type has all it needs."""
 
     def depart(self, car: Car) -> None:
         """Leave all giving way to the controller."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
 
     def advise(self, car: Car) -> None:
-        """Do nothing: `steer` looks at it."""
+        """Do nothing: `steer` reads the advice."""
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
@@ -166,7 +166,7 @@ class Follower:
         self._speeds.hand_back(car)
 
     def _merging(self, car: Car) -> float:
-        """How much the vehicle counts that takes its exit before it from another lane."""
+        """How much the vehicle from another lane that takes the exit before it counts."""
         mine, law = self._exit[car.path][0], self._law
         ahead = None
         for other in self._inside:

@@ -1,8 +1,8 @@
-"""The process that runs libsumo: it moves vehicles, the controller's own process decides.
+"""The process that runs libsumo. It moves the vehicles; the caller's process decides.
 
-libsumo holds one simulation a process, and a crash would take its caller down, so it has a process
-of its own. That process knows no controller: it advances until a wake-up, sends a view, and carries
-out the commands that come back, as `minisim.simulation` does with the compiled kernel.
+libsumo holds one simulation a process, and a crash would take its caller down. So it runs in a
+process of its own, which knows no controller. That process advances until a wake-up, sends a view
+and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
 
 SUMO follows leaders, integrates and finds collisions. `minisim.sumo.steering` tells it what else
 vehicles have to obey.
@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 import os
-import pickle
 import shutil
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,7 @@ from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, TRACE, Records, time_of
 from minisim.hosting import Alarm
 from minisim.sumo.cruising import Cruiser
-from minisim.sumo.messages import Asked, Ended, Failed, Job, Started
+from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
 
 #: Lines of a recording that are kept as Python objects.
@@ -51,10 +50,10 @@ class Worker:
 
     A tick is the state that SUMO writes at that time. SUMO first moves all vehicles and then
     inserts those that are due, so a vehicle's first state is that of its insertion. Vehicles that a
-    controller or a recording may need are watched in every step, the others now and then.
+    controller or a recording may need are watched in every step; the others are read now and then.
     """
 
-    def __init__(self, job: Job, libsumo: Any, caller: Caller) -> None:
+    def __init__(self, job: Job, libsumo: Any, caller: Channel) -> None:
         self._job, self._libsumo, self._caller = job, libsumo, caller
         road, law = job.road, job.law
         self._steering: Steering = (
@@ -67,11 +66,8 @@ class Worker:
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
         ]
-        self._cars = {
-            car.name: car
-            for row, record in enumerate(job.vehicles)
-            for car in [Car(row, record, law)]
-        }
+        cars = (Car(row, record, law) for row, record in enumerate(job.vehicles))
+        self._cars = {car.name: car for car in cars}
         # A metre earlier, so that the acceleration is known from the first step on.
         self._near = -1.0 + min(
             self._steering.near, law.entry - law.sight, self._marks[0], _record_start(job)
@@ -122,7 +118,8 @@ class Worker:
     def _decide(self) -> None:
         """Ask what the session commands; all answers are collected before any is carried out."""
         self._alarm.reset(self._tick)
-        for command in self._caller.ask(Asked(self._tick, tuple(self._view()))):
+        self._caller.send(Asked(self._tick, tuple(self._view())))
+        for command in self._caller.receive():
             self._apply(command)
 
     def _view(self) -> Iterator[Observed]:
@@ -313,33 +310,11 @@ def _record_start(job: Job) -> float:
     return job.law.record_start if job.law.record_from != NEVER else math.inf
 
 
-class Caller:
-    """The other side: the process that holds the session."""
-
-    def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
-        self._source, self._target = source, target
-
-    def receive(self) -> Any:
-        """The next object; `EOFError` when the caller has gone."""
-        return pickle.load(self._source)
-
-    def send(self, message: Started | Asked | Ended | Failed) -> None:
-        """Send one object."""
-        pickle.dump(message, self._target)
-        self._target.flush()
-
-    def ask(self, asked: Asked) -> list[Command]:
-        """Send a view and return the answer."""
-        self.send(asked)
-        answer: list[Command] = self.receive()
-        return answer
-
-
 def main() -> None:
     """Receive a job on stdin, run it, and talk on stdout; what SUMO prints goes to stderr."""
     with os.fdopen(os.dup(1), "wb") as target:
         os.dup2(2, 1)
-        caller = Caller(sys.stdin.buffer, target)
+        caller = Channel(sys.stdin.buffer, target)
         job: Job = caller.receive()
         import libsumo
 

@@ -1,6 +1,6 @@
-"""The `minisim` command: the composition root, which may import everything, and does so late.
+"""The `minisim` command. It may import every other package.
 
-Each module beside this one adds the command of its name to the app. A command imports what it
+Each module of this package adds the command of its name to the app. A command imports what it
 needs when it runs, so that `minisim --help` is quick.
 """
 
@@ -21,10 +21,10 @@ from scenarios.termination import Terminated, terminable
 
 __all__ = ["COMMANDS", "app", "main"]
 
-#: The help lists these first, then the others by name.
+#: The help lists these first, and then the others by name.
 _FIRST = ("demo", "run", "controllers", "animate", "sweep", "figures", "reproduce", "crossval")
 
-#: The names of the modules beside this one, in the order of the help.
+#: The names of the commands, in the order of the help.
 COMMANDS = tuple(sorted(
     (module.name for module in pkgutil.iter_modules(__path__) if not module.ispkg),
     key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name),
@@ -40,8 +40,8 @@ _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
-    Bad input is one line on stderr and 2, a collision that stops a run or a stdout that cannot be
-    written is 1, Ctrl-C is 130, SIGTERM is 143. No expected failure is a traceback.
+    Bad input is one line on stderr and code 2. A collision that stops a run, or a stdout that
+    cannot be written, is 1. Ctrl-C is 130, and SIGTERM 143. No expected failure is a traceback.
     """
     prepare_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Terminated as end:
         return _fail("terminated", int(end.code or 0))
     except BrokenPipeError:
-        # The reader of our output has gone, as `head` does: there is no more to say.
+        # The reader of our output has gone, as `head` does.
         drop_output()
         return 1
     except OSError as error:
@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _message(error: MinisimError) -> str:
-    """Its message, with the notes that were added on its way."""
+    """The message and the notes that were added on the way."""
     return "; ".join([str(error), *getattr(error, "__notes__", ())])
 
 

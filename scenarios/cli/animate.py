@@ -8,21 +8,8 @@ from typing import Annotated
 import typer
 
 from minisim.errors import number
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    Arrivals,
-    Bearings,
-    ControllerName,
-    Density,
-    Humans,
-    ProfileName,
-    ScenarioName,
-    Seed,
-    Side,
-    Split,
-    Turns,
-    build_scenario,
-)
 from scenarios.cli.shared.simulate import simulate
 from scenarios.cli.shared.terminal import bar
 
@@ -33,29 +20,29 @@ from scenarios.cli.shared.terminal import bar
     "minisim animate five-way -c fixed-time -d 300 --start 600 --seconds 120 -o signal.html"
 )
 def animate(
-    scenario: ScenarioName,
+    scenario: options.ScenarioName,
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="FILE", show_default=False,
+            "--out", "-o", metavar="FILE",
             help="What to write: .gif, .mp4 (needs ffmpeg) or .html (a page with a player).",
         ),
     ],
-    controller: ControllerName = "dim",
-    humans: Humans = 0.0,
+    controller: options.ControllerName = "dim",
+    humans: options.Humans = 0.0,
     start: Annotated[float, typer.Option(metavar="S", help="Simulated time to begin at.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
     fps: Annotated[float, typer.Option(help="Frames a second; at most one a step.")] = 10.0,
-    density: Density = None,
-    split: Split = None,
-    turns: Turns = None,
-    profile: ProfileName = "paper",
-    side: Side = "left",
-    bearings: Bearings = None,
-    seed: Seed = 0,
-    arrivals: Arrivals = None,
+    density: options.Density = None,
+    split: options.Split = None,
+    turns: options.Turns = None,
+    profile: options.ProfileName = "paper",
+    side: options.Side = "left",
+    bearings: options.Bearings = None,
+    seed: options.Seed = 0,
+    arrivals: options.Arrivals = None,
 ) -> None:  # fmt: skip
-    """Write an animation: who waits, who has the right of way, who crosses."""
+    """Write an animation: which vehicles wait, have the right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
@@ -69,7 +56,7 @@ def animate(
     number("--start [s]", start, low=0, high=9e6)
     number("--seconds", seconds, above=0, high=3600)
     frame_times(start, seconds, fps, profile_named(profile).dt)
-    junction = build_scenario(
+    junction = options.build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=start + seconds,
     )  # fmt: skip

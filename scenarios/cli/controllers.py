@@ -9,30 +9,30 @@ from typing import Annotated, Any
 
 import typer
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import AsJson
 from scenarios.cli.shared.terminal import show_json
-
-#: Columns of the output.
-WIDTH = 80
 
 
 @app.command(
-    epilog="Name a controller with parameters as in -c dim:gate=harmonious,monitor=on. One of your "
-    "own is -c mymodule:MyController(k=3) or -c path/to/file.py:MyController, and needs a line in "
-    "no file of ours.\n\n"
+    epilog="Give parameters as in -c dim:gate=harmonious,monitor=on. A controller of your own "
+    "needs no registration: -c mymodule:MyController(k=3) or -c path/to/file.py:MyController.\n\n"
     "[bold]Examples[/bold]\n\nminisim controllers dim\n\nminisim controllers mymodule:MyController"
 )
 def controllers(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="List the parameters of this one.", show_default=False),
+        typer.Argument(metavar="NAME", help="List the parameters of this one."),
     ] = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
+    from scenarios.controllers import CONTROLLERS, maker_of, package_of, plugins
+
     if name is None:
-        meanings = dict(_meanings())
+        meanings = {known: _meaning(entry.make) for known, entry in CONTROLLERS.items()}
+        for known, plugin in plugins().items():
+            meanings[known] = f"of the package {package_of(plugin)} ({plugin.value})"
         if as_json:
             show_json(meanings)
             return
@@ -40,9 +40,8 @@ def controllers(
         for known, meaning in meanings.items():
             typer.echo(_wrapped(f"{known:{width}}{meaning}", width))
         return
-    from scenarios.controllers import described
-
-    make = described(name).make
+    ours = name.partition(":")[0]
+    make = maker_of(ours if ours in CONTROLLERS else name)
     meaning, parameters = _meaning(make), list(_parameters(make))
     if as_json:
         show_json({"name": name, "meaning": meaning, "parameters": parameters})
@@ -54,15 +53,6 @@ def controllers(
             if kind["parameters"]:
                 typer.echo("\n" + _wrapped(f"{parameter['name']}={word}: {kind['meaning']}", 0))
                 _show_parameters(kind["parameters"])
-
-
-def _meanings() -> Iterator[tuple[str, str]]:
-    from scenarios.controllers import CONTROLLERS, package_of, plugins
-
-    for entry in CONTROLLERS.values():
-        yield entry.name, _meaning(entry.make)
-    for name, plugin in plugins().items():
-        yield name, f"of the package {package_of(plugin)} ({plugin.value})"
 
 
 def _meaning(make: Callable[..., Any]) -> str:
@@ -104,4 +94,4 @@ def _show_parameters(parameters: list[dict[str, Any]]) -> None:
 
 
 def _wrapped(text: str, indent: int) -> str:
-    return textwrap.fill(text, WIDTH, subsequent_indent=" " * indent, break_long_words=False)
+    return textwrap.fill(text, 80, subsequent_indent=" " * indent, break_long_words=False)

@@ -6,15 +6,8 @@ from typing import Annotated
 
 import typer
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    Order,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, names
 
 
@@ -24,21 +17,21 @@ from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, na
     "minisim decide five-way a1 b3 c4 d2 e1 --plot decision.png"
 )
 def decide(
-    scenario: ScenarioName,
+    scenario: options.ScenarioName,
     movements: Annotated[
         list[str],
         typer.Argument(
-            metavar="MOVEMENTS...", show_default=False,
+            metavar="MOVEMENTS...",
             help="What the front vehicle of each lane wants, such as a1 b2 c2 d2: lane a to the "
             "1st exit clockwise, and so on; at most one a lane.",
         ),
     ],
-    order: Order = "size",
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
+    order: options.Order = "size",
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
     plot: Plot = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, explain

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from minisim.errors import integer
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar, show
 
@@ -20,22 +20,13 @@ from scenarios.cli.shared.terminal import bar, show
     "demo.md, demo.png and demo.gif."
 )
 def demo(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table, plot and GIF.")] = (
-        Path("out")
-    ),
+    out: options.Folder = Path("out"),
     seeds: Annotated[
         int | None,
-        typer.Option(
-            help="Runs a point, 2 … 1000; 5 by default, 2 with --quick.", show_default=False
-        ),
+        typer.Option(help="Runs a point, 2 … 1000; 5 by default, 2 with --quick."),
     ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(help="Processes to use; one a core by default.", show_default=False),
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer points, shorter runs: a smoke test.")
-    ] = False,
+    jobs: options.Jobs = None,
+    quick: options.Quick = False,
 ) -> None:
     """The tour: DIM beside a fixed-time signal, in under a minute."""
     from minisim.files import make_folder
@@ -43,12 +34,12 @@ def demo(
 
     runs = (2 if quick else 5) if seeds is None else integer("--seeds", seeds, low=2, high=1000)
     tour = Tour.quick(runs) if quick else Tour(seeds=runs)
-    processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
+    workers = options.processes(jobs)
     folder = make_folder(out)
     with bar("starting"):
-        film = tour.film()  # first, for it compiles the kernel once for all processes
+        film = tour.film()  # first: it compiles the kernel once for all processes
     with bar("simulating") as progress:
-        points = run_tour(tour, processes, progress)
+        points = run_tour(tour, workers, progress)
     from figures.demo import performance_figure
     from figures.film.animate import write_animation
     from figures.style import save

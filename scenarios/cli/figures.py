@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from minisim.errors import InputError
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar, show
 
 
 @app.command(
     epilog="A figure of results needs runs in a store; [bold]minisim reproduce[/bold] makes them. "
-    "What a figure lacks, its small print says.\n\n"
+    "The small print of a figure says which runs it lacks.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim figures --list\n\n"
     "minisim figures maps worst-case webster --out figures\n\n"
@@ -24,28 +26,25 @@ def figures(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME...]", show_default=False,
-            help="Which ones; every one that there are runs for by default.",
+            metavar="[NAME...]", help="Which ones; every one that there are runs for by default."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write to.")] = (
-        Path("out/figures")
-    ),
+    out: options.Folder = Path("out/figures"),
     store: Annotated[
         Path | None,
-        typer.Option(metavar="STORE", help="The runs, as made by minisim reproduce or sweep.",
-                     show_default=False),
+        typer.Option(metavar="STORE", help="The runs, as made by minisim reproduce or sweep."),
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(help="Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with "
-                          "--quick.", show_default=False),
+        typer.Option(
+            help="Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with --quick."
+        ),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Look for the runs of minisim reproduce --quick.")
     ] = False,
     as_list: Annotated[bool, typer.Option("--list", help="List the names and stop.")] = False,
-) -> None:  # fmt: skip
+) -> None:
     """Draw the paper's figures and tables and those beyond it (PDF, SVG, PNG; MD, CSV, TeX)."""
     from figures.gallery import GALLERY, item_named, write
     from minisim.files import make_folder
@@ -58,38 +57,31 @@ def figures(
         show(gallery_table(GALLERY.values()))
         return
     items = [item_named(name) for name in dict.fromkeys(names or GALLERY)]
-    left = 0
     effort = Effort.of(quick=quick, seeds=seeds)
-    wanting = [item.name for item in items if item.needs]
-    if store is None and names and wanting:
+    missing = []
+    left = [item.name for item in items if item.needs] if store is None else []
+    if names and left:
         raise InputError(
-            f"{', '.join(wanting)}: drawn from results; give them with --store "
+            f"{', '.join(left)}: drawn from results; give them with --store "
             "(minisim reproduce makes them)"
         )
-    if store is None:
-        left = len(wanting)
-        items = [item for item in items if not item.needs]
-    source = None if store is None else Store(store, create=False)
-    try:
+    items = [item for item in items if item.name not in left]
+    with nullcontext() if store is None else Store(store, create=False) as source:
         folder = make_folder(out)
         archive = Archive(find_in(source), effort)
-        missing = []
         with bar("drawing") as progress:
             for done, item in enumerate(items, start=1):
                 try:
-                    drawing = item.build(archive)
+                    write(item.build(archive), folder, item.name)
                 except MissingRunsError as error:
                     if names:
                         raise
-                    missing.append((item.name, str(error)))
-                else:
-                    write(drawing, folder, item.name)
+                    missing.append(f"{item.name}: {error}")
                 progress(done, len(items))
-    finally:
-        if source is not None:
-            source.close()
     typer.echo(f"wrote {len(items) - len(missing)} figures and tables to {folder}")
     if left:
-        typer.echo(f"  not {left} others, which need runs: name a store with --store", err=True)
-    for name, why in missing:
-        typer.echo(f"  not {name}: {why}", err=True)
+        typer.echo(
+            f"  not {len(left)} others, which need runs: name a store with --store", err=True
+        )
+    for why in missing:
+        typer.echo(f"  not {why}", err=True)

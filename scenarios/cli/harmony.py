@@ -9,14 +9,8 @@ from rich.text import Text
 
 from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import answer, harmony_table, junction
 
 
@@ -25,15 +19,15 @@ from scenarios.cli.shared.proof import answer, harmony_table, junction
     "clockwise.\n\n[bold]Example[/bold]\n\nminisim harmony custom --bearings 0,80,190,260 --csv"
 )
 def harmony(
-    scenario: ScenarioName,
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
+    scenario: options.ScenarioName,
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
     clearance: Annotated[
         float, typer.Option(metavar="M", help="Room between the ways of two bodies in metres.")
     ] = CLEARANCE,
     csv: Annotated[bool, typer.Option("--csv", help="Print the matrix as CSV.")] = False,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Print which movements can be driven at once: the harmony matrix."""
     if csv and as_json:

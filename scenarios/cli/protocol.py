@@ -10,15 +10,8 @@ import typer
 from minisim.errors import InputError
 from minisim.files import check_file
 from minisim.junction.movements import ARM_NAMES
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    Order,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import answer, junction, names, protocol_text
 from scenarios.cli.shared.terminal import bar
 
@@ -31,7 +24,7 @@ MAX_ARMS = 4
 
 
 @app.command(
-    epilog="Exit code 1 where the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
+    epilog="Exit code 1 if the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
     "--priorities rotating or waiting two minutes and a gigabyte.\n\n[bold]Examples[/bold]\n\n"
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
@@ -40,7 +33,7 @@ MAX_ARMS = 4
     "-o two.gif"
 )
 def protocol(
-    scenario: ScenarioName,
+    scenario: options.ScenarioName,
     commit: Annotated[
         str,
         typer.Option(
@@ -57,7 +50,7 @@ def protocol(
             "them.",
         ),
     ] = "clear",
-    order: Order = "size",
+    order: options.Order = "size",
     priorities: Annotated[
         str,
         typer.Option(
@@ -69,14 +62,14 @@ def protocol(
     counterexample: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", show_default=False,
-            help="Where it is unsafe: write arrivals with which simulated vehicles collide.",
+            metavar="FILE.csv",
+            help="If it is unsafe: write arrivals with which simulated vehicles collide.",
         ),
     ] = None,
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
-    as_json: AsJson = False,
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
+    as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Visit every state of arrivals, decisions, commitments and clearings (3 and 4 arms).
 
@@ -90,8 +83,8 @@ def protocol(
     what, matrix = junction(scenario, bearings, side, profile)
     if matrix.n > MAX_ARMS:
         raise InputError(
-            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and with "
-            "them too many states"
+            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and too many "
+            "states"
         )
     rules = Protocol(matrix, order, gate, commit, priorities)
     with bar("visiting all states") as progress:
@@ -100,10 +93,7 @@ def protocol(
     if counterexample is not None:
         _write_counterexample(what, search, counterexample)
     facts = {
-        "scenario": what.name,
-        "order": order,
-        "gate": gate,
-        "commit": commit,
+        "scenario": what.name, "order": order, "gate": gate, "commit": commit,
         "priorities": priorities,
         "states": search.states,
         "transitions": search.transitions,
@@ -114,7 +104,7 @@ def protocol(
             ARM_NAMES[k]: lasso and {"stem": names(lasso.stem), "cycle": names(lasso.cycle)}
             for k, lasso in enumerate(lassos)
         },
-    }
+    }  # fmt: skip
     answer(as_json, facts, protocol_text(what.name, search, lassos), wrote=counterexample)
     if search.unsafe or search.stuck is not None:
         raise typer.Exit(1)

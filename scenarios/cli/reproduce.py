@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from minisim.errors import integer
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar
 from scenarios.studies import NAMES, study_named
 
 if TYPE_CHECKING:
-    from scenarios.studies.shared.reproduction import Made
+    pass
 
 
 @app.command(
-    epilog="Simulates the paper's grid twice, as its text prescribes it and as the published runs "
-    "were made, and what the paper leaves open: every controller on equal terms, gates, rules of "
-    "priority and capacities. Writes DIR/report.md, DIR/figures and the store. What the store has "
-    "already is not simulated again, so an interrupted run goes on where it was.\n\n"
+    epilog="Simulates the paper's grid twice: as its text prescribes it, and as the published runs "
+    "were made. Then comes what the paper leaves open: every controller on equal terms, gates, "
+    "rules of priority and capacities. Writes DIR/report.md, DIR/figures and the store. A run that "
+    "is in the store is not made again, so an interrupted command continues where it stopped.\n\n"
     "[bold]How long[/bold]\n\n"
     "Processor time with 10 seeds, on a machine that simulates an hour under DIM in 0.1 s: text, "
     "the paper's grid of 700 hours and the first to be run, 2.5 minutes; fair 6; gate and fairness "
@@ -31,27 +30,20 @@ if TYPE_CHECKING:
     "The report says what each study took, and CPU seconds a simulated hour by controller."
 )
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of report and figures.")
-    ] = Path("out"),
+    out: options.Folder = Path("out"),
     store: Annotated[
         Path | None,
-        typer.Option(metavar="STORE", help="Where the runs are kept; DIR/runs.sqlite by default.",
-                     show_default=False),
+        typer.Option(metavar="STORE", help="Where the runs are kept; DIR/runs.sqlite by default."),
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(help="Runs a case, at least 2; 10 by default, 2 with --quick.",
-                     show_default=False),
+        typer.Option(help="Runs a case, at least 2; 10 by default, 2 with --quick."),
     ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(help="Processes to use; one a core by default.", show_default=False),
-    ] = None,
+    jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="STUDY", show_default=False,
+            metavar="STUDY",
             help="Only this one, and only what is drawn from it; may be repeated. One of "
             f"{', '.join(NAMES)}.",
         ),
@@ -60,7 +52,7 @@ def reproduce(
         bool,
         typer.Option("--quick", help="Two demands, 150 s each: a smoke test."),
     ] = False,
-) -> None:  # fmt: skip
+) -> None:
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.reproduction_report import write_report
     from minisim.files import make_folder
@@ -71,29 +63,25 @@ def reproduce(
 
     effort = Effort.of(quick=quick, seeds=seeds)
     names = [study_named(name).name for name in only or NAMES]
-    processes = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
+    workers = options.processes(jobs)
     if store is not None and store.exists():
-        Store(store, create=False).close()  # refused before a folder is made
+        Store(store, create=False).close()  # a wrong one is refused before a folder is made
     folder = make_folder(out)
-    pictures = make_folder(folder / "figures")
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
         made = []
         for name in names:
             with bar(f"simulating {name}") as progress:
-                made.append(make(name, effort, rows, processes, progress))
-            typer.echo(_done(made[-1]), err=True)
+                made.append(make(name, effort, rows, workers, progress))
+            done = made[-1]
+            took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
+            failed = f", {len(done.failed)} failed" if done.failed else ""
+            typer.echo(f"{name}: {took}{failed}", err=True)
         with bar("drawing") as progress:
             files = write_report(
-                Archive(find_in(rows), effort), made, processes, folder, pictures, progress,
-                parts=names,
-            )  # fmt: skip
-    typer.echo(f"wrote {files} figures and tables to {pictures}")
+                Archive(find_in(rows), effort), made, workers, folder, progress, parts=names
+            )
+    typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
     broken = sum(len(part.failed) for part in made)
     if broken:
         typer.echo(f"{broken} runs failed; the report names them", err=True)
-
-
-def _done(made: Made) -> str:
-    took = f"{made.name}: {made.computed} of {made.runs} runs computed in {made.wall_s:.0f} s"
-    return f"{took}, {len(made.failed)} failed" if made.failed else took

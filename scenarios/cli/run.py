@@ -2,44 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from minisim.errors import CollisionError, InputError, choice
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    FILES,
-    Arrivals,
-    AsJson,
-    Bearings,
-    By,
-    ControllerName,
-    Density,
-    Gui,
-    Horizon,
-    Host,
-    Humans,
-    KeepFiles,
-    Metrics,
-    ProfileName,
-    ScenarioName,
-    Seed,
-    Side,
-    Split,
-    SumoFcd,
-    SumoModel,
-    Turns,
-    Warmup,
-    build_scenario,
-    chosen_metrics,
-)
 from scenarios.cli.shared.simulate import simulate, simulate_in_sumo
 from scenarios.cli.shared.terminal import bar, show, show_json
 
-HOSTS = ("minisim", "sumo")
+
+def _file(help: str) -> Any:
+    return typer.Option(metavar="FILE", rich_help_panel=options.FILES, help=help)
+
+
+def _sumo(help: str, metavar: str | None, *flags: str) -> Any:
+    return typer.Option(
+        *flags, metavar=metavar, show_default=False, rich_help_panel="SUMO", help=help
+    )
 
 
 @app.command(
@@ -50,18 +33,23 @@ HOSTS = ("minisim", "sumo")
     "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
 )
 def run(
-    scenario: ScenarioName,
-    controller: ControllerName = "dim",
-    humans: Humans = 0.0,
-    density: Density = None,
-    split: Split = None,
-    turns: Turns = None,
-    profile: ProfileName = "paper",
-    side: Side = "left",
-    bearings: Bearings = None,
-    seed: Seed = 0,
-    horizon: Horizon = 3600.0,
-    warmup: Warmup = 0.0,
+    scenario: options.ScenarioName,
+    controller: options.ControllerName = "dim",
+    humans: options.Humans = 0.0,
+    density: options.Density = None,
+    split: options.Split = None,
+    turns: options.Turns = None,
+    profile: options.ProfileName = "paper",
+    side: options.Side = "left",
+    bearings: options.Bearings = None,
+    seed: options.Seed = 0,
+    horizon: Annotated[
+        float,
+        typer.Option(metavar="S", show_default=False, help="Simulated time; 3600 unless told."),
+    ] = 3600.0,
+    warmup: Annotated[
+        float, typer.Option(metavar="S", show_default=False, help="Earlier trips do not count.")
+    ] = 0.0,
     on_collision: Annotated[
         str,
         typer.Option(metavar="DO", show_default=False, help="stop, record, or teleport (SUMO)."),
@@ -69,37 +57,29 @@ def run(
     no_safety: Annotated[
         bool, typer.Option("--no-safety", help="Do not measure TTC and PET.")
     ] = False,
-    metrics: Metrics = None,
-    by: By = "lane",
-    as_json: AsJson = False,
-    arrivals: Arrivals = None,
-    trips: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", rich_help_panel=FILES, help="Write the trips (.csv, .parquet)."
-        ),
+    metrics: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
     ] = None,
-    trajectories: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", rich_help_panel=FILES, help="Write trajectories (.csv, .parquet)."
-        ),
+    by: Annotated[
+        str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
+    ] = "lane",
+    as_json: options.AsJson = False,
+    arrivals: options.Arrivals = None,
+    trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
+    trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
+    fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
+    host: Annotated[str, _sumo("What moves vehicles: minisim or sumo.", "NAME")] = "minisim",
+    sumo_model: Annotated[
+        str | None, _sumo("IDM, Krauss or CC, if not its own.", "NAME")
     ] = None,
-    fcd: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", rich_help_panel=FILES, help="Write trajectories as SUMO's XML."
-        ),
-    ] = None,
-    host: Host = "minisim",
-    sumo_model: SumoModel = None,
-    gui: Gui = False,
-    keep_files: KeepFiles = None,
-    sumo_fcd: SumoFcd = None,
-) -> None:
+    gui: Annotated[bool, _sumo("Show the run in sumo-gui.", None, "--gui")] = False,
+    keep_files: Annotated[Path | None, _sumo("Keep SUMO's files in a new folder.", "DIR")] = None,
+    sumo_fcd: Annotated[Path | None, _sumo("SUMO's own floating-car data (XML).", "FILE")] = None,
+) -> None:  # fmt: skip
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from minisim.files import check_apart, check_file, check_table
-    from minisim.results.metrics import SAFETY
+    from minisim.results.metrics import SAFETY, asked_metrics
     from minisim.results.summary import GROUPS
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.controllers import controller_named
@@ -115,31 +95,30 @@ def run(
     for xml in (fcd, sumo_fcd):
         if xml is not None:
             check_file(xml, ".xml")
-    asked, by = chosen_metrics(metrics), choice("--by", by, GROUPS)
-    junction = build_scenario(
+    asked = asked_metrics([] if metrics is None else [name.strip() for name in metrics.split(",")])
+    choice("--by", by, GROUPS)
+    if choice("host", host, ("minisim", "sumo")) == "minisim":
+        _refuse_sumo_options({
+            "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
+            "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",
+        })  # fmt: skip
+    junction = options.build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
-        junction,
-        controller_named(controller, profile),
-        seed,
-        humans,
-        on_collision=on_collision,
-        metrics=(*asked, *(() if no_safety else SAFETY)),
-    )
-    everything = fcd is not None or trajectories is not None
-    record = "all" if everything else None
-    sumo = {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
+        junction, controller_named(controller, profile), seed, humans,
+        on_collision=on_collision, metrics=(*asked, *(() if no_safety else SAFETY)),
+    )  # fmt: skip
+    recording: dict[str, Any] = {"record": None if fcd is None and trajectories is None else "all"}
+    if host == "sumo":
+        recording |= {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
     files = [path for path in (trips, trajectories, fcd, sumo_fcd) if path is not None]
     try:
-        if choice("host", host, HOSTS) == "sumo":
-            result = recipe.run(simulate_in_sumo, record=record, **sumo)
-        else:
-            _check_minisim_can(on_collision, **sumo)
-            result = recipe.run(simulate, record=record)
+        result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
-        error.add_note(_unwritten(files))
+        unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
+        error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise
     with bar("measuring"):
         summary = result.summary(recipe.metrics, [by])
@@ -152,18 +131,9 @@ def run(
     if as_json:
         show_json(summary)
         return
-    from scenarios.cli.shared.report import (
-        number_lines,
-        run_table,
-        run_title,
-        safety_line,
-        tally_line,
-    )
+    from scenarios.cli.shared import report
 
-    show(
-        run_title(summary), run_table(summary, asked, by), safety_line(summary),
-        *tally_line(result.counts), *number_lines(summary, asked),
-    )  # fmt: skip
+    show(*report.run_parts(summary, asked, by, result.counts))
     for collision in result.collisions[:10]:
         typer.echo(f"  {collision}")
     for path in files:
@@ -172,20 +142,9 @@ def run(
         typer.echo(f"  SUMO's files are in {keep_files}")
 
 
-def _check_minisim_can(on_collision: str, **sumo: object) -> None:
+def _refuse_sumo_options(given: Mapping[str, object]) -> None:
     """Raise `InputError` where an option asks for what only SUMO can do."""
-    names = {
-        "model": "--sumo-model", "gui": "--gui", "keep_files": "--keep-files", "fcd": "--sumo-fcd",
-    }  # fmt: skip
-    asked = [option for name, option in names.items() if sumo[name]]
-    if on_collision == "teleport":
-        asked.append("--on-collision teleport")
+    asked = [name for name, value in given.items() if value]
     if asked:
         need = "needs" if len(asked) == 1 else "need"
         raise InputError(f"{' and '.join(asked)} {need} --host sumo")
-
-
-def _unwritten(files: Sequence[Path]) -> str:
-    """What is not there after a collision has stopped the run, and how to get it."""
-    wrote = f"{', '.join(map(str, files))} not written; " if files else ""
-    return f"{wrote}--on-collision record notes collisions and goes on"

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from minisim.errors import InputError, choice, integer, number
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import bar, show
 from scenarios.studies import NAMES, SEARCHES, study_named
@@ -24,19 +23,17 @@ if TYPE_CHECKING:
     from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
-#: Key of a file -> its value where it is left out, as `scenarios.sweep.file` has it.
+#: Key of a file -> the default that `scenarios.sweep.file` gives it.
 DEFAULTS = {
     "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
     "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
     "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
 }  # fmt: skip
-#: A junction of one's own, as a file has it, and how the help shows brackets.
+#: A junction of your own, as it is written in a file, and how brackets are escaped in the help.
 CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
 PLAIN = str.maketrans({"[": r"\["})
 LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
-#: The study that is the paper's grid as its text prescribes it.
-PAPER = {"paper": "text"}
 #: Studies that are lists of experiments.
 STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
 
@@ -66,7 +63,7 @@ def sweep(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="FILE.toml|paper|STUDY", show_default=False,
+            metavar="FILE.toml|paper|STUDY",
             help="The experiments; or the paper's grid: its four controllers, five densities and "
             "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
             f"study of minisim reproduce: {', '.join(STUDIES)}.",
@@ -78,21 +75,13 @@ def sweep(
     ] = Path("sweep.db"),
     seeds: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", show_default=False,
-            help="Runs a cell, seeds 1 … N; as the file says, or 10.",
-        ),
+        typer.Option(metavar="N", help="Runs a cell, seeds 1 … N; as the file says, or 10."),
     ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", help="Processes to use; one a core by default.", show_default=False
-        ),
-    ] = None,
+    jobs: options.Jobs = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", show_default=False,
+            metavar="ADDRESS",
             help="Run on the Dask cluster of this scheduler (pip install 'minisim\\[dask]').",
         ),
     ] = None,
@@ -102,32 +91,33 @@ def sweep(
     ] = None,
     horizon: Annotated[
         float | None,
-        typer.Option(
-            metavar="S", show_default=False, help="Simulated time; as the file says, or 3600."
-        ),
+        typer.Option(metavar="S", help="Simulated time; as the file says, or 3600."),
     ] = None,
-) -> None:  # fmt: skip
+) -> None:
     """Run many experiments over seeds; results are kept, and what is there is not run again."""
     from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.sweep.cells import cells
+    from scenarios.sweep.cluster import cluster
     from scenarios.sweep.store import Store
 
     if seeds is not None:
         integer("--seeds", seeds, low=1, high=100_000)
-    if jobs is not None:
-        if scheduler is not None:
-            raise InputError("--jobs is for this machine, --scheduler for a cluster; give one")
-        integer("--jobs", jobs, low=1, high=1024)
+    if jobs is not None and scheduler is not None:
+        raise InputError("--jobs is for this machine, --scheduler for a cluster; give one")
+    workers = options.processes(jobs)
     if horizon is not None:
         number("--horizon [s]", horizon, above=0, high=MAX_TIME)
     check_apart({"FILE.toml": Path(what), "--out": out, "--export": export})
     if export is not None:
         check_table(export)
     experiments = _experiments(what, seeds, horizon)
-    with _executor(scheduler) as executor, Store(out) as store:
-        rows = _run(experiments, executor, jobs or os.cpu_count() or 1, store, out)
+    with (
+        nullcontext() if scheduler is None else cluster(scheduler) as executor,
+        Store(out) as store,
+    ):
+        rows = _run(experiments, executor, workers, store, out)
     averaged = cells(rows)
     show(sweep_table(averaged), sweep_notes(rows, averaged, experiments))
     typer.echo(f"  {len(rows)} runs in {out}")
@@ -139,33 +129,25 @@ def sweep(
 
 
 def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
-    """A study's, or those of a file; a word that is neither is taken for a study's name."""
+    """Those of a study or of a file; a word without a suffix that is no file names a study."""
     from scenarios.sweep.file import check_can_run, read_experiments
 
-    studies = (*PAPER, *STUDIES)
+    studies = ("paper", *STUDIES)
     if what in studies or not (Path(what).suffix or Path(what).exists()):
-        study = study_named(PAPER.get(name := choice("study", what, studies), name))
+        study = study_named("text" if what == "paper" else choice("study", what, studies))
         runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
-        found = [experiment for _, experiment in runs]
+        recipes = [recipe for _, recipe in runs]
     else:
-        found = read_experiments(what, seeds=seeds, horizon=horizon)
+        recipes = read_experiments(what, seeds=seeds, horizon=horizon)
     with bar("checking"):
-        check_can_run(found)
-    return found
-
-
-@contextmanager
-def _executor(scheduler: str | None) -> Iterator[Executor | None]:
-    from scenarios.sweep.cluster import cluster
-
-    with nullcontext() if scheduler is None else cluster(scheduler) as executor:
-        yield executor
+        check_can_run(recipes)
+    return recipes
 
 
 def _run(
     experiments: list[Recipe], executor: Executor | None, jobs: int, store: Store, out: Path
 ) -> pd.DataFrame:
-    """The rows in the order of the experiments, with a bar that tells of failures."""
+    """The rows in the order of the experiments, with a bar that counts failures."""
     import pandas as pd
 
     from scenarios.sweep.keys import key_of

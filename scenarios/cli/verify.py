@@ -4,35 +4,28 @@ from __future__ import annotations
 
 import typer
 
+from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.options import (
-    AsJson,
-    Bearings,
-    Order,
-    ProfileName,
-    ScenarioName,
-    Side,
-)
 from scenarios.cli.shared.proof import Plot, analysis_text, answer, claims_table, junction, names
 from scenarios.cli.shared.terminal import bar
 
 
 @app.command(
-    epilog="Exit code 1 where a claim is false. 6 arms take about 20 s.\n\n"
+    epilog="Exit code 1 if a claim is false. 6 arms take about 20 s.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim verify four-way\n\n"
     "minisim verify five-way --order lanes --plot verification.png"
 )
 def verify(
-    scenario: ScenarioName,
-    order: Order = "size",
-    bearings: Bearings = None,
-    side: Side = "left",
-    profile: ProfileName = "paper",
+    scenario: options.ScenarioName,
+    order: options.Order = "size",
+    bearings: options.Bearings = None,
+    side: options.Side = "left",
+    profile: options.ProfileName = "paper",
     plot: Plot = None,
-    as_json: AsJson = False,
+    as_json: options.AsJson = False,
 ) -> None:
-    """Try every case that a junction can decide: the paper's claims, one by one."""
+    """Check the paper's claims one by one, in every case that can occur at a junction."""
     from dim.proofs.verification import analyse, most_cliques
 
     what, matrix = junction(scenario, bearings, side, profile)

@@ -10,7 +10,7 @@ from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
-from scenarios.library import MAKERS, scenario_named
+from scenarios.library import MAKERS
 from scenarios.paper import (
     BASELINE_GRID,
     DENSITIES,
@@ -31,12 +31,12 @@ PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}
 #: Names of their junctions -> number of arms.
 JUNCTIONS: Final = {"three-way": 3, "four-way": 4, "five-way": 5}
 
-#: What a replay's mean travel time may differ by from the published one, by the controller's name
-#: in `reference.csv` [s]: what the parts of the published set-up that are not on record allow.
+#: How far a replay's mean travel time may be from the published one, by the controller's name in
+#: `reference.csv` [s]. Parts of the published set-up are not on record; this leaves room for them.
 TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 
-#: The same of DIM at 350 veh/h, where two vehicles of the published runs were teleported and the
-#: order of vehicles that came in the same second decides more [s].
+#: The same for DIM at 350 veh/h [s]. There, two vehicles of the published runs were teleported, and
+#: the order of vehicles that came in the same second decides more.
 TRAVEL_350: Final = 3.0
 
 #: The version of SUMO that is the other host, among those that minisim can drive like.
@@ -51,7 +51,7 @@ class Case:
     """One cell.
 
     Raises:
-        InputError: an unknown controller, or the published one is not to be had.
+        InputError: an unknown controller, or the published one cannot be made.
     """
 
     scenario: Scenario = part("junction, demand and profile", Scenario)
@@ -65,9 +65,9 @@ class Case:
         self.recipe()
 
     def recipe(self, seed: int = 0) -> Recipe:
-        """The run of one seed: a replay with the published vehicle has the published controller.
+        """The run of one seed; a replay with the published vehicle has the published controller.
 
-        Vehicles of the published runs do touch; all others must not.
+        Vehicles of the published runs do touch; in other runs that is an error.
         """
         if self.published is not None and self.same_law:
             controller = controller_of(*self.published)
@@ -78,7 +78,7 @@ class Case:
 
     @property
     def split(self) -> str:
-        """Of the demand, such as "4:3:2:1"; of a published run what its label says."""
+        """Of the demand, such as "4:3:2:1"; a published run has that of its label."""
         if self.published is not None:
             return self.published.split
         shares = self.scenario.demand.split
@@ -96,11 +96,11 @@ class Case:
 
     @property
     def same_law(self) -> bool:
-        """Whether SUMO moves the vehicles by the very law of minisim."""
+        """Whether SUMO moves the vehicles by the same law as minisim."""
         return self.scenario.profile.name.startswith(AS_RUN.name)
 
     def reference(self, metric: str, lane: str) -> float | None:
-        """The paper's mean [s]; None where it has none that the cell could be expected to give."""
+        """The paper's mean [s]; None where it has none that this cell should reproduce."""
         if not self.same_law or self.scenario.horizon != HOUR:
             return None
         who = PUBLISHED.get(self.controller)
@@ -113,7 +113,7 @@ class Case:
         return None if chosen.empty else float(chosen["value"].iloc[0])
 
     def reference_tolerance(self, metric: str) -> Tolerance | None:
-        """What a replay may differ from the published mean by; None for any other cell.
+        """How far a replay may be from the published mean; None for any other cell.
 
         Waiting 10 %; travel as in `TRAVEL` and `TRAVEL_350`.
         """
@@ -127,31 +127,6 @@ class Case:
         }.get(metric)
 
 
-def drawn_cases(
-    names: Sequence[str],
-    controllers: Sequence[str],
-    densities: Sequence[float],
-    splits: Sequence[str],
-    profile: str | Profile,
-    horizon: float,
-) -> list[Case]:
-    """Every junction × split × controller × density, arrivals drawn by seed.
-
-    Raises:
-        InputError: an unknown name, or an impossible demand.
-    """
-    return [
-        Case(
-            scenario_named(name, density=density, split=split, profile=profile, horizon=horizon),
-            controller,
-        )
-        for name in names
-        for split in splits
-        for controller in controllers
-        for density in densities
-    ]
-
-
 def replayed_cases(
     names: Sequence[str],
     controllers: Sequence[str],
@@ -163,10 +138,8 @@ def replayed_cases(
     """The published runs of these controllers, junctions, densities and splits; all where empty.
 
     Args:
-        names: of the junctions.
-        controllers: command-line names, of `PUBLISHED`.
-        densities: mean inflows a lane [veh/h].
-        splits: as the runs are labelled.
+        names, controllers: of junctions and controllers on the command line.
+        densities, splits: as the runs are labelled; densities are mean inflows a lane [veh/h].
         profile: None is each run's own vehicle, with the controller of the run; any other vehicle
             goes with the controller of that profile.
         horizon: simulated time [s].
@@ -176,10 +149,8 @@ def replayed_cases(
     """
     for split in splits:
         choice("split of a published run", split, SPLITS)
-    for name in names:
-        choice("junction of a published run", name, JUNCTIONS)
+    arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]
     ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
-    arms = [JUNCTIONS[name] for name in names] or list(MAKERS)
     cases = [
         Case(
             replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
@@ -188,7 +159,7 @@ def replayed_cases(
         )
         for cell in (*GRID, *BASELINE_GRID)
         if cell.controller in ran
-        and cell.arms in arms
+        and cell.arms in (arms or MAKERS)
         and cell.density in (densities or DENSITIES)
         and cell.split in (splits or SPLITS)
     ]

@@ -1,23 +1,22 @@
 """Two hosts on the same arrivals: how far their trips agree, and where they part.
 
-Differences are SUMO's value minus minisim's. A vehicle has the same index in both, for the arrival
-table is the same.
+Differences are SUMO's value minus minisim's. A vehicle has the same index in both hosts, because
+they get the same arrival table.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES, Bools, Movement
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS, METRICS
-from minisim.results.trajectories import TIME, VEHICLE, S
+from minisim.results.trajectories import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
 from minisim.results.trips import Trips
 from scenarios.statistics import Interval, ks_distance, mean_interval
 
@@ -30,10 +29,10 @@ CLOSE: Final = 0.1
 #: Two positions farther apart than this are not the same [m].
 APART: Final = 0.5
 
-#: A trip is judged by these two.
-JUDGED: Final = ("waiting_time_s", "travel_time_s")
+#: The metrics by which a trip is judged, and how a report calls them.
+JUDGED: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
 
-#: Decimals of a time [s]: more are rounding, and would tell equal waiting times apart.
+#: Decimals of a time [s]: more would tell equal waiting times apart by their rounding errors.
 DECIMALS: Final = 6
 
 
@@ -45,7 +44,7 @@ class Tolerance:
     absolute: float = 0.0
 
     def holds(self, value: float, difference: float) -> bool:
-        """Whether a value that differs so much is within; false for NaN."""
+        """Whether a value that differs this much is within; false for NaN."""
         return abs(difference) <= max(self.relative * abs(value), self.absolute)
 
     def __str__(self) -> str:
@@ -62,92 +61,66 @@ class Pair(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One metric of one lane.
+    """One metric of one lane, over all seeds; times in seconds."""
 
-    Attributes:
-        lane: "all" or a letter.
-        metric: one of `minisim.results.metrics.MEANS`.
-        trips: that ended, in minisim and in SUMO, over all seeds.
-        minisim, sumo: the mean over seeds of each run's mean [s].
-        difference: of the two means of a seed, mean over seeds [s].
-        ks: distance of the distributions of all trips; NaN where a host has none.
-        within: share of the trips that differ by less than `CLOSE`.
-    """
-
-    lane: str
-    metric: str
-    trips: tuple[int, int]
-    minisim: Interval
+    lane: str  # "all" or a letter
+    metric: str  # one of `minisim.results.metrics.MEANS`
+    trips: tuple[int, int]  # that ended, in minisim and in SUMO
+    minisim: Interval  # the mean over seeds of each run's mean
     sumo: Interval
-    difference: Interval
-    ks: float
-    within: float
+    difference: Interval  # of the two means of a seed, mean over seeds
+    ks: float  # distance of the distributions of all trips; NaN where a host has none
+    within: float  # share of the trips that differ by less than `CLOSE`
 
 
 class Divergence(NamedTuple):
-    """The first trip, in order of demand, that is not the same in both hosts.
-
-    Attributes:
-        seed: of the run.
-        vehicle: index into the trips.
-        movement: such as "a2".
-        depart: in minisim [s]; of the demand where it never got on the road.
-        end: when it had arrived in both [s]; the end of the run where it did not.
-        waiting, travel: in minisim and in SUMO [s], up to the end of the run.
-    """
+    """The first trip, in order of demand, that is not the same in both hosts; times in seconds."""
 
     seed: int
-    vehicle: int
-    movement: str
-    depart: float
-    end: float
-    waiting: tuple[float, float]
+    vehicle: int  # index into the trips
+    movement: str  # such as "a2"
+    depart: float  # in minisim; the time of its demand where it never got on the road
+    end: float  # when it had arrived in both; the end of the run where it did not
+    waiting: tuple[float, float]  # in minisim and in SUMO, up to the end of the run
     travel: tuple[float, float]
 
 
 class Parting(NamedTuple):
-    """The first moment at which a vehicle is at two places.
+    """The first moment at which a vehicle is at two places."""
 
-    Attributes:
-        time: [s].
-        vehicle: index into the trips.
-        positions: from the road entry, in minisim and in SUMO [m].
-        speeds: in minisim and in SUMO [m/s].
-    """
-
-    time: float
-    vehicle: int
-    positions: tuple[float, float]
-    speeds: tuple[float, float]
+    time: float  # [s]
+    vehicle: int  # index into the trips
+    movement: str  # such as "a2"
+    positions: tuple[float, float]  # from the road entry, in minisim and in SUMO [m]
+    speeds: tuple[float, float]  # in minisim and in SUMO [m/s]
+    minisim: pd.DataFrame  # trajectories around it (`Run.trajectories`)
+    sumo: pd.DataFrame
 
 
-def compare(pairs: Sequence[Pair], arms: int) -> list[Row]:
-    """Every metric of all lanes and of each; raises `InputError` without a pair."""
-    if not pairs:
-        raise InputError("a comparison needs at least one run that both hosts finished")
-    lanes: list[int | None] = [None, *range(arms)]
-    return [_row(pairs, lane, metric) for lane in lanes for metric in MEANS]
+def compare(pairs: Sequence[Pair], arms: int) -> tuple[Row, ...]:
+    """Every metric of all lanes and of each; nothing without a pair."""
+    lanes: list[int | None] = [None, *range(arms)] if pairs else []
+    return tuple(_row(pairs, lane, metric) for lane in lanes for metric in MEANS)
 
 
 def agreement(pairs: Sequence[Pair]) -> float:
     """Share of the trips whose waiting and travel time both differ by less than `CLOSE`."""
-    return _share(np.concatenate([_close(pair, JUDGED)[_ended(pair)] for pair in pairs]))
+    return _share([_close(pair, *JUDGED)[_ended(pair)] for pair in pairs])
 
 
 def first_divergence(pair: Pair) -> Divergence | None:
     """Where the trips of one seed begin to differ; None where none does."""
-    apart = np.flatnonzero(~_close(pair, JUDGED) & _ended(pair))
+    apart = np.flatnonzero(~_close(pair, *JUDGED) & _ended(pair))
     if not len(apart):
         return None
     k = int(apart[0])
     ours, theirs = pair.minisim, pair.sumo
-    arrivals = [t.arrival[k] if t.arrived[k] else t.end for t in (ours, theirs)]
     return Divergence(
         seed=pair.seed,
         vehicle=k,
         movement=str(Movement(int(ours.lane[k]), int(ours.manoeuvre[k]))),
         depart=float(ours.depart[k] if ours.departed[k] else ours.demand_time[k]),
-        end=float(max(arrivals)),
+        end=max(float(t.arrival[k]) if t.arrived[k] else t.end for t in (ours, theirs)),
         waiting=(float(ours.waiting_time[k]), float(theirs.waiting_time[k])),
         travel=(float(ours.travel_time[k]), float(theirs.travel_time[k])),
     )
@@ -156,10 +129,8 @@ def first_divergence(pair: Pair) -> Divergence | None:
 def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
     """The first of the common moments at which a vehicle's positions are more than `APART` apart.
 
-    Of several vehicles at that moment, the one that is farthest apart.
-
-    Args:
-        minisim, sumo: trajectories of the same run (`Run.trajectories`).
+    If several vehicles are at that moment, it is the one that is farthest apart. Both frames are
+    trajectories of the same run (`Run.trajectories`).
     """
     both = minisim.merge(sumo, on=[TIME, VEHICLE], suffixes=("", "_sumo"))
     both["apart"] = (both[S] - both[f"{S}_sumo"]).abs()
@@ -170,15 +141,18 @@ def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
     return Parting(
         time=float(row[TIME]),
         vehicle=int(row[VEHICLE]),
+        movement=f"{row[LANE]}{row[MANOEUVRE]}",
         positions=(float(row[S]), float(row[f"{S}_sumo"])),
-        speeds=(float(row["speed_mps"]), float(row["speed_mps_sumo"])),
+        speeds=(float(row[SPEED]), float(row[f"{SPEED}_sumo"])),
+        minisim=minisim,
+        sumo=sumo,
     )
 
 
 def times(trips: Trips, metric: str, lane: int | None = None) -> Floats:
     """A metric of the trips that ended [s], of one lane or of all."""
     chosen = trips.arrived if lane is None else trips.arrived & (trips.lane == lane)
-    return np.round(METRICS[metric].values(trips, len(chosen))[chosen], DECIMALS)
+    return np.asarray(METRICS[metric].of(trips)[chosen]).round(DECIMALS)
 
 
 def _row(pairs: Sequence[Pair], lane: int | None, metric: str) -> Row:
@@ -190,21 +164,20 @@ def _row(pairs: Sequence[Pair], lane: int | None, metric: str) -> Row:
         lane="all" if lane is None else ARM_NAMES[lane],
         metric=metric,
         trips=(len(pooled[0]), len(pooled[1])),
-        minisim=_interval(a for a, _ in means),
-        sumo=_interval(b for _, b in means),
-        difference=_interval(b - a for a, b in means),
+        minisim=_interval([a for a, _ in means]),
+        sumo=_interval([b for _, b in means]),
+        difference=_interval([b - a for a, b in means]),
         ks=ks_distance(*pooled) if all(map(len, pooled)) else math.nan,
-        within=_share(np.concatenate([_close(p, (metric,))[_ended(p, lane)] for p in pairs])),
+        within=_share([_close(pair, metric)[_ended(pair, lane)] for pair in pairs]),
     )
 
 
-def _interval(values: Iterator[float]) -> Interval:
-    data = list(values)
-    return mean_interval(map(float, data)) if data else Interval(math.nan, math.nan, 0)
+def _interval(values: Sequence[float]) -> Interval:
+    return mean_interval(map(float, values)) if values else Interval(math.nan, math.nan, 0)
 
 
-def _close(pair: Pair, metrics: Sequence[str]) -> Bools:
-    """Whether a trip is the same; what one that has not ended has gathered so far counts."""
+def _close(pair: Pair, *metrics: str) -> Bools:
+    """Whether a trip is the same, shape (k,); an unfinished one counts with its time so far."""
     differences = [np.abs(METRICS[m].of(pair.sumo) - METRICS[m].of(pair.minisim)) for m in metrics]
     return np.asarray(np.max(differences, axis=0) <= CLOSE + 10.0**-DECIMALS)
 
@@ -215,5 +188,6 @@ def _ended(pair: Pair, lane: int | None = None) -> Bools:
     return np.asarray(ended if lane is None else ended & (pair.minisim.lane == lane))
 
 
-def _share(values: Bools) -> float:
+def _share(parts: Sequence[Bools]) -> float:
+    values = np.concatenate(parts) if parts else np.empty(0)
     return float(values.mean()) if len(values) else math.nan

@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 from minisim.files import markdown_table, write_table, write_text
 from minisim.version import __version__
 from scenarios.crossval.cases import Case
-from scenarios.crossval.comparison import APART, CLOSE, Divergence, Row
-from scenarios.crossval.results import FEW, HOST_SHARE, HOST_TOLERANCES, Film, Result
+from scenarios.crossval.comparison import APART, CLOSE, JUDGED, Divergence, Parting, Row
+from scenarios.crossval.results import FEW, HOST_SHARE, HOST_TOLERANCES, Result
 from scenarios.statistics import Interval
 
 if TYPE_CHECKING:
     import pandas as pd
 
 CSV, REPORT = "crossval.csv", "crossval.md"
-
-#: Metric -> heading of its table.
-HEADINGS: Final = {"waiting_time_s": "Waiting time", "travel_time_s": "Travel time"}
 
 #: What a table shows where there is nothing to show.
 NOTHING: Final = "–"
@@ -29,16 +26,13 @@ NOTHING: Final = "–"
 def write_report(
     results: Sequence[Result], folder: Path, command: str, figures: Mapping[str, str]
 ) -> None:
-    """Write both files, each whole or not at all.
+    """Write both files, each whole or not at all; raises `FileError`.
 
     Args:
         results: of the comparison.
-        folder: where to; the figures are there already.
+        folder: to write to; the figures are already there.
         command: that makes the report again.
         figures: file name -> caption.
-
-    Raises:
-        FileError: a file cannot be written.
     """
     write_table(table(results), folder / CSV)
     write_text(folder / REPORT, markdown(results, command, figures))
@@ -55,53 +49,43 @@ def table(results: Sequence[Result]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows = [row for result in results for row in _rows(result)]
-    return pd.DataFrame(rows, columns=list(dict.fromkeys(key for row in rows for key in row)))
+    return pd.DataFrame([row for result in results for row in _rows(result)])
 
 
 def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]) -> str:
     """The report: tolerances, tables, where the hosts part, failed runs, figures."""
     versions = sorted({result.sumo for result in results if result.sumo})
-    lines = [
-        "# minisim, SUMO and the paper on common arrivals",
-        "",
-        f"minisim {__version__}, {', '.join(versions) or 'SUMO did not run'}. Made by:",
-        "",
-        f"```sh\n{command}\n```",
-        "",
-        *_tolerances(),
-        "",
-        "## Verdict",
-        "",
-        _verdicts(results),
-    ]
-    for metric, heading in HEADINGS.items():
-        lines += ["", f"## {heading} [s]", "", _means(results, metric)]
     replays = [result for result in results if result.meets_paper("minisim") is not None]
-    if replays:
-        lines += ["", "## Against the paper [s]", "", _replays(replays)]
-    lines += ["", "## Where the hosts part", "", *_partings(results)]
     failures = [
         (result.case.name, failure.host, str(failure.seed), failure.error)
         for result in results
         for failure in result.failures
     ]
-    if failures:
-        failed = markdown_table(("cell", "host", "seed", "error"), failures, words=(0, 1, 3))
-        lines += ["", "## Runs that failed", "", failed]
-    lines += ["", "## Figures", ""]
-    for name, caption in figures.items():
-        lines += [f"![{caption}]({name})", "", f"{caption}.", ""]
-    lines += ["## By lane [s]", "", _lanes(results), ""]
-    return "\n".join(lines)
+    parts = {
+        "Verdict": _verdicts(results),
+        **{f"{heading} [s]": _means(results, metric) for metric, heading in JUDGED.items()},
+        "Against the paper [s]": _replays(replays) if replays else "",
+        "Where the hosts part": _partings(results),
+        "Runs that failed": failures
+        and markdown_table(("cell", "host", "seed", "error"), failures, words=(0, 1, 3)),
+        "Figures": "\n\n".join(f"![{text}]({name})\n\n{text}." for name, text in figures.items()),
+        "By lane [s]": _lanes(results),
+    }
+    return "\n\n".join([
+        "# minisim, SUMO and the paper on common arrivals",
+        f"minisim {__version__}, {', '.join(versions) or 'SUMO did not run'}. Made by:",
+        f"```sh\n{command}\n```",
+        *_tolerances(),
+        *(f"## {title}\n\n{text}".rstrip() for title, text in parts.items() if text),
+    ]) + "\n"  # fmt: skip
 
 
 def summary(results: Sequence[Result]) -> str:
     """How many cells agree, in one line."""
     verdicts = [result.hosts_agree for result in results if result.hosts_agree is not None]
-    text = f"{sum(verdicts)} of {len(verdicts)} cells: both hosts agree within the tolerances"
-    if not verdicts:
-        text = "no cell could be compared"
+    text = "no cell could be compared"
+    if verdicts:
+        text = f"{sum(verdicts)} of {len(verdicts)} cells: both hosts agree within the tolerances"
     for host, name in (("minisim", "minisim"), ("sumo", "SUMO")):
         judged = [met for result in results if (met := result.meets_paper(host)) is not None]
         if judged:
@@ -117,36 +101,8 @@ def summary(results: Sequence[Result]) -> str:
 
 def _rows(result: Result) -> Iterator[dict[str, Any]]:
     case = result.case
-    for row in result.rows:
-        yield {
-            **_identity(case),
-            "lane": row.lane,
-            "metric": row.metric,
-            "host": None,
-            "seed": None,
-            "seeds": len(result.pairs),
-            "trips_minisim": row.trips[0],
-            "trips_sumo": row.trips[1],
-            "minisim": row.minisim.mean,
-            "minisim_ci95": row.minisim.half_width,
-            "sumo": row.sumo.mean,
-            "sumo_ci95": row.sumo.half_width,
-            "difference": row.difference.mean,
-            "difference_ci95": row.difference.half_width,
-            "ks": row.ks,
-            "within": row.within,
-            "collisions_minisim": result.collisions[0],
-            "collisions_sumo": result.collisions[1],
-            "published": case.reference(row.metric, row.lane),
-            "error": None,
-        }
-    for failure in result.failures:
-        yield {**_identity(case), **failure._asdict()}
-
-
-def _identity(case: Case) -> dict[str, Any]:
     scenario = case.scenario
-    return {
+    cell = {
         "controller": case.controller,
         "scenario": scenario.name,
         "arms": scenario.intersection.n,
@@ -156,28 +112,38 @@ def _identity(case: Case) -> dict[str, Any]:
         "arrivals": "drawn" if case.published is None else "published",
         "horizon_s": scenario.horizon,
     }
+    for row in result.rows:
+        means = {}
+        for what in ("minisim", "sumo", "difference"):
+            means[what], means[f"{what}_ci95"], _ = getattr(row, what)
+        yield {
+            **cell, "lane": row.lane, "metric": row.metric, "host": None, "seed": None,
+            "seeds": len(result.pairs), "trips_minisim": row.trips[0], "trips_sumo": row.trips[1],
+            **means, "ks": row.ks, "within": row.within,
+            "collisions_minisim": result.collisions[0], "collisions_sumo": result.collisions[1],
+            "published": _published(case, row), "error": None,
+        }  # fmt: skip
+    for failure in result.failures:
+        yield {**cell, **failure._asdict()}
 
 
-def _tolerances() -> list[str]:
+def _tolerances() -> tuple[str, ...]:
     hosts = ", ".join(
-        f"mean {HEADINGS[metric].lower()} {tolerance}"
-        for metric, tolerance in HOST_TOLERANCES.items()
+        f"mean {JUDGED[name].lower()} {tolerance}" for name, tolerance in HOST_TOLERANCES.items()
     )
-    return [
+    return (
         "Means are over the trips that ended before the horizon, as SUMO and the paper count them; "
         "± is half a 95 % interval over seeds; a difference is SUMO − minisim, paired by seed (the "
         "arrivals are the same); KS is the largest distance between the two distributions of a "
         "trip's time (0 the same, 1 apart).",
-        "",
         f"The hosts agree when, each with its own car following, they differ by at most: {hosts}; "
         f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
         "the paper when mean waiting is within 10 % of the published number, and mean travel "
         "within 0.5 s (DIM; at 350 veh/h within 3 s), 1 s (V2I-C) or 2 s (signals).",
-        "",
         f"{NOTHING} is no verdict: no run of the cell ended well in both hosts, or no trip did. "
         f"Verdicts over fewer than {FEW} trips are marked: one trip may decide them.",
-    ]
+    )
 
 
 def _verdicts(results: Sequence[Result]) -> str:
@@ -204,11 +170,7 @@ def _verdicts(results: Sequence[Result]) -> str:
 def _means(results: Sequence[Result], metric: str) -> str:
     return markdown_table(
         ("cell", "minisim", "SUMO", "difference", "KS", "published"),
-        (
-            (result.case.name, *_cells(result.case, result.row(metric)))
-            for result in results
-            if result.rows
-        ),
+        ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows),
     )
 
 
@@ -220,22 +182,20 @@ def _replays(results: Sequence[Result]) -> str:
          "same", "met"),
         (
             (
-                result.case.controller,
-                str(result.case.scenario.intersection.n),
-                result.case.split,
-                f"{result.case.density:g}",
+                case.controller,
+                str(case.scenario.intersection.n),
+                case.split,
+                f"{case.density:g}",
                 *(
                     _number(value)
-                    for metric in HEADINGS
-                    for row in [result.row(metric)]
-                    for value in (
-                        row.minisim.mean, row.sumo.mean, result.case.reference(metric, "all")
-                    )
+                    for row in map(result.row, JUDGED)
+                    for value in (row.minisim.mean, row.sumo.mean, _published(case, row))
                 ),
                 _share(result.agreement),
                 _yes(result.meets_paper("minisim")),
             )
             for result in results
+            for case in [result.case]
         ),
         words=(0, 2, 11),
     )  # fmt: skip
@@ -248,63 +208,65 @@ def _lanes(results: Sequence[Result]) -> str:
             (
                 result.case.name,
                 row.lane,
-                HEADINGS[row.metric].lower(),
+                JUDGED[row.metric].lower(),
                 " / ".join(map(str, row.trips)),
                 *_cells(result.case, row),
             )
             for result in results
             for row in result.rows
-            if row.lane != "all" and row.metric in HEADINGS
+            if row.lane != "all" and row.metric in JUDGED
         ),
         words=(0, 1, 2),
     )
 
 
 def _cells(case: Case, row: Row) -> tuple[str, ...]:
-    return (
-        *map(_interval, (row.minisim, row.sumo, row.difference)),
-        _number(row.ks, 3),
-        _number(case.reference(row.metric, row.lane)),
-    )
+    means = map(_interval, (row.minisim, row.sumo, row.difference))
+    return *means, _number(row.ks, 3), _number(_published(case, row))
 
 
-def _partings(results: Sequence[Result]) -> list[str]:
-    apart = [(result, result.divergence) for result in results if result.divergence is not None]
+def _published(case: Case, row: Row) -> float | None:
+    return case.reference(row.metric, row.lane)
+
+
+def _partings(results: Sequence[Result]) -> str:
     same = [result.case.name for result in results if result.rows and result.divergence is None]
-    lines = [f"No trip differs: {', '.join(same)}.", ""] if same else []
-    if not apart:
-        return lines
-    return [
-        *lines,
-        "The first trip, in order of demand, whose waiting or travel time differs by more than "
-        f"{CLOSE:g} s; and the first vehicle, from half a minute before it came on the road on, "
-        f"that is more than {APART:g} m from where the other host has it.",
-        "",
-        markdown_table(
-            ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",
-             "travel minisim / SUMO", "first apart", "where minisim / SUMO [m]",
-             "speed minisim / SUMO [m/s]"),
-            ((result.case.name, *_parting(found, result.film)) for result, found in apart),
-            words=(0, 2, 5),
-        ),
-    ]  # fmt: skip
+    apart = [
+        (result.case.name, *_trip(result.divergence), *_moment(result.parting))
+        for result in results
+        if result.divergence is not None
+    ]
+    parts = [f"No trip differs: {', '.join(same)}."] if same else []
+    if apart:
+        parts += [
+            "The first trip, in order of demand, whose waiting or travel time differs by more than "
+            f"{CLOSE:g} s; and, from half a minute before that vehicle came on the road, the first "
+            f"vehicle that is more than {APART:g} m from where the other host has it.",
+            markdown_table(
+                ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",
+                 "travel minisim / SUMO", "first apart", "where minisim / SUMO [m]",
+                 "speed minisim / SUMO [m/s]"),
+                apart,
+                words=(0, 2, 5),
+            ),
+        ]  # fmt: skip
+    return "\n\n".join(parts)
 
 
-def _parting(found: Divergence, film: Film | None) -> tuple[str, ...]:
-    first = (
-        str(found.seed),
-        f"vehicle {found.vehicle} ({found.movement}), on the road from {found.depart:.2f} s",
-        f"{found.waiting[0]:.2f} / {found.waiting[1]:.2f}",
-        f"{found.travel[0]:.2f} / {found.travel[1]:.2f}",
-    )
-    if film is None or (parting := film.parting) is None:
-        return *first, NOTHING, NOTHING, NOTHING
-    return (
-        *first,
-        f"vehicle {parting.vehicle} ({film.movement}) at {parting.time:.2f} s",
-        f"{parting.positions[0]:.2f} / {parting.positions[1]:.2f}",
-        f"{parting.speeds[0]:.2f} / {parting.speeds[1]:.2f}",
-    )
+def _trip(first: Divergence) -> tuple[str, ...]:
+    which = f"vehicle {first.vehicle} ({first.movement}), on the road from {first.depart:.2f} s"
+    return str(first.seed), which, _both(first.waiting), _both(first.travel)
+
+
+def _moment(parting: Parting | None) -> tuple[str, ...]:
+    if parting is None:
+        return NOTHING, NOTHING, NOTHING
+    which = f"vehicle {parting.vehicle} ({parting.movement}) at {parting.time:.2f} s"
+    return which, _both(parting.positions), _both(parting.speeds)
+
+
+def _both(values: tuple[float, float]) -> str:
+    return f"{values[0]:.2f} / {values[1]:.2f}"
 
 
 def _interval(interval: Interval) -> str:

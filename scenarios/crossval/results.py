@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from functools import cached_property
+from typing import Final, NamedTuple
 
 from scenarios.crossval.cases import Case
-from scenarios.crossval.comparison import Divergence, Pair, Parting, Row, Tolerance
-
-if TYPE_CHECKING:
-    import pandas as pd
+from scenarios.crossval.comparison import (
+    Divergence,
+    Pair,
+    Parting,
+    Row,
+    Tolerance,
+    agreement,
+    compare,
+    first_divergence,
+)
 
 #: What the means of the two hosts may differ by where each has its own car following.
 HOST_TOLERANCES: Final = {
@@ -19,8 +26,8 @@ HOST_TOLERANCES: Final = {
 #: Share of the trips that must be the same where both hosts have the same car following.
 HOST_SHARE: Final = 0.9
 
-#: Trips below which a verdict says little: one that takes twice the mean moves a mean of 30 by
-#: 3 %, which is all that travel times may differ by.
+#: With fewer trips than this a verdict says little: one trip that takes twice the mean moves a
+#: mean of 30 by 3 %, which is all that travel times may differ by.
 FEW: Final = 30
 
 
@@ -33,46 +40,30 @@ class Failure(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
-    """Trajectories of both hosts around the first trip that differs.
-
-    Attributes:
-        minisim, sumo: trajectories.
-        parting: where they part; None where no vehicle does while it is recorded.
-        movement: of the vehicle that parts.
-    """
-
-    minisim: pd.DataFrame
-    sumo: pd.DataFrame
-    parting: Parting | None
-    movement: str
-
-
-@dataclass(frozen=True, eq=False)
 class Result:
-    """What a case gave.
-
-    Attributes:
-        case: the case.
-        pairs: the seeds that both hosts finished.
-        rows: the statistics; empty without a pair.
-        agreement: share of the trips that are the same; NaN without a pair.
-        collisions: in minisim and in SUMO, over the pairs.
-        failures: the runs that failed.
-        sumo: version of SUMO, empty where it did not run.
-        divergence: the first trip of the first pair that differs; None where none does.
-        film: what led to it; None until it is recorded.
-    """
+    """What a case gave."""
 
     case: Case
-    pairs: tuple[Pair, ...]
-    rows: tuple[Row, ...]
-    agreement: float
-    collisions: tuple[int, int]
-    failures: tuple[Failure, ...]
-    sumo: str
-    divergence: Divergence | None
-    film: Film | None = None
+    pairs: tuple[Pair, ...] = ()  # the seeds that both hosts finished
+    collisions: tuple[int, int] = (0, 0)  # in minisim and in SUMO, over the runs that ended well
+    failures: tuple[Failure, ...] = ()
+    sumo: str = ""  # its version; empty where it did not run
+    parting: Parting | None = None  # None where a second run saw none, or was not made
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The statistics; empty without a pair."""
+        return compare(self.pairs, self.case.scenario.intersection.n)
+
+    @cached_property
+    def agreement(self) -> float:
+        """Share of the trips that are the same; NaN without a pair."""
+        return agreement(self.pairs)
+
+    @cached_property
+    def divergence(self) -> Divergence | None:
+        """The first trip of the first pair that differs; None where none does."""
+        return first_divergence(self.pairs[0]) if self.pairs else None
 
     def row(self, metric: str, lane: str = "all") -> Row:
         """The statistics of a metric and lane."""
@@ -90,9 +81,10 @@ class Result:
 
     @property
     def hosts_agree(self) -> bool | None:
-        """Whether the hosts agree within the stated tolerances; None: nothing to judge by.
+        """Whether the hosts agree within the stated tolerances.
 
-        That is so where no seed was finished by both, or no trip ended in either.
+        None where there is nothing to judge by: no seed was finished by both hosts, or no trip
+        ended in either.
         """
         if not any(self.trips):
             return None
@@ -104,7 +96,7 @@ class Result:
         )
 
     def meets_paper(self, host: str) -> bool | None:
-        """Whether a host's means are within the tolerances of the published ones; None: no such."""
+        """Whether a host's means are within the tolerances of the published ones, if there are."""
         judged = [
             tolerance.holds(value, getattr(self.row(metric), host).mean - value)
             for metric in HOST_TOLERANCES

@@ -3,36 +3,36 @@
 from __future__ import annotations
 
 import importlib.metadata
-import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+
+import numpy as np
 
 from minisim.errors import MinisimError
+from minisim.files import make_folder, replacing
 from minisim.results.trajectories import LANE, MANOEUVRE, SPEED, TIME, VEHICLE, S
+from minisim.results.trips import Trips
 from scenarios.crossval.cases import Case
-from scenarios.crossval.comparison import (
-    Divergence,
-    Pair,
-    agreement,
-    compare,
-    first_divergence,
-    first_parting,
-)
-from scenarios.crossval.outcome import Outcome, kept_file, read_outcome, write_outcome
-from scenarios.crossval.results import Failure, Film, Result
+from scenarios.crossval.comparison import Divergence, Pair, first_parting
+from scenarios.crossval.results import Failure, Result
 from scenarios.recipe import Host
-from scenarios.sweep.pool import given, pooled, processes
+from scenarios.sweep.keys import description_of, digest_of, results_version
+from scenarios.sweep.pool import pooled, processes
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from minisim.results.run import Run, ScenarioLike
 
-HOSTS: Final = ("minisim", "sumo")
+#: Host -> where its `simulate` is, imported when it is needed.
+HOSTS: Final = {"minisim": "minisim.simulation", "sumo": "minisim.sumo"}
+
+#: Folder of SUMO's kept runs, inside that of the report; they take nearly all the time.
+KEPT: Final = "sumo"
 
 #: Recorded before the departure of the first trip that differs, and after its arrival [s].
 BEFORE, AFTER = 30.0, 5.0
@@ -42,61 +42,56 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 
+class _Outcome(NamedTuple):
+    """What a run gave; `sumo` is the version of SUMO, empty for the other host."""
+
+    trips: Trips
+    collisions: int
+    sumo: str
+
+
 def crossvalidate(
     cases: Sequence[Case],
     seeds: Sequence[int],
-    executor: Executor | None = None,
+    jobs: int = 1,
     progress: Progress | None = None,
     folder: Path | None = None,
-    *,
-    jobs: int = 1,
 ) -> list[Result]:
     """Run every case with every seed in both hosts, and compare.
 
-    A run that fails becomes a `Failure` of its case. Replays have one run: their arrivals are not
-    drawn.
+    A run that fails becomes a `Failure` of its case; one whose process dies is tried once more.
+    Replays have one run: their arrivals are not drawn.
 
     Args:
-        cases, seeds: what to run.
-        executor: runs it; None is a pool of processes, in which a run whose process dies is tried
-            once more.
+        cases, seeds, jobs: what to run, and in how many processes.
         progress: called with the number of runs done and of all.
-        folder: where SUMO's runs are kept and found again; None runs them all.
-        jobs: processes of the pool.
+        folder: where SUMO's runs are kept and looked for; None runs them all.
     """
     runs = [
-        [
-            (case, host, seed, folder)
-            for seed in (seeds if case.published is None else [0])
-            for host in HOSTS
-        ]
+        (
+            case,
+            [(host, seed) for seed in (seeds if case.published is None else [0]) for host in HOSTS],
+        )
         for case in cases
     ]
-    tasks = [run for of_case in runs for run in of_case]
-    outcomes = iter(_gather(_run, tasks, executor, jobs, progress))
-    return [
-        _result(case, {run[1:3]: next(outcomes) for run in of_case})
-        for case, of_case in zip(cases, runs, strict=True)
-    ]
+    tasks = [(case, host, seed, folder) for case, todo in runs for host, seed in todo]
+    outcomes = iter(_gather(_run, tasks, jobs, progress))
+    return [_result(case, {run: next(outcomes) for run in todo}) for case, todo in runs]
 
 
 def film(
-    results: Sequence[Result],
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    *,
-    jobs: int = 1,
+    results: Sequence[Result], jobs: int = 1, progress: Progress | None = None
 ) -> list[Result]:
-    """Add the trajectories around the first trip that differs, from a second, shorter run."""
+    """Add where the hosts part, from a second, shorter run around the first trip that differs."""
     tasks = [
         (result.case, host, result.divergence)
         for result in results
         if result.divergence is not None
         for host in HOSTS
     ]
-    frames = iter(_gather(_record, tasks, executor, jobs, progress))
+    frames = iter(_gather(_record, tasks, jobs, progress))
     return [
-        result if result.divergence is None else _filmed(result, next(frames), next(frames))
+        result if result.divergence is None else _parted(result, next(frames), next(frames))
         for result in results
     ]
 
@@ -111,65 +106,62 @@ class _Excerpt:
         return getattr(self._scenario, name)
 
 
-def _run(task: tuple[Case, str, int, Path | None]) -> Outcome:
+def _run(task: tuple[Case, str, int, Path | None]) -> _Outcome:
     case, host, seed, folder = task
-    if folder is None or host != HOSTS[1]:
-        return _outcome(case, host, seed)
-    file = kept_file(folder, case, seed, importlib.metadata.version("libsumo"))
-    kept = read_outcome(file)
-    if kept is None:
-        kept = _outcome(case, host, seed)
-        write_outcome(file, kept)
-    return kept
+    recipe = case.recipe(seed)
+    file = None
+    if folder is not None and host == "sumo":
+        version = importlib.metadata.version("libsumo")
+        key = digest_of("\n".join([description_of(recipe), results_version(), version]))
+        file = folder / KEPT / f"{key[:24]}.npz"
+        if kept := _read(file):
+            return kept
+    run = recipe.run(_host(host))
+    outcome = _Outcome(run.counted, len(run.collisions), run.host.get("sumo", ""))
+    if file is not None:
+        make_folder(file.parent)
+        with replacing(file) as part:
+            np.savez_compressed(
+                part, collisions=outcome.collisions, sumo=outcome.sumo, **run.counted._asdict()
+            )
+    return outcome
 
 
-def _outcome(case: Case, host: str, seed: int) -> Outcome:
+def _read(file: Path) -> _Outcome | None:
+    """A run that was kept; None where it is not there, or not whole."""
     try:
-        run = case.recipe(seed).run(_host(host))
-    except MinisimError as error:
-        return Outcome(error=str(error))
-    return Outcome(run.counted, len(run.collisions), run.host.get("sumo", ""))
+        with np.load(file, allow_pickle=False) as data:
+            columns = {name: data[name] for name in Trips._fields}
+            columns |= {name: float(columns[name]) for name in ("end", "start")}
+            return _Outcome(Trips(**columns), int(data["collisions"]), str(data["sumo"]))
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+        return None
 
 
 def _record(task: tuple[Case, str, Divergence]) -> pd.DataFrame:
     case, host, divergence = task
     end = min(divergence.end + AFTER, case.scenario.horizon)
     window = (max(0.0, divergence.depart - BEFORE), end)
-    simulate = _host(host)
 
     def excerpt(scenario: ScenarioLike, *rest: Any, **options: Any) -> Run:
-        return simulate(_Excerpt(scenario, end), *rest, **options)
+        return _host(host)(_Excerpt(scenario, end), *rest, **options)
 
     run = case.recipe(divergence.seed).run(excerpt, record="all", record_window=window)
     return run.trajectories[[TIME, VEHICLE, LANE, MANOEUVRE, S, SPEED]]
 
 
 def _host(name: str) -> Host:
-    if name == "minisim":
-        from minisim.simulation import simulate
-
-        return simulate
-    from minisim.sumo import simulate as simulate_in_sumo
-
-    return simulate_in_sumo
+    simulate: Host = importlib.import_module(HOSTS[name]).simulate
+    return simulate
 
 
 def _gather(
-    function: Callable[[Task], Answer],
-    tasks: Sequence[Task],
-    executor: Executor | None,
-    jobs: int,
-    progress: Progress | None,
+    function: Callable[[Task], Answer], tasks: Sequence[Task], jobs: int, progress: Progress | None
 ) -> list[Answer | BaseException]:
     """The function's answers in the order of the tasks; in place of one, what was raised."""
-    todo = dict(enumerate(tasks))
-    if executor is None:
-        # A process also where there is one: a thread could not be ended amid an hour in SUMO.
-        results = pooled(function, todo, jobs, pool_of=processes)
-    else:
-        results = given(function, todo, executor)
     answers: dict[int, Answer | BaseException] = {}
-    with closing(results):
+    # Processes even with one job: a thread could not be ended during an hour in SUMO.
+    with closing(pooled(function, dict(enumerate(tasks)), jobs, pool_of=processes)) as results:
         for k, answer in results:
             answers[k] = answer
             if progress is not None:
@@ -177,52 +169,39 @@ def _gather(
     return [answers[k] for k in range(len(tasks))]
 
 
-def _result(case: Case, outcomes: dict[tuple[str, int], Outcome | BaseException]) -> Result:
-    ended = {
-        run: Outcome(error=_reason(made)) if isinstance(made, BaseException) else made
-        for run, made in outcomes.items()
-    }
-    both = [
-        (seed, ended[HOSTS[0], seed], made) for (h, seed), made in ended.items() if h == HOSTS[1]
-    ]
-    pairs = tuple(
-        Pair(seed, ours.trips, theirs.trips)
-        for seed, ours, theirs in both
-        if ours.trips is not None and theirs.trips is not None
+def _result(case: Case, outcomes: Mapping[tuple[str, int], _Outcome | BaseException]) -> Result:
+    good = {run: made for run, made in outcomes.items() if not isinstance(made, BaseException)}
+    ours, theirs = (
+        {seed: made for (host, seed), made in good.items() if host == which} for which in HOSTS
     )
     return Result(
         case=case,
-        pairs=pairs,
-        rows=tuple(compare(pairs, case.scenario.intersection.n)) if pairs else (),
-        agreement=agreement(pairs) if pairs else math.nan,
-        collisions=(sum(o.collisions for _, o, _ in both), sum(o.collisions for _, _, o in both)),
-        failures=tuple(
-            Failure(host, seed, made.error) for (host, seed), made in ended.items() if made.error
+        pairs=tuple(
+            Pair(seed, ours[seed].trips, theirs[seed].trips) for seed in ours if seed in theirs
         ),
-        sumo=next((made.sumo for made in ended.values() if made.sumo), ""),
-        divergence=first_divergence(pairs[0]) if pairs else None,
+        collisions=(
+            sum(made.collisions for made in ours.values()),
+            sum(made.collisions for made in theirs.values()),
+        ),
+        failures=_failures(outcomes),
+        sumo=next((made.sumo for made in theirs.values()), ""),
     )
 
 
-def _filmed(
+def _parted(
     result: Result, minisim: pd.DataFrame | BaseException, sumo: pd.DataFrame | BaseException
 ) -> Result:
     if isinstance(minisim, BaseException) or isinstance(sumo, BaseException):
-        made = dict(zip(HOSTS, (minisim, sumo), strict=True))
-        failed = tuple(
-            Failure(host, result.pairs[0].seed, f"recording again: {_reason(error)}")
-            for host, error in made.items()
-            if isinstance(error, BaseException)
-        )
+        seed = result.pairs[0].seed
+        failed = _failures({("minisim", seed): minisim, ("sumo", seed): sumo}, "recording again: ")
         return replace(result, failures=result.failures + failed)
-    parting = first_parting(minisim, sumo)
-    movement = ""
-    if parting is not None:
-        who = minisim[minisim[VEHICLE] == parting.vehicle].iloc[0]
-        movement = f"{who[LANE]}{who[MANOEUVRE]}"
-    return replace(result, film=Film(minisim, sumo, parting, movement))
+    return replace(result, parting=first_parting(minisim, sumo))
 
 
-def _reason(error: BaseException) -> str:
-    kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
-    return f"{kind}{error}"
+def _failures(made: Mapping[tuple[str, int], object], doing: str = "") -> tuple[Failure, ...]:
+    failures = []
+    for (host, seed), error in made.items():
+        if isinstance(error, BaseException):
+            kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
+            failures.append(Failure(host, seed, f"{doing}{kind}{error}"))
+    return tuple(failures)

@@ -1,7 +1,8 @@
-"""Questions and their answers, one module a study: which runs, and what their rows say.
+"""Questions and their answers, one module a study: its runs, and what it computes from them.
 
-A module exports its `STUDY`; the module of the same name in `figures.studies` draws it. What they
-share is in `shared`. A new study is named in `NAMES`: lists, help texts and the report follow it.
+A module exports its `STUDY`; the module of the same name in `figures.studies` draws it. What
+several studies need is in `shared`. Add a new study to `NAMES`: lists, help texts and the report
+follow it.
 """
 
 from __future__ import annotations
@@ -14,22 +15,22 @@ from minisim.errors import choice
 if TYPE_CHECKING:
     from scenarios.studies.shared.study import Study
 
-#: Every study, in the order in which they are run and reported.
+#: Every study, in the order of runs and of the report.
 NAMES = (
     "text", "as-run", "fair", "gate", "capacity", "fairness", "humans", "perception", "confidence",
 )  # fmt: skip
 
-#: Those that choose experiments by the results of others, and so have no list of them.
+#: Studies that choose runs by the results of earlier ones, and so have no list of them.
 SEARCHES = ("capacity",)
 
 
 def study_named(name: str) -> Study:
-    """A study by name; raises `InputError` with the nearest one."""
+    """A study by name; `InputError` names the nearest one."""
     choice("study", name, NAMES)
     study: Study = import_module(f"scenarios.studies.{module_name(name)}").STUDY
     return study
 
 
 def module_name(study: str) -> str:
-    """What the modules of a study are called, here and in `figures.studies`."""
+    """The name of a study's modules, here and in `figures.studies`."""
     return study.replace("-", "_")

@@ -11,14 +11,7 @@ from scenarios.studies.shared.study import Study
 
 
 class PublishedPoint(NamedTuple):
-    """A published run, also where that is not what its label says.
-
-    Attributes:
-        series: its controller, by our name.
-        arms: of the junction.
-        split: of the inflow over the lanes.
-        density: mean inflow a lane [veh/h].
-    """
+    """A published run, even where it is not what its label says; fields as in `ControllerPoint`."""
 
     series: str
     arms: int
@@ -26,7 +19,7 @@ class PublishedPoint(NamedTuple):
     density: float
 
     def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
-        """The run of one seed; collisions are counted, for some published rules have them."""
+        """The run of one seed. Collisions are counted: some published rules have them."""
         name = {ours: theirs for theirs, ours in SERIES.items()}[self.series]
         cell = Cell(self.split, int(self.density), self.arms, name)
         return Recipe(
@@ -36,18 +29,18 @@ class PublishedPoint(NamedTuple):
 
     @property
     def where(self) -> str:
-        """What tells it from other points of its series, but for the demand."""
+        """What sets it apart from other points of its series, besides demand."""
         return f"{self.arms} arms, {self.split}"
 
 
 STUDY = Study(
     "as-run",
-    "What do the rules and vehicles that produced the published numbers give?",
+    "What do the rules and vehicles behind the published numbers give?",
     tuple(
         PublishedPoint(SERIES[cell.controller], cell.arms, cell.split, float(cell.density))
         for cell in (*GRID, *BASELINE_GRID)
     ),
-    # The published V2I-C decides every 0.01 s and costs some 20 s of CPU a simulated hour, a
-    # hundred times a signal; its runs differ little.
+    # The published V2I-C decides every 0.01 s. A simulated hour costs some 20 s of CPU, a hundred
+    # times that of a signal, and its runs differ little.
     {"v2ic": 3},
 )

@@ -1,10 +1,9 @@
 """Capacity: the largest demand that is served without a growing queue, by bisection.
 
-A run serves its demand when the number of vehicles that are there (on the road or before it)
-grows by less than `TOLERANCE` of what arrives meanwhile. That is asked of each seed for itself,
-so that the capacities of the seeds have a mean and an interval. Near capacity a queue wanders:
-single hours of a signal tell its capacity with a standard deviation of 4 %, and the tolerance adds
-its 2 %.
+A run serves its demand when the number of vehicles on the road or before it grows by less than
+`TOLERANCE` of the arrivals meanwhile. Each seed has its own bisection, so that capacities have a
+mean and an interval. Near capacity a queue wanders: single hours of a signal give its capacity
+with a standard deviation of 4 %, and the tolerance adds its 2 %.
 """
 
 from __future__ import annotations
@@ -27,21 +26,15 @@ if TYPE_CHECKING:
 #: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
 TOLERANCE = 0.02
 
-#: Arms of the junctions.
-ARMS = (3, 4, 5, 6)
-
 
 @dataclass(frozen=True)
 class CapacityStudy(Study):
-    """Bisects the demand of every point, which is replaced, for each seed of a search."""
+    """Bisects demand at every point, with each seed of the search; a point's own is not used."""
 
     points: tuple[ControllerPoint, ...]
 
     def collect(self, effort: Effort, find: Find) -> Results:
-        """All points at once: each round asks `find` one list.
-
-        A point with a run that is missing or failed is not asked for again.
-        """
+        """One list for `find` each round; a point with a missing or failed run is given up."""
         search = effort.search
         brackets = {
             (point, seed): (0, search.steps)
@@ -56,31 +49,30 @@ class CapacityStudy(Study):
             }
             rows = find([probe.recipe(seed, search.horizon) for (_, seed), probe in probes.items()])
             asked += zip(probes.values(), rows, strict=True)
-            for (key, (low, high)), row in zip([*brackets.items()], rows, strict=True):
+            lost = set()
+            for key, row in zip(probes, rows, strict=True):
+                low, high = brackets[key]
                 middle = (low + high) // 2
-                if row is not None and not row["error"]:
+                if row is None or row["error"]:
+                    lost.add(key[0])
+                else:
                     brackets[key] = (low, middle) if grows(row) else (middle, high)
-            lost = {
-                point
-                for (point, _), row in zip(probes, rows, strict=True)
-                if row is None or row["error"]
-            }
             brackets = {key: each for key, each in brackets.items() if key[0] not in lost}
         return Results.of(self, effort, asked)
 
     def most_runs(self, effort: Effort) -> int:
-        """How many runs `collect` asks for, at most."""
+        """The most runs that `collect` asks for."""
         return len(self.points) * effort.search.seeds * effort.search.rounds
 
     def extent(self, effort: Effort) -> str:
-        """Which seeds and horizon an effort gives it, in words."""
+        """The seeds and the horizon, in words."""
         return f"the seeds 1 … {effort.search.seeds} over {effort.search.horizon:g} s"
 
 
 STUDY = CapacityStudy(
     "capacity",
     "Which demand is served without a growing queue?",
-    fair_grid(RIVALS, ARMS, (0.0,)),
+    fair_grid(RIVALS, (3, 4, 5, 6), (0.0,)),
 )
 
 
@@ -100,22 +92,22 @@ class Capacity(NamedTuple):
 
     @property
     def below(self) -> float | None:
-        """What it is below, where the search met no demand that a seed's run serves."""
+        """The upper bound, if a seed served no demand that was tried; None otherwise."""
         return max(high for _, high in self.brackets) if self._open(0.0) else None
 
     @property
     def above(self) -> float | None:
-        """What it is above, where the search met no demand that a seed's run does not serve."""
+        """The lower bound, if a seed served every demand that was tried; None otherwise."""
         return min(low for low, _ in self.brackets) if self._open(math.inf) else None
 
     @property
     def interval(self) -> Interval:
-        """Mean over seeds, each the middle of its bracket, and 95 % interval.
+        """Mean over seeds of the middles of their brackets, with its 95 % interval.
 
-        Half the bracket, within which a seed's value may be anywhere, is part of the half width.
+        A seed's value may be anywhere in its bracket, so half the bracket adds to the half width.
 
         Raises:
-            InputError: `below` or `above` is all that is known.
+            InputError: only `below` or `above` is known.
         """
         if self.below is not None or self.above is not None:
             raise InputError(f"the capacity of {self.series} on {self.arms} arms has no bounds")
@@ -124,12 +116,11 @@ class Capacity(NamedTuple):
         return middles._replace(half_width=middles.half_width + rounding)
 
     def __str__(self) -> str:
-        if self.below is not None and self.above is not None:
-            return "–"
-        if self.below is not None:
-            return f"< {self.below:.0f}"
-        if self.above is not None:
-            return f"> {self.above:.0f}"
+        below, above = self.below, self.above
+        if below is not None:
+            return f"< {below:.0f}" if above is None else "–"
+        if above is not None:
+            return f"> {above:.0f}"
         mean, half, _ = self.interval
         return f"{mean:.0f}" if math.isnan(half) else f"{mean:.0f} ± {half:.0f}"
 
@@ -137,17 +128,17 @@ class Capacity(NamedTuple):
         return any(end in bracket for bracket in self.brackets)
 
 
-def grows(row: Mapping[Any, Any], tolerance: float = TOLERANCE) -> bool:
-    """Whether a row of a sweep tells of a queue that grows.
+def grows(row: Mapping[Any, Any]) -> bool:
+    """Whether the queue grew in a run, given its row of a sweep.
 
-    `queue_growth` is between two windows that begin half the horizon apart; half of the demanded
+    `queue_growth` compares two windows that begin half the horizon apart. Half of the demanded
     trips arrive in that time.
     """
-    return float(row["queue_growth"]) > tolerance * float(row["trips"]) / 2.0
+    return float(row["queue_growth"]) > TOLERANCE * float(row["trips"]) / 2.0
 
 
 def capacities(results: Results) -> list[Capacity]:
-    """The capacity of every point whose search ran to its end, from the rows of the study."""
+    """The capacity of every point whose search ran to its end."""
     search = results.effort.search
     rows = results.good
     known = []
@@ -160,7 +151,7 @@ def capacities(results: Results) -> list[Capacity]:
 
 
 def _bracket(rows: pd.DataFrame) -> tuple[float, float]:
-    """What the rows of one seed's bisection leave: a bisection never serves above what grew."""
+    """The bracket of one seed: highest demand served, and lowest at which the queue grew."""
     demands = {True: [math.inf], False: [0.0]}
     for row in rows.to_dict("records"):
         demands[grows(row)].append(float(row["density"]))

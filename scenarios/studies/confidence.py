@@ -1,4 +1,4 @@
-"""Misread intents, over the confidence below which a reading is not believed."""
+"""Misread intents, if vehicles believe only readings above some confidence."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dim.senses.noise import CLASSIFIER
 from scenarios.studies.shared.intent_errors import FEW, IntentErrorPoint
 from scenarios.studies.shared.study import Study
 
-#: Thresholds of confidence; 0 takes every reading as it is.
+#: Thresholds of confidence; at 0, every reading is believed.
 THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 
 STUDY = Study(
     "confidence",
     "What does it cost to believe only readings that are sure?",
-    # Lanes first: with the largest clique first, unknown intents block the junction.
+    # By lanes, since unknown intents block a junction where the largest clique goes first.
     tuple(
         IntentErrorPoint("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
         for kind, threshold in product(KINDS, THRESHOLDS)

@@ -2,34 +2,128 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from minisim.errors import InputError, items, numbers
 from scenarios.controllers import RIVALS
-from scenarios.studies.shared.crossing import (
-    Crossing,
-    crossing,
-    paired_differences,
-)
-from scenarios.studies.shared.delay import MEASURES, with_total_delay
+from scenarios.statistics import mean_interval
 from scenarios.studies.shared.points import fair_grid
-from scenarios.studies.shared.study import Study
+from scenarios.studies.shared.study import TOTAL_DELAY, Study, with_total_delay
+from scenarios.sweep.cells import pairs
 
 if TYPE_CHECKING:
     import pandas as pd
 
-#: DIM with either gate, and what it may lose to.
+#: DIM with either gate, and the other controllers.
 GATES = ("dim", "dim:gate=harmonious")
 OTHERS = tuple(name for name in RIVALS if name not in GATES)
 
 #: From nearly free flow to far beyond the capacity of every controller [veh/h/lane].
 DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
 
+#: What "worse" may mean: measure -> column of `with_total_delay`. These are the complete forms,
+#: which include vehicles still on the road; the others flatter a controller that serves few.
+MEASURES = {
+    "waiting time": "complete_waiting_time_s",
+    "time loss": "complete_time_loss_s",
+    "time loss and departure delay": TOTAL_DELAY,
+}
+
 STUDY = Study(
     "fair",
     "Which controller is best with one vehicle and speed limit for all?",
     fair_grid(RIVALS, (4,), DENSITIES),
 )
+
+
+class Crossing(NamedTuple):
+    """The demand from which on one controller does worse than another.
+
+    Attributes:
+        density: the lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is
+            positive at the lowest demand tried, +inf if it never is.
+        low, high: its interval, open (±inf) if the demands tried do not bound it.
+        until: where the mean difference falls back to 0 or less, +inf if it does not. Beyond the
+            capacity of both, neither wins.
+        tried: lowest and highest demand of both; nothing is known beyond.
+    """
+
+    density: float
+    low: float
+    high: float
+    until: float
+    tried: tuple[float, float]
+
+    def __str__(self) -> str:
+        bounded = math.isfinite(self.low) or math.isfinite(self.high)
+        return f"{self.point} ({self.interval})" if bounded else self.point
+
+    @property
+    def point(self) -> str:
+        """The demand in words."""
+        if self.density == -math.inf:
+            return "all" if self.until == math.inf else f"up to {self.until:.0f}"
+        if self.density == math.inf:
+            return "never"
+        return f"{self.density:.0f}" + ("" if self.until == math.inf else f" to {self.until:.0f}")
+
+    @property
+    def interval(self) -> str:
+        """The interval in words; if it is open, the demand at which it begins or ends."""
+        low, high = (f"{end:.0f}" if math.isfinite(end) else "" for end in (self.low, self.high))
+        if low and high:
+            return f"{low} to {high}"
+        return f"{low} at the earliest" if low else f"{high} at the latest" if high else "–"
+
+
+def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
+    """Where paired differences, ours minus theirs, turn positive.
+
+    The mean difference is taken as linear between the demands tried, and so are the bounds of its
+    pointwise 95 % Student-t intervals. The interval of the crossing holds the demands at which
+    those intervals hold 0: it runs from the crossing of the upper bound to that of the lower one (a
+    confidence set by inversion of the test, Fieller 1954).
+
+    Args:
+        differences: demand [veh/h/lane] -> one difference a seed, at least two.
+
+    Raises:
+        InputError: fewer than two demands, or a demand with fewer than two differences.
+    """
+    densities = sorted(numbers("demands", list(differences)))
+    if len(densities) < 2:
+        raise InputError("a crossing needs differences at two demands or more")
+    bands = []
+    for density in densities:
+        values = items(f"differences at {density:g}", differences[density], "numbers")
+        if len(values) < 2:
+            raise InputError(f"a crossing needs two differences or more at {density:g} veh/h/lane")
+        bands.append(mean_interval(values))
+    start, until = _first_rise(densities, [band.mean for band in bands])
+    low, _ = _first_rise(densities, [band.mean + band.half_width for band in bands])
+    high, _ = _first_rise(densities, [band.mean - band.half_width for band in bands])
+    return Crossing(start, low, high, until, (densities[0], densities[-1]))
+
+
+def tried(crossings: Iterable[Crossing]) -> tuple[float, float]:
+    """The lowest and the highest demand that was tried for any."""
+    lows, highs = zip(*(crossing.tried for crossing in crossings), strict=True)
+    return min(lows), max(highs)
+
+
+def paired_differences(
+    rows: pd.DataFrame, ours: str, theirs: str, metric: str
+) -> dict[float, list[float]]:
+    """Differences of a column between two series, ours minus theirs: density -> one a common seed.
+
+    Raises:
+        InputError: two runs of one seed with other arrivals.
+    """
+    by_density = pairs(rows, metric, "series", (ours, theirs), ["density"])
+    return {float(density): values for (density,), values in by_density.items() if len(values) > 1}
 
 
 def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
@@ -44,3 +138,22 @@ def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
         if len(differences) > 1:
             known[measure, gate, rival] = crossing(differences)
     return known
+
+
+def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
+    """Where the polygon (x, y) first leaves y ≤ 0, and where it then comes back."""
+    above = [value > 0.0 for value in y]
+    if True not in above:
+        return math.inf, math.inf
+    rise = above.index(True)
+    fall = above.index(False, rise) if False in above[rise:] else None
+    return (
+        -math.inf if rise == 0 else _zero(x, y, rise),
+        math.inf if fall is None else _zero(x, y, fall),
+    )
+
+
+def _zero(x: Sequence[float], y: Sequence[float], k: int) -> float:
+    """Where the line from point k − 1 to point k is 0."""
+    share = y[k - 1] / (y[k - 1] - y[k])
+    return x[k - 1] + share * (x[k] - x[k - 1])

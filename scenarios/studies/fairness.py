@@ -25,16 +25,15 @@ STUDY = Study(
     fair_grid(PRIORITIES, (4,), DENSITIES),
 )
 
-#: Column of a sweep that holds a lane's mean waiting time, the complete form: what the vehicles
-#: still on the road have waited counts, or a starved lane would look served.
+#: Column of a lane's mean waiting time. Vehicles still on the road count (the complete form), or a
+#: starved lane would look served.
 LANE_WAIT = "lanes_{}_complete_waiting_time_s"
-LANE_TRIPS = "lanes_{}_trips"
 
 
 def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
     """Gini's coefficient Σᵢⱼ wᵢwⱼ|xᵢ − xⱼ| / (2 Σwᵢ Σwᵢxᵢ) (Gini 1912, mean difference form).
 
-    0 where all are equal, or all are 0; 1 − 1/n where one of n has everything.
+    It is 0 if all are equal or all are 0, and 1 − 1/n if one of n has everything.
 
     Args:
         values: ≥ 0.
@@ -56,15 +55,14 @@ def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> flo
 
 
 def lane_waits(rows: pd.DataFrame, arms: int) -> pd.DataFrame:
-    """Add `worst_lane_s`, the longest of the lanes' mean waits, and `gini` of them to a sweep.
+    """Add `worst_lane_s`, the longest mean wait of a lane, and the `gini` of the lanes' means.
 
-    The lanes' means are weighted by their trips. Rows of failed runs are left out.
+    The means are weighted by their trips.
     """
-    good = rows[rows["error"].isna()]
     lanes = ARM_NAMES[:arms]
-    waits = good[[LANE_WAIT.format(lane) for lane in lanes]].astype(float).fillna(0.0)
-    trips = good[[LANE_TRIPS.format(lane) for lane in lanes]].astype(float)
-    return good.assign(
+    waits = rows[[LANE_WAIT.format(lane) for lane in lanes]].astype(float).fillna(0.0)
+    trips = rows[[f"lanes_{lane}_trips" for lane in lanes]].astype(float)
+    return rows.assign(
         worst_lane_s=waits.max(axis=1),
         gini=[*map(gini, waits.to_numpy().tolist(), trips.to_numpy().tolist())],
     )

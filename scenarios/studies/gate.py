@@ -1,4 +1,4 @@
-"""The paper's gate, which waits for a clear junction, against the harmonious one."""
+"""The paper's gate, which waits until the junction is clear, against the harmonious one."""
 
 from __future__ import annotations
 

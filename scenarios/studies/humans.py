@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 #: Shares of human drivers.
 SHARES = (0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
-#: Demands at which they are compared [veh/h/lane]: moderate, and near what humans alone can do.
+#: Demands [veh/h/lane]: a moderate one, and one near the capacity of humans alone.
 DENSITIES = (150.0, 250.0)
-#: What humans alone are compared with.
+#: The controller that humans alone are compared with.
 STOP = "all-way-stop"
 
 STUDY = Study(
     "humans",
-    "What do human drivers cost, and whom?",
+    "How much delay do human drivers cause, and to which vehicles?",
     (
         *(
             fair(gate, 4, density, share)
@@ -33,11 +33,9 @@ STUDY = Study(
 
 
 def delays(rows: pd.DataFrame, group: str) -> pd.Series[float]:
-    """Time loss and departure delay of a group in each row [s]; NaN where it has no vehicle.
+    """Time loss and departure delay [s] of "human" or "automated" vehicles, one value a row.
 
-    Args:
-        rows: of the study.
-        group: "human" or "automated".
+    NaN where there is no such vehicle.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Misread intents, over the probability, kind and manner of errors."""
+"""Misread intents: probability, kind and manner of errors."""
 
 from __future__ import annotations
 

@@ -6,13 +6,13 @@ from scenarios.paper import BASELINE_GRID, GRID, SERIES, Cell
 from scenarios.studies.shared.points import ControllerPoint
 from scenarios.studies.shared.study import Study
 
-#: What the text has for unbalanced inflow: "the lane priorities are set according to the incoming
-#: traffic", and the greens of its table, the same for every lane (§ Comparison Models).
+#: The text's rules for unbalanced inflow: "the lane priorities are set according to the incoming
+#: traffic", and the greens of its table, equal for every lane (§ Comparison Models).
 UNBALANCED = {"dim": "dim:priorities=inflow", "fixed-time": "fixed-time:equal_greens=true"}
 
 
 def point_of(cell: Cell) -> ControllerPoint:
-    """A published cell by the rules and parameters of the text."""
+    """A published cell with the rules and parameters of the text."""
     series = SERIES[cell.controller]
     controller = series if cell.split == "balanced" else UNBALANCED.get(series, series)
     return ControllerPoint("paper", series, controller, cell.arms, cell.split, float(cell.density))

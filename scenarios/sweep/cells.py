@@ -1,6 +1,6 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell is all that was run alike but for the seed.
+A cell holds the runs that differ in their seed only.
 """
 
 from __future__ import annotations
@@ -35,22 +35,21 @@ CELL: Final = (
 #: Summed over the runs of a cell.
 SUMS: Final = ("trips", "unfinished", "collisions")
 
-#: Other columns of runs that are no metric of a cell.
+#: Other columns of runs that are not metrics.
 OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
 
-#: What columns of groups of trips begin with.
+#: Prefixes of the columns of groups of trips.
 GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row a cell, in the order in which the cells come.
+    """One row a cell, in the order of the rows.
 
     Returns:
         `CELL`; `runs` that succeeded and `failed` ones; `trips`, `unfinished` and `collisions`
         (sums); each of the columns `averaged` with the half widths of its 95 % confidence interval
         (`…_ci95`) and of the 95 % prediction interval of one more run (`…_pi95`), NaN where
-        unknown;
-        `growing`, whether its queues kept growing, asked of all its runs together; `too_short`,
+        unknown; `growing`, whether the queues of all runs together kept growing; `too_short`,
         whether the runs are too short to tell; `cpu_s`, mean processor time of a run.
     """
     import pandas as pd
@@ -67,7 +66,7 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
-    """Columns that are averaged: both forms of the usual means, and what was asked for besides."""
+    """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
     known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
     more = [
         column
@@ -78,19 +77,17 @@ def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _is_numeric(column: pd.Series[Any]) -> bool:
-    """Whether it holds a number, and nothing but numbers where it holds something."""
-    there = column.dropna()
-    return len(there) > 0 and all(isinstance(value, Real) for value in there)
+    """Whether the values are numbers, at least one."""
+    values = column.dropna()
+    return len(values) > 0 and all(isinstance(value, Real) for value in values)
 
 
 def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
-    """Mean of `metric`, a column or a `Metric`, under one controller less that under another.
-
-    Runs are compared one by one.
+    """Mean difference of `metric`, a column or a `Metric`, between two controllers, run by run.
 
     Returns:
-        One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` and
-        `difference_ci95`.
+        One row a cell that both ran: `CELL` without the controller, `pairs`, `difference` (the
+        first controller's value less the second's) and `difference_ci95`.
 
     Raises:
         InputError: an unknown metric or controller, or two runs of one seed with other arrivals.
@@ -119,13 +116,13 @@ def pairs(
 ) -> dict[tuple[Any, ...], list[float]]:
     """Differences of `metric` between two controllers: values of `by` -> one value a seed.
 
-    Runs are paired by seed, and only where both controllers met the same arrivals, so that what
-    varies between seeds alike for both cancels.
+    Runs are paired by seed. Both controllers met the same arrivals, so the variation that they
+    share cancels.
 
     Args:
         rows: of a sweep; failed runs and missing values are left out.
         metric: a column; the first controller's less the second's.
-        column: where `names` stand, such as "controller".
+        column: the one that holds `names`, such as "controller".
         names: of both controllers.
         by: columns that name a cell.
 
@@ -157,21 +154,16 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
 
 
 def saturated(good: pd.DataFrame) -> bool:
-    """Whether the queues of a cell's runs, of the junction or of a lane, kept growing together.
-
-    No where the runs are `too_short` to tell.
-    """
-    if too_short(good):
-        return False
-    arms = int(good["arms"].iloc[0])
-    return grows(good.filter(regex="(queue_growth|trips)$").sum(), arms)
+    """Whether the queues of a cell's runs kept growing; false where they are `too_short`."""
+    sums = good.filter(regex="(queue_growth|trips)$").sum()
+    return not too_short(good) and grows(sums, int(good["arms"].iloc[0]))
 
 
 def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads that fill.
 
-    The travel time on a free road is taken as travel time less time loss: of the trips that ended,
-    and where none did, of what was driven.
+    The travel time on a free road is travel time less time loss: of the trips that ended, or of
+    what was driven where none did.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

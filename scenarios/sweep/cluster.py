@@ -24,8 +24,8 @@ PATIENCE = 5.0
 def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     """An executor on the cluster of the scheduler at `address`, such as tcp://10.0.0.1:8786.
 
-    Dask runs the tasks of a lost worker again on others, and gives up a run that has cost three
-    workers. The workers need the same version of minisim.
+    Dask repeats the tasks of a lost worker on others, and gives up a run that has cost three
+    workers. All workers need the same version of minisim.
 
     Raises:
         MissingExtraError: without the extra `dask`.
@@ -38,32 +38,31 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         raise MissingExtraError(
             "--scheduler needs the package distributed: pip install 'minisim[dask]'"
         ) from None
-    # The sweep itself reports a lost connection in one line. Each logger has a level of its own.
+    # The sweep itself reports a lost connection in one line. Each logger has its own level.
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=patience, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"no Dask scheduler at {address!r}: {_first_line(error)}") from error
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(f"no Dask scheduler at {address!r}: {reason}") from error
     with client:
         _check_workers(client, address, patience)
-        executor: Executor = client.get_executor()
-        yield executor
+        yield client.get_executor()
 
 
 def _check_address(address: str) -> None:
-    """Refuse what is no address: Dask would hang while it cleans up."""
+    """Raise `InputError` for what is no address, since Dask would hang while it cleans up."""
     instance("scheduler", address, str)
     form = ADDRESS.fullmatch(address)
     if form is None:
-        raise InputError(
-            f"no Dask scheduler at {address!r}: an address has the form tcp://host:port"
-        )
-    if not 1 <= int(form["port"]) <= 65535:
-        raise InputError(
-            f"no Dask scheduler at {address!r}: a port is 1 … 65535, got {form['port']}"
-        )
+        why = "an address has the form tcp://host:port"
+    elif not 1 <= int(form["port"]) <= 65535:
+        why = f"a port is 1 … 65535, got {form['port']}"
+    else:
+        return
+    raise InputError(f"no Dask scheduler at {address!r}: {why}")
 
 
 def _check_workers(client: Any, address: str, patience: float) -> None:
@@ -76,10 +75,8 @@ def _check_workers(client: Any, address: str, patience: float) -> None:
     except ImportError as error:
         raise InputError(f"the workers of {address} lack minisim: {error}") from error
     ours = results_version()
-    other = {worker: version for worker, version in versions.items() if version != ours}
-    for worker, version in other.items():
-        raise InputError(f"worker {worker} has version {version} of the results, here it is {ours}")
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
+    for worker, version in versions.items():
+        if version != ours:
+            raise InputError(
+                f"worker {worker} has version {version} of the results, here it is {ours}"
+            )

@@ -1,4 +1,4 @@
-"""Keys of recipes: what tells one run from another in a store."""
+"""Keys of recipes, by which a store tells runs apart."""
 
 from __future__ import annotations
 
@@ -20,30 +20,26 @@ from minisim.errors import InputError, show
 from minisim.version import __version__
 from scenarios.recipe import Recipe
 
-#: Raised by one when the same recipe gives another row than before, while the version of the
-#: package stays: rows of older results are then computed again.
+#: Raise it by one when a recipe gives another row than before and the version of the package stays
+#: the same. Stored rows are then computed again.
 RESULTS = 3
 
-#: Packages whose code `RESULTS` speaks for.
+#: Packages whose changes `RESULTS` counts.
 OURS = ("minisim", "dim", "baselines", "scenarios")
 
 
 def results_version() -> str:
-    """What rows depend on besides their recipe."""
+    """The version of rows, which depend on it and on their recipe."""
     return f"{__version__}/{RESULTS}"
 
 
 def description_of(recipe: Recipe) -> str:
-    """Every parameter as JSON: two recipes are the same when their descriptions are.
-
-    Raises:
-        InputError: a controller that is not made of dataclasses, numbers, texts and arrays.
-    """
+    """Every parameter as JSON, equal for equal recipes; raises `InputError` as `canonical`."""
     return json.dumps(canonical(recipe), separators=(",", ":"), allow_nan=True)
 
 
 def key_of(recipe: Recipe) -> str:
-    """The name of a recipe in a store; raises `InputError` as `description_of`."""
+    """The key of a recipe in a store; raises `InputError` as `canonical`."""
     return digest_of(description_of(recipe))
 
 
@@ -53,19 +49,20 @@ def digest_of(description: str) -> str:
 
 
 def canonical(value: object) -> Any:
-    """The parameters of a recipe as JSON values, alike for equal recipes.
+    """The parameters of a recipe as JSON values, equal for equal recipes.
 
-    Dataclasses become their class and fields, with what tells versions of their code apart where
-    they are not ours (`_code`). Numbers become floats, since 350 and 350.0 are the same density.
-    Arrays become their type, shape and SHA-256.
+    Dataclasses become their class and fields, and those that are not ours also the version of their
+    code (`_code`). Numbers become floats, since 350 and 350.0 are the same density. Arrays become
+    their type, shape and SHA-256.
 
     Raises:
-        InputError: anything else: it could not be looked up again.
+        InputError: a value of another kind.
     """
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, Integral | Real):
-        return _canonical_number(value)
+        number = float(value)
+        return number + 0.0 if number == value or math.isnan(number) else str(value)  # no -0.0
     if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
         plain = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("<"))
         digest = hashlib.sha256(plain.tobytes()).hexdigest()
@@ -100,13 +97,13 @@ def canonical(value: object) -> Any:
 
 @cache
 def _code(kind: type | FunctionType) -> dict[str, Any]:
-    """What tells versions of a class or function apart: its `version`, or the text of its modules.
+    """The `version` of a class or function, or else a digest of its modules' text.
 
-    Nothing for our own classes, for which `RESULTS` speaks. The rules of a controller are usually
-    in its session, so the whole file counts; what that imports does not.
+    Empty for our own classes, whose changes `RESULTS` counts. The rules of a controller are usually
+    in its session, so the whole file counts, but not what it imports.
 
     Raises:
-        InputError: no version, and no file, as in an interactive session.
+        InputError: neither a version nor a file, as in an interactive session.
     """
     modules = sorted({
         parent.__module__
@@ -126,8 +123,3 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
             "go unnoticed; give it a text or an integer `version`"
         ) from error
     return {"code": hashlib.sha256(texts.encode()).hexdigest()}
-
-
-def _canonical_number(value: Real | Integral) -> float | str:
-    number = float(value)
-    return number + 0.0 if number == value or math.isnan(number) else str(value)

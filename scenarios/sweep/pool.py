@@ -1,7 +1,7 @@
 """Many runs at once, in processes of our own or in a caller's executor; processes may die.
 
-The pools of loky and pebble do not replace this one: with both, a busy worker outlives a killed
-parent, loky loses all runs to one dead worker, and pebble's pool is no `Executor`.
+loky and pebble cannot replace this pool. With both, a busy worker outlives a killed parent; with
+loky, one dead worker loses all runs; and pebble's pool is no `Executor`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
 )
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from itertools import islice
 from multiprocessing import Pipe, get_context
@@ -29,16 +29,16 @@ from typing import TypeVar
 from minisim.errors import integer
 from scenarios.termination import Terminated, raise_terminated
 
-#: Runs that a pool of ours has in hand per worker: one that runs and the next one.
+#: Runs that a pool of ours holds per worker: the one that runs and the next one.
 IN_HAND = 2
 
-#: How often a worker is asked to end, once a second, before it is ended by force.
+#: How often a worker is asked to end, once a second, before it is killed.
 PATIENCE = 10
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
-#: Number of a task, and its answer or, in place of one, what was raised.
+#: Number of a task, and its answer or the exception that it raised.
 Results = Generator[tuple[int, Answer | BaseException]]
 
 
@@ -59,16 +59,12 @@ def given(
     """Run in a caller's executor, which gets all tasks at once."""
     left = set(todo)
     reason: BaseException = BrokenExecutor("the executor takes no runs")
-    running: dict[int, Future[Answer]] = {}
-    try:
-        for k, result in _results(function, todo, executor, len(todo), running):
+    with closing(_results(function, todo, executor, len(todo))) as results:
+        for k, result in results:
             left.discard(k)
             if isinstance(result, BaseException):
                 reason = result
             yield k, result
-    finally:
-        for future in running.values():
-            future.cancel()
     for k in sorted(left):
         yield k, reason
 
@@ -83,15 +79,15 @@ def pooled(
 ) -> Results[Answer]:
     """Run in pools of our own; close the generator to give up.
 
-    When a worker dies, its pool is lost with all runs in hand, and it is not known which of them
-    killed it. Each of them is tried again alone. The rest goes on in a fresh pool.
+    When a worker dies, its pool is lost, and any of the runs that it held may have killed it. Each
+    of them is tried again alone. The others go on in a new pool.
 
     Args:
         function: runs a task; both go to another process.
         todo: the tasks.
-        jobs: processes.
-        pool_of: makes a pool of that many.
-        begin: called with the first pool before it gets anything to do.
+        jobs: number of processes.
+        pool_of: makes a pool of as many.
+        begin: called with the first pool before it gets a task.
     """
     left = dict(todo)
     while left:
@@ -100,7 +96,7 @@ def pooled(
             if begin is not None:
                 begin(pool)
                 begin = None
-            for k, result in _results(function, left, pool, IN_HAND * jobs, {}):
+            for k, result in _results(function, left, pool, IN_HAND * jobs):
                 if isinstance(result, BrokenExecutor):
                     suspects[k] = left[k]
                 else:
@@ -108,14 +104,14 @@ def pooled(
                     yield k, result
         while suspects:
             with _until_given_up(processes(1)) as alone:
-                for k, result in _results(function, suspects, alone, 1, {}):
+                for k, result in _results(function, suspects, alone, 1):
                     del suspects[k], left[k]
                     yield k, result
 
 
 @contextmanager
 def _until_given_up(pool: Executor) -> Iterator[Executor]:
-    """A pool for the block; an exception ends its processes at once, and what they run."""
+    """A pool for the block; an exception ends its processes and their runs at once."""
     with pool:
         try:
             yield pool
@@ -136,7 +132,7 @@ def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -
 class _Processes(ProcessPoolExecutor):
     """Spawned processes, since forking beside the threads of a progress bar can hang.
 
-    They end when their parent has gone or lets go of them.
+    They end when their parent has died or lets them go.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -144,19 +140,19 @@ class _Processes(ProcessPoolExecutor):
         super().__init__(jobs, get_context("spawn"), initializer=_begin_worker, initargs=(leash,))
 
     def let_go(self) -> None:
-        """End all processes at once, with what they run."""
+        """End all processes and their runs at once."""
         self._hand.close()
 
 
 def _begin_worker(leash: Connection) -> None:
-    # Ctrl-C reaches every process of the terminal; it is the parent that answers it.
+    # Ctrl-C reaches every process of the terminal; only the parent should answer it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
     signal.signal(signal.SIGTERM, raise_terminated)
 
 
 def _end_with(leash: Connection) -> None:
-    """End when the parent no longer holds the other end, as when it was killed."""
+    """End when the parent has closed the other end, or was killed."""
     try:
         leash.recv_bytes()
     except (EOFError, OSError):
@@ -169,7 +165,7 @@ def _end_with(leash: Connection) -> None:
 
 
 def _ending(function: Callable[[Task], Answer], task: Task) -> Answer:
-    """Run a task; `Terminated` ends the worker, where a pool would take it for the result."""
+    """Run a task; `Terminated` ends the worker, since a pool would take it for a result."""
     try:
         return function(task)
     except Terminated as end:
@@ -181,15 +177,15 @@ def _results(
     todo: Mapping[int, Task],
     executor: Executor,
     in_hand: int,
-    running: dict[int, Future[Answer]],
-) -> Iterator[tuple[int, Answer | BaseException]]:
-    """Results as they come, with at most `in_hand` runs handed over at a time.
+) -> Results[Answer]:
+    """Results as they come, with at most `in_hand` runs in the executor; closing cancels these.
 
-    It ends early when the executor breaks, after at least one `BrokenExecutor` and one for each
-    run in hand. `running` is empty at first and always holds what is handed over.
+    It ends early when the executor breaks, after at least one `BrokenExecutor` and one for each run
+    that it held.
     """
     done: SimpleQueue[int] = SimpleQueue()
-    waiting = iter(list(todo.items()))  # the caller takes from `todo` what is done
+    running: dict[int, Future[Answer]] = {}
+    waiting = iter(list(todo.items()))  # a copy, since the caller removes finished tasks
     broken = False
 
     def hand_over(count: int) -> Iterator[tuple[int, BaseException]]:
@@ -202,23 +198,26 @@ def _results(
             # k=k keeps this k and not the loop's last; mypy cannot infer such a default.
             running[k].add_done_callback(lambda _, k=k: done.put(k))  # type: ignore[misc]
 
-    for refused in hand_over(in_hand):
-        broken = True
-        yield refused
-    while running:
-        k = done.get()
-        result = _result(running.pop(k))
-        broken = broken or isinstance(result, BrokenExecutor)
-        if not broken:
-            # Before the caller stores the result, so that no worker waits for the disk.
-            for refused in hand_over(1):
-                broken = True
-                yield refused
-        yield k, result
+    try:
+        for refused in hand_over(in_hand):
+            broken = True
+            yield refused
+        while running:
+            k = done.get()
+            result = _result(running.pop(k))
+            broken = broken or isinstance(result, BrokenExecutor)
+            if not broken:
+                # Before the caller stores the result, so that no worker waits for the disk.
+                for refused in hand_over(1):
+                    broken = True
+                    yield refused
+            yield k, result
+    finally:
+        for future in running.values():
+            future.cancel()
 
 
 def _result(future: Future[Answer]) -> Answer | BaseException:
-    """What a finished run returned or raised."""
     if future.cancelled():
         return CancelledError("the executor gave the run up")
     return future.exception() or future.result()
@@ -226,7 +225,7 @@ def _result(future: Future[Answer]) -> Answer | BaseException:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Delay Ctrl-C, and keep it from processes that are started meanwhile."""
+    """Delay Ctrl-C, and hide it from processes that start meanwhile."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

@@ -1,4 +1,4 @@
-"""One run of a sweep: what identifies it, and the row that it gives."""
+"""One run of a sweep: the columns that identify it, and its row."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from scenarios.sweep.keys import RESULTS, results_version
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Columns that a repetition of the same run measures anew.
+#: Columns that differ when the same run is repeated.
 MEASURED = ("cpu_s",)
 
 Row = dict[str, Any]
 
 
 class Outcome(NamedTuple):
-    """What a run left: its row, and where that came from."""
+    """The row of a run, and the versions that made it."""
 
     row: Row
     provenance: dict[str, str]
 
 
 def identity_of(recipe: Recipe) -> Row:
-    """The columns that tell what was run."""
+    """The columns that say what was run."""
     scenario = recipe.scenario
     demand, intersection = scenario.demand, scenario.intersection
     recorded = scenario.recorded is not None
@@ -55,7 +55,7 @@ def identity_of(recipe: Recipe) -> Row:
 
 
 def outcome_of(recipe: Recipe) -> Outcome:
-    """Run it; a `MinisimError` becomes part of the row."""
+    """Run a recipe; a `MinisimError` goes into the row."""
     began = time.thread_time()
     try:
         run = recipe.run()
@@ -65,7 +65,7 @@ def outcome_of(recipe: Recipe) -> Outcome:
         return failed(recipe, error)
     identity = identity_of(recipe)
     row = {
-        **(identity | summary | identity),  # columns in this order, the controller's from the label
+        **(identity | summary | identity),  # in this order; the controller is called by its label
         "growing": grows(summary, run.site.intersection.n),
         "arrivals": _fingerprint(run.columns),
         "cpu_s": cpu,
@@ -76,19 +76,14 @@ def outcome_of(recipe: Recipe) -> Outcome:
 
 
 def failed(recipe: Recipe, error: BaseException) -> Outcome:
-    """The outcome of a run that gave none."""
+    """The outcome of a run that raised `error`."""
     kind = "" if isinstance(error, MinisimError) else f"{type(error).__name__}: "
     row = {**identity_of(recipe), "version": results_version(), "error": f"{kind}{error}"}
     return Outcome(row, _provenance())
 
 
 def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
-    """Whether the queues of the junction or of a lane kept growing.
-
-    Args:
-        row: of a run, or the sums over several.
-        arms: of the junction.
-    """
+    """Whether the queues of the junction or of a lane kept growing, by a row or a sum of rows."""
     return any(
         growing(float(row[f"{of}queue_growth"]), int(row[f"{of}trips"]))
         for of in ("", *(f"lanes_{lane}_" for lane in ARM_NAMES[:arms]))
@@ -96,7 +91,7 @@ def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
 
 
 def _fingerprint(trips: Trips) -> str:
-    """Names the arrivals: rows of common arrivals have the same."""
+    """A digest of the arrivals, equal for common arrivals."""
     digest = hashlib.sha256()
     for column in (trips.demand_time, trips.lane, trips.manoeuvre):
         digest.update(np.ascontiguousarray(column).tobytes())

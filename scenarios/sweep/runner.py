@@ -1,8 +1,9 @@
-"""Many runs at once: experiments over processes or a caller's executor, one row each."""
+"""Many runs at once, in processes of our own or a caller's executor; one row each."""
 
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from contextlib import closing
@@ -10,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from minisim.errors import ExecutorError, instance, integer
+from minisim.errors import ExecutorError, InputError, instance, integer, show
 from minisim.results.metrics import Metric, asked_metrics
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import key_of
@@ -21,14 +22,14 @@ from scenarios.sweep.store import Store
 if TYPE_CHECKING:
     import pandas as pd
 
-#: What a run left that a caller's executor never finished.
+#: Raised for runs that a caller's executor gave up.
 GIVEN_UP = (BrokenExecutor, CancelledError)
 
 Progress = Callable[[int, int], None]
 
 
 def sweep(
-    experiments: Iterable[Recipe],
+    recipes: Iterable[Recipe],
     executor: Executor | None = None,
     progress: Progress | None = None,
     *,
@@ -36,41 +37,43 @@ def sweep(
     store: Store | None = None,
     metrics: Iterable[str | Metric] = (),
 ) -> pd.DataFrame:
-    """Run all experiments and return one row each, in their order.
+    """Run all recipes and return one row each, in their order.
 
-    The rows do not depend on the executor, nor on the number of its workers, but for the columns
+    The rows do not depend on the executor or the number of its workers, except for the columns
     `MEASURED`.
 
     Args:
-        experiments: what to run.
-        executor: any `concurrent.futures.Executor`, which stays open, such as
-            `dask.distributed.Client.get_executor()`; None is a pool of processes, as short-lived
-            as the call. They are spawned, so a script that sweeps needs the usual
+        recipes: what to run.
+        executor: any `concurrent.futures.Executor`, such as
+            `dask.distributed.Client.get_executor()`; it stays open. None is a pool of processes
+            for this call. They are spawned, so a script that sweeps needs the usual
             `if __name__ == "__main__":`.
-        progress: called with the runs done and their number, in this process.
-        jobs: processes of the pool, one a core unless told; 1 runs in this process.
-        store: rows go there as they come, and those that it holds are not computed again.
-        metrics: columns besides the usual: names of `minisim.results.metrics.METRICS`, or
-            `Metric`s of your own. With several processes, the function of an own one must be in
-            a module that they can import.
+        progress: called in this process with the number of finished runs and that of all.
+        jobs: processes of the pool, one a core by default; 1 runs in this process.
+        store: rows go there as they come, and rows that it has are not computed again.
+        metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`, or
+            `Metric`s of your own. Several processes need its function in a module that they can
+            import.
 
     Returns:
         What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
         ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
-        (`scenarios.statistics.growing`, which says when it means nothing), `arrivals` (alike for
-        common arrivals), `cpu_s`, `version`, and `error`: why a run failed, missing where it did
-        not.
+        (`scenarios.statistics.growing`, with its limits), `arrivals` (equal for common arrivals),
+        `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
 
     Raises:
-        InputError: something other than a `Recipe` or a `Store`, or jobs beside an executor.
+        InputError: something other than a `Recipe` or a `Store`, or a controller or metric that
+            cannot go to another process.
         FileError: the store cannot be written; what it has stays.
-        ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died;
-            what was done is in the store. Without a store, their rows have it as an error.
+        ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died.
+            Finished runs are in the store. Without a store, the rows of the others say so.
     """
     import pandas as pd
 
     added = asked_metrics(metrics)
-    todo = [with_metrics(experiment, added) for experiment in experiments]
+    todo = _checked(recipes)
+    if added:
+        todo = [replace(recipe, metrics=(*recipe.metrics, *added)) for recipe in todo]
     rows: dict[int, Row] = {}
     with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
         for k, row in results:
@@ -80,40 +83,32 @@ def sweep(
     return pd.DataFrame([rows[k] for k in range(len(todo))])
 
 
-def with_metrics(recipe: Recipe, metrics: Iterable[str | Metric]) -> Recipe:
-    """The recipe with more metrics; raises `InputError` as it does."""
-    instance("experiment", recipe, Recipe)
-    return replace(recipe, metrics=(*recipe.metrics, *metrics))
-
-
 def finished(
-    experiments: Iterable[Recipe],
+    recipes: Iterable[Recipe],
     executor: Executor | None = None,
     *,
     jobs: int | None = None,
     store: Store | None = None,
 ) -> Generator[tuple[int, Row]]:
-    """Position and row of each experiment as it is done; what the store has comes first.
+    """Position and row of each run as it finishes; rows of the store come first.
 
     Arguments and errors are those of `sweep`. Close it to give up.
     """
-    todo = list(experiments)
-    for experiment in todo:
-        instance("experiment", experiment, Recipe)
-    if jobs is None:
-        jobs = os.cpu_count() or 1
-    integer("jobs", jobs, low=1, high=1024)
+    todo = _checked(recipes)
+    jobs = integer("jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     if store is not None:
         instance("store (open it with `Store(path)`)", store, Store)
     missing = dict(enumerate(todo))
     if store is not None:
-        keys = [key_of(experiment) for experiment in todo]
+        keys = [key_of(recipe) for recipe in todo]
         valid = store.valid(keys)
         for k, key in enumerate(keys):
             if key in valid:
                 del missing[k]
                 yield k, valid[key]
     if executor is None:
+        if min(jobs, len(missing)) > 1:
+            _check_portable(missing.values())
         results = pooled(outcome_of, missing, jobs, begin=partial(_warm, list(missing.values())))
     else:
         results = given(outcome_of, missing, executor)
@@ -135,17 +130,37 @@ def finished(
         )
 
 
-def _warm(experiments: Iterable[Recipe], pool: Executor) -> None:
-    """Compile once for all processes: one of them compiles to disk before the others start.
+def _checked(recipes: Iterable[Recipe]) -> list[Recipe]:
+    todo = list(recipes)
+    for recipe in todo:
+        instance("recipe", recipe, Recipe)
+    return todo
 
-    Otherwise every process of a fresh installation would compile for itself, all at the same time.
-    What is compiled depends on the vehicle. A run that fails here will tell why when its turn
-    comes.
-    """
-    for experiment in {type(e.scenario.profile.vehicle): e for e in experiments}.values():
-        scenario = replace(experiment.scenario, horizon=experiment.scenario.profile.dt, warmup=0.0)
+
+def _check_portable(recipes: Iterable[Recipe]) -> None:
+    """Raise `InputError` for a controller or metric that cannot go to another process."""
+    parts = {id(part): part for it in recipes for part in (it.controller, *it.metrics)}
+    for part in parts.values():
         try:
-            tried = handed(pool, outcome_of, replace(experiment, scenario=scenario))
+            pickle.dumps(part)
+        except Exception as error:  # a class of the caller's own may raise anything
+            raise InputError(
+                f"{show(part)} cannot go to other processes ({error}); put its class or function "
+                "at the top of a module, or use one job"
+            ) from error
+
+
+def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
+    """Let one process compile to disk before the others start.
+
+    Otherwise all processes of a fresh installation would compile at the same time. The compiled
+    code depends on the class of the vehicle. A run that fails here fails again in its turn, where
+    its row says why.
+    """
+    for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
+        scenario = replace(recipe.scenario, horizon=recipe.scenario.profile.dt, warmup=0.0)
+        try:
+            tried = handed(pool, outcome_of, replace(recipe, scenario=scenario))
         except BrokenExecutor:
             return
         tried.exception()

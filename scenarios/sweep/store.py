@@ -1,11 +1,11 @@
 """Results on disk: one SQLite file, one row a run.
 
-Every run is a transaction of its own, written ahead (WAL) and forced to the disk. Whatever kills a
-sweep, the rows stored before are there. Several processes may write at once: each waits for the
-other's transaction, and a run that two of them computed is one row.
+Every run is a transaction of its own, written ahead (WAL) and forced to the disk. If a sweep is
+killed, all rows stored before are still there. Several processes may write at once: each waits for
+the other's transaction, and a run that two of them computed is one row.
 
-A key connects a row with its experiment; the row is valid while the version of the results is the
-same. SQLite needs a local disk, since network file systems do not lock files reliably.
+A key connects a row with its recipe. The row is valid while the version of the results is the same.
+SQLite needs a local disk, since network file systems do not lock files reliably.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -26,12 +26,12 @@ from scenarios.sweep.rows import Outcome, Row
 if TYPE_CHECKING:
     import pandas as pd
 
-#: In the header of the file: that it is a store ("DIMs"), and the layout of its table.
+#: In the header of the file: the mark of a store ("DIMs"), and the layout of its table.
 APPLICATION = 0x44494D73
 SCHEMA = 1
 
-#: How long to wait for a transaction of another process [s], and on opening: a sweep holds a store
-#: for some milliseconds only.
+#: How long to wait for another process [s]: for its transaction, and when opening. A sweep holds a
+#: store only for some milliseconds.
 PATIENCE = 30.0
 OPENING = 3.0
 
@@ -61,11 +61,11 @@ _MAGIC = b"SQLite format 3\0"
 
 
 class Store:
-    """The rows of experiments in a file; close it, or use it in a `with` statement.
+    """Rows in a file; close it, or use it in a `with` statement.
 
     Args:
-        path: of the file; made when it is not there and `create` is true.
-        create: whether it may be made.
+        path: of the file.
+        create: whether to make the file where there is none.
 
     Raises:
         FileError: no such file, not a store, one of another layout, or a damaged one. The file
@@ -112,7 +112,7 @@ class Store:
             )
 
     def valid(self, keys: Iterable[str]) -> dict[str, Row]:
-        """The rows of these keys that need not be computed again: not failed, not outdated."""
+        """Key -> row of those that need not be computed again: neither failed nor outdated."""
         wanted = set(keys)
         with self._guarded("read"):
             rows = self._database.execute(
@@ -147,7 +147,7 @@ class Store:
 
     def _prepare(self, fresh: bool) -> None:
         if fresh:
-            # Before WAL is on: a roll-back journal makes the header part of the transaction.
+            # Before WAL is on, the roll-back journal makes the header part of the transaction.
             self._database.executescript(_CREATE)
         columns = tuple(name for _, name, *_ in self._database.execute("PRAGMA table_info(runs)"))
         if columns != COLUMNS:
@@ -180,16 +180,17 @@ class Store:
 
 
 def _is_fresh(path: Path) -> bool:
-    """Whether the store is still to be made; raises `FileError` for a file that is not a store.
+    """Whether there is no store yet; raises `FileError` for a file that is not a store.
 
-    It reads the bytes itself, since SQLite would begin to repair a file that is not ours.
+    It reads the bytes itself, since SQLite would begin to repair another program's file.
     """
     try:
         if not path.parent.is_dir():
             raise FileError(f"cannot open store {path}: there is no folder {path.parent}")
         if path.exists() and not path.is_file():
             raise FileError(f"cannot open store {path}: it is not an ordinary file")
-        header = _head(path) if path.exists() else b""
+        with path.open("rb") if path.exists() else nullcontext() as file:
+            header = file.read(100) if file else b""
     except (OSError, ValueError) as error:
         raise FileError(f"cannot open store {path}: {error}") from error
     if not header:
@@ -204,8 +205,3 @@ def _is_fresh(path: Path) -> bool:
             "it was left as it is"
         )
     return False
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(100)

@@ -1,8 +1,13 @@
-"""The examples in CONTRIBUTING.md are complete: a controller that keeps the contract, a metric."""
+"""The examples in CONTRIBUTING.md are complete: each is run as the guide shows it."""
 
 from __future__ import annotations
 
 import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -21,14 +26,103 @@ from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import description_of, key_of
+from tests import ROOT
 
-GUIDE = Path(__file__).parents[2] / "CONTRIBUTING.md"
+GUIDE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
-def example(chapter: str = "Add a controller") -> str:
-    """The first block of Python in a chapter."""
-    text = GUIDE.read_text(encoding="utf-8").split(f"## {chapter}\n")[1]
-    return text.split("```python\n")[1].split("```")[0]
+def example(chapter: str = "Add a controller", kind: str = "python") -> str:
+    """The first block of a kind in a chapter."""
+    text = GUIDE.split(f"\n## {chapter}\n")[1].split("\n## ")[0]
+    return text.split(f"```{kind}\n")[1].split("```")[0]
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the source with everything added that the guide adds in `+++` blocks and files."""
+    tree = tmp_path_factory.mktemp("tree")
+    for room in ("minisim", "dim", "baselines", "scenarios", "figures"):
+        shutil.copytree(ROOT / room, tree / room, ignore=shutil.ignore_patterns("__pycache__"))
+    for edit in re.findall(r"^\+\+\+ .*?(?=^\+\+\+|^```)", GUIDE, re.MULTILINE | re.DOTALL):
+        head, *lines = edit.rstrip("\n").split("\n")
+        path = tree / head.removeprefix("+++ ")
+        old, new = ("\n".join(line[1:] for line in lines if line[:1] != mark) for mark in "+-")
+        text = path.read_text(encoding="utf-8")
+        assert text.count(f"{old}\n") == 1, edit
+        path.write_text(text.replace(f"{old}\n", f"{new}\n"), encoding="utf-8")
+    (tree / "baselines" / "one_at_a_time.py").write_text(example(), encoding="utf-8")
+    (tree / "scenarios" / "cli" / "arms.py").write_text(example("Add a subcommand"), "utf-8")
+    return tree
+
+
+def output(tree: Path, *arguments: str) -> str:
+    environment = {**os.environ, "MINISIM_JIT": "0", "PYTHONPATH": f"{tree}{os.pathsep}{ROOT}"}
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=tree, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert not done.returncode, done.stderr
+    return done.stdout
+
+
+LAW = """
+import minisim
+from baselines import FixedTime
+from minisim.vehicle import VehicleType
+from scenarios import four_way
+from scenarios.scenario import Profile
+
+assert minisim.__file__.startswith({tree!r})
+for model in ("iidm", "idm-plus"):
+    profile = Profile(name="mine", vehicle=VehicleType(model=model), speed_limit=14.0)
+    run = minisim.simulate(four_way(300, profile=profile, horizon=120.0), FixedTime(), 1)
+    print(run.summary()["travel_time_s"])
+"""
+
+
+def test_its_law_drives_and_is_no_other(tree: Path) -> None:
+    other, ours = map(float, output(tree, "-c", LAW.format(tree=str(tree))).split())
+    assert other != ours
+    assert 60.0 < ours < 120.0
+
+
+def test_its_controller_is_compared_by_name(tree: Path) -> None:
+    run = "-m minisim run three-way -c one-at-a-time:sight=60 -d 100 --horizon 60 --json"
+    assert json.loads(output(tree, *run.split()))["controller"] == "one-at-a-time:sight=60"
+    rivals = output(tree, "-c", "from scenarios.controllers import RIVALS; print(RIVALS)")
+    assert "one-at-a-time" in rivals
+
+
+def test_its_subcommand_answers(tree: Path) -> None:
+    printed = output(tree, "-m", "minisim", "arms", "four-way").splitlines()
+    assert printed == ["a 0°", "b 90°", "c 180°", "d 270°"]
+
+
+def test_its_figure_is_in_the_gallery(tree: Path) -> None:
+    assert "gate-losses" in output(tree, "-m", "minisim", "figures", "--list")
+    code = """
+from figures.gallery import item_named
+from scenarios.studies.shared.archive import Archive
+from scenarios.studies.shared.effort import Effort
+from tests.builders import synthetic_find
+
+figure = item_named("gate-losses").build(Archive(synthetic_find, Effort(seeds=2)))
+print(len(figure.axes[0].get_legend_handles_labels()[0]))
+"""
+    assert output(tree, "-c", code) == "2\n"
+
+
+def test_every_file_that_the_guide_names_exists() -> None:
+    rows = re.findall(r"^\| `([a-z/]+)/` \|[^|]*\|([^|]*)\|", GUIDE, re.MULTILINE)
+    assert len(rows) >= 18
+    for room, files in rows:
+        for name in re.findall(r"`([a-z_/]+(?:\.py|/))`", files):
+            assert (ROOT / room / name).exists(), f"{room}/{name}"
+    rooms = "minisim|dim|baselines|scenarios|figures|tests"
+    for path in re.findall(rf"`((?:{rooms})/[a-z_/]+\.py)`", GUIDE):
+        made = path in ("baselines/one_at_a_time.py", "scenarios/cli/arms.py")
+        assert (ROOT / path).is_file() is not made, path
+    assert len(GUIDE.splitlines()) < 330
 
 
 def loaded(text: str, folder: Path) -> ModuleType:

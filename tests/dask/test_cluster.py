@@ -22,9 +22,9 @@ from scenarios.cli import main
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
 from scenarios.sweep.cluster import cluster
-from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
+from tests.builders import repeatable
 
 pytest.importorskip("distributed", reason="needs the extra `dask`")
 
@@ -80,16 +80,12 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
         yield address
 
 
-def experiments(count: int, horizon: float = 120.0) -> list[Recipe]:
+def recipes(count: int, horizon: float = 120.0) -> list[Recipe]:
     return [Recipe(four_way(300, horizon=horizon), Dim(), seed) for seed in range(count)]
 
 
-def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.drop(columns=list(MEASURED))
-
-
 def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:
-    todo = experiments(24, horizon=600.0)
+    todo = recipes(24, horizon=600.0)
     here = sweep(todo, jobs=1)
     processes = [worker(scheduler), worker(scheduler)]
     killed = False
@@ -161,7 +157,7 @@ def test_no_scheduler_is_told_within_seconds(
 
 
 def test_a_lost_scheduler_leaves_what_was_done(tmp_path: Path) -> None:
-    todo = experiments(12, horizon=1200.0)
+    todo = recipes(12, horizon=1200.0)
     with running_scheduler(tmp_path) as (address, process):
         processes = [worker(address)]
 

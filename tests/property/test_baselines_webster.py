@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.signals.fixed_time import FixedTime
-from baselines.signals.heads import Colour, Phase, Program
+from baselines.signals.fixed_time import FixedTime, Program
+from baselines.signals.heads import Colour
 from baselines.signals.webster import MIN_GREEN, webster, webster_delay
 from minisim.errors import MinisimError
 from scenarios.strategies import floats
@@ -53,31 +53,25 @@ def test_websters_cycle_is_close_to_the_least_delay(n: int, ratio: float) -> Non
 
 @st.composite
 def programs(draw: st.DrawFn) -> Program:
-    n = draw(st.integers(1, 5))
+    n = draw(st.integers(2, 5))
     return Program(
-        tuple(
-            Phase(
-                (lane,),
-                green=draw(floats(0.5, 60.0)),
-                amber=draw(st.sampled_from([0.0, 2.0, 3.5])),
-                all_red=draw(st.sampled_from([0.0, 1.0])),
-            )
-            for lane in range(n)
-        )
+        range(n),
+        draw(st.lists(floats(0.5, 60.0), min_size=n, max_size=n)),
+        amber=draw(st.sampled_from([0.0, 2.0, 3.5])),
+        all_red=draw(st.sampled_from([0.0, 1.0])),
     )
 
 
 @given(programs(), floats(0.0, 1e5))
 def test_a_program_shows_the_same_until_it_switches(program: Program, time: float) -> None:
-    lanes = len(program.phases)
     switch = program.next_switch(time)
 
     assert time < switch <= time + program.cycle + 1e-6
-    shown = program.colours(time, lanes)
+    shown = program.colours(time)
     for share in (0.001, 0.5, 0.999):
         between = time + share * (switch - time)
         if between < switch:
-            assert program.colours(between, lanes) == shown
+            assert program.colours(between) == shown
             assert program.next_switch(between) == switch
     assert sum(colour is not Colour.RED for colour in shown) <= 1
 
@@ -85,7 +79,6 @@ def test_a_program_shows_the_same_until_it_switches(program: Program, time: floa
 @given(programs())
 def test_a_program_does_not_drift(program: Program) -> None:
     """Waking from switch to switch, the start of each cycle is its number times the cycle."""
-    lanes = len(program.phases)
     switches, time = [0.0], 0.0
     while time < 50 * program.cycle:
         time = program.next_switch(time)
@@ -93,12 +86,11 @@ def test_a_program_does_not_drift(program: Program) -> None:
     starts = [
         later
         for earlier, later in pairwise(switches)
-        if program.colours(later, lanes)[0] is Colour.GREEN
-        and (lanes == 1 or program.colours(earlier, lanes)[0] is not Colour.GREEN)
+        if program.colours(later)[0] is Colour.GREEN
+        and program.colours(earlier)[0] is not Colour.GREEN
     ]
-    if lanes > 1:
-        assert starts == [k * program.cycle for k in range(1, len(starts) + 1)]
-        assert len(starts) >= 49
+    assert starts == [k * program.cycle for k in range(1, len(starts) + 1)]
+    assert len(starts) >= 49
 
 
 @given(st.dictionaries(st.sampled_from(sorted(FixedTime.__dataclass_fields__)), JUNK))
@@ -114,8 +106,6 @@ def test_any_argument_makes_a_timing_or_a_clear_error(a: Any, b: Any, c: Any) ->
         lambda: webster([100, 100, 100], saturation_flow=a, max_cycle=b),
         lambda: webster([100, 100, 100], min_green=a, lost_time_per_phase=b),
         lambda: webster_delay(a, b, c),
-        lambda: Phase(a, b, c),
-        lambda: Program(a),
     ):
         with suppress(MinisimError):
             attempt()

@@ -1,4 +1,4 @@
-"""Car following over all ordinary drivers: nobody hits a leader that brakes to a stop."""
+"""Car following over all ordinary drivers: no vehicle hits a leader that brakes to a stop."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_ballistic_is_exact_and_never_reverses(v: float, s: float, acc: float, d
 
 
 @given(floats(0.5, 30.0), floats(0.0, 1.0), floats(1.0, 6.0), floats(0.02, 0.2), floats(1.0, 3.0))
-def test_whoever_follows_speed_towards_reaches_the_target_speed_in_time(
+def test_following_speed_towards_reaches_the_target_speed_in_time(
     v: float, share: float, b: float, dt: float, room: float
 ) -> None:
     """From anywhere that b can make it: braking never exceeds b, and the line is not crossed

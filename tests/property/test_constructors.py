@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable
+from dataclasses import MISSING
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -15,19 +15,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import scenarios
-from baselines import Adaptive, AllWayStop, FixedTime, LongestQueue, webster, webster_delay
-from baselines.signals.heads import Phase, Program
-from dim import Dim, ExactPerception, HarmonyMatrix, NoisyPerception, Zones, decide, explain
+from baselines import webster, webster_delay
+from dim import HarmonyMatrix, explain
 from minisim import simulate
 from minisim.arrivals import Arrivals, Demand, read_arrivals
-from minisim.control import Marking, Plan, Site, Unregulated
+from minisim.control import Marking, Site, Unregulated
 from minisim.errors import MinisimError
 from minisim.junction.geometry import Intersection
+from minisim.parameters import parameters
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import FAIR, Profile, Scenario, profile_named
+from tests.property.test_declared import declarations
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)
 FOUR = Intersection(BEARINGS, arm_length=60.0)
@@ -50,8 +51,8 @@ TRAFFIC = {
 }  # fmt: skip
 RUN = {"profile": "fair", "horizon": 60.0, "recorded": None}
 
+#: Functions and classes with arguments that have no default.
 CASES = {
-    "VehicleType": Case(VehicleType, {f.name: f.default for f in dataclasses.fields(VehicleType)}),
     "Intersection": Case(Intersection, {"bearings": BEARINGS, **GEOMETRY}),
     "Intersection.parse": Case(FOUR.parse, {"text": "a1"}),
     "Demand": Case(Demand, TRAFFIC),
@@ -66,11 +67,6 @@ CASES = {
          "dt": 0.1, "seed": 0},
     ),
     "Marking": Case(Marking, {"name": "red", "start": 30.0, "end": 8.0, "speed": 5.0}),
-    "Plan": Case(
-        Plan,
-        {"hold_distance": 2.0, "markings": (), "marks": (1.0,), "wake_on_clear": True,
-         "period": 1.0, "sight": 50.0, "lanes_open": False},
-    ),
     "Profile": Case(
         Profile,
         {"name": "x", "vehicle": CAR, "speed_limit": 14.0, "depart_speed": None, "dt": 0.1},
@@ -81,11 +77,6 @@ CASES = {
          "recorded": EMPTY},
     ),
     "three_way": Case(scenarios.three_way, {**GEOMETRY, **TRAFFIC, **RUN, "turns": (1, 1)}),
-    "four_way": Case(scenarios.four_way, {**GEOMETRY, **TRAFFIC, **RUN}),
-    "five_way": Case(
-        scenarios.five_way,
-        {**GEOMETRY, **TRAFFIC, **RUN, "turns": None, "junction_radius": 12.0},
-    ),
     "regular": Case(scenarios.regular, {"n": 4, **GEOMETRY, **TRAFFIC, **RUN}),
     "from_bearings": Case(
         scenarios.from_bearings,
@@ -97,44 +88,11 @@ CASES = {
     "HarmonyMatrix.from_geometry": Case(
         HarmonyMatrix.from_geometry, {"intersection": FOUR, "vehicle": CAR, "clearance": 0.5}
     ),
-    "decide": Case(
-        decide,
-        {"movements": ("a1", "b2"), "matrix": HarmonyMatrix.paper(4), "order": "size",
-         "priorities": (3, 2, 1, 0)},
-    ),
     "explain": Case(
         explain,
         {"movements": ("a1", "b2"), "matrix": HarmonyMatrix.paper(4), "order": "lanes",
-         "priorities": None},
+         "priorities": (3, 2, 1, 0)},
     ),
-    "Zones": Case(Zones, {"red": 30.0, "yellow": 6.0, "green": 2.0, "red_speed": 5.0}),
-    "Dim": Case(
-        Dim,
-        {"order": "size", "commit": "stoppable", "gate": "clear", "priorities": None,
-         "zones": Zones(), "matrix": None, "perception": ExactPerception(), "period": None},
-    ),
-    "NoisyPerception": Case(
-        NoisyPerception,
-        {"intent_error": 0.15, "kind": "missed", "shared": True, "persistent": False,
-         "unsignalled": (0.3, 0.25), "confidence": 0.9, "sensor_range": 30.0, "occlusion": True,
-         "delay": 0.5, "position_noise": 0.1, "speed_noise": 0.1, "frame": 0.1},
-    ),
-    "FixedTime": Case(
-        FixedTime,
-        {"greens": (5.0, 6.0), "amber": 2.0, "saturation_flow": 1500.0, "lost_time": 2.0,
-         "equal_greens": False, "max_cycle": 180.0, "all_red": 0.0},
-    ),
-    "Adaptive": Case(
-        Adaptive,
-        {"detector_range": 100.0, "min_time_loss": 1.0, "min_green": 3.0, "max_green": 50.0,
-         "extend_max_green": True, "amber": 2.0},
-    ),
-    "LongestQueue": Case(
-        LongestQueue, {"interval": 5.0, "detector_range": 50.0, "amber": 2.0}
-    ),
-    "AllWayStop": Case(AllWayStop, {"reaction": 1.0}),
-    "Phase": Case(Phase, {"lanes": (0,), "green": 5.0, "amber": 2.0, "all_red": 0.0}),
-    "Program": Case(Program, {"phases": (Phase((0,), 5.0),)}),
     "webster": Case(
         webster,
         {"rates": (100.0,) * 4, "saturation_flow": 1500.0, "lost_time_per_phase": 2.0,
@@ -152,9 +110,15 @@ CASES = {
     ),
 }  # fmt: skip
 
+#: Every declared class whose parameters all have a default.
+for kind in {kind for kind, _ in declarations().values()}:
+    defaults = {it.name: it.default for it in parameters(kind)}
+    if MISSING not in defaults.values():
+        CASES.setdefault(kind.__name__, Case(kind, defaults))
+
 
 def numbers() -> st.SearchStrategy[Any]:
-    """Numbers of every type, with a liking for the edges."""
+    """Numbers of every type, mostly at the edges."""
     edges = [
         0, -1, 1, 0.5, 3, math.nan, math.inf, -math.inf, -0.0, 5e-324, 1e-300, 1e308, 10**30,
         10**400, -(10**400), True, False, 1j, np.float64("nan"), np.float32(2.5),

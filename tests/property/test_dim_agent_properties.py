@@ -68,7 +68,7 @@ def is_crossing(vehicle: Observed, dim: Dim, b: float) -> bool:
 
 
 def model(holding: set[int], view: View, dim: Dim, site: Site, matrix: HarmonyMatrix) -> set[int]:
-    """Algorithm 1 once more, for all vehicles at once and in the words of DESIGN §6."""
+    """Algorithm 1 again, for all vehicles at once."""
     near = [v for v in view.vehicles if v.distance <= 8.0]
     crossing = [v for v in near if is_crossing(v, dim, site.vehicle.deceleration)]
     before = sorted((v for v in near if v.distance >= 0), key=lambda v: -v.distance)
@@ -138,7 +138,7 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
 
 
 @given(runs())
-def test_whoever_starts_to_go_is_in_harmony_with_everyone_who_goes(
+def test_a_vehicle_that_starts_to_go_is_in_harmony_with_all_that_go(
     run: tuple[Site, Dim, list[View]],
 ) -> None:
     """With commit="stoppable", one view after the other: the new right of way is safe."""
@@ -157,11 +157,11 @@ def test_whoever_starts_to_go_is_in_harmony_with_everyone_who_goes(
                 assert other.lane == v.lane or matrix[v.movement, other.movement]
         if movers and crossing:
             assert dim.gate == "harmonious"
-        for v in movers:  # in front of everyone of its lane who has not entered
+        for v in movers:  # in front of all of its lane that have not entered
             ahead = [o for o in near if o.lane == v.lane and o.distance < v.distance]
             assert all(o.distance < 0 for o in ahead)
         if near and not crossing:
-            assert movers  # somebody goes: no deadlock
+            assert movers  # a vehicle goes: no deadlock
 
 
 @pytest.mark.parametrize("maker", [three_way, four_way, five_way])

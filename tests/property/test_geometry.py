@@ -57,14 +57,14 @@ def test_corridor_contains_every_body(
 
 @share(0.5)
 @given(intersections(), vehicles())
-def test_nobody_touches_a_vehicle_held_at_another_entry(
+def test_no_vehicle_touches_one_held_at_another_entry(
     intersection: Intersection, vehicle: VehicleType
 ) -> None:
-    """Right of way is given to movements, so a held vehicle must be out of everybody's way.
+    """Right of way is given to movements, so a held vehicle must be out of the way of all others.
 
-    Cars of up to 6 × 2 m on lanes of 2.8 m or more: one body's width in the own lane, and what
-    the inner side cuts of the corner, 2/27·L²/r for a tangent arc of radius r (the offset of the
-    chord at the tangent point, largest when a third of the body is past it).
+    Cars are at most 6 × 2 m, lanes at least 2.8 m wide. A car takes its width of the lane, and its
+    inner side cuts the corner by 2/27·L²/r for a tangent arc of radius r (the offset of the chord
+    at the tangent point, largest when a third of the body is past it).
     """
     room = entry_room(intersection, vehicle)
     fronts = intersection.approach_length - np.array([0.0, 3.0])
@@ -82,19 +82,13 @@ def test_nobody_touches_a_vehicle_held_at_another_entry(
     assert room > 0.0
 
 
-@given(
-    bearings(),
-    floats(2.0, 4.0),
-    floats(0.0, 1.0),
-    floats(3.0, 15.0),
-    floats(1.5, 3.0),
-)
+@given(bearings(), floats(2.0, 4.0), floats(0.0, 1.0), floats(3.0, 15.0), floats(1.5, 3.0))
 @example((0.0, 72.0, 144.0, 216.0, 288.0), 2.0, 1.0, 6.0, 2.0)
 @example((0.0, 60.0, 120.0), 3.2, 1.0, 12.0, 2.5)
 def test_a_vehicle_that_does_not_fit_the_lanes_is_refused(
     angles: tuple[float, ...], lane_width: float, shrink: float, length: float, width: float
 ) -> None:
-    """Whatever `Site` accepts is never touched while held, or `Site` says that it does not fit."""
+    """`Site` accepts a vehicle only when no other touches it while it is held."""
     smallest = Intersection(angles, lane_width=lane_width).junction_radius
     try:
         intersection = Intersection(
@@ -110,7 +104,7 @@ def test_a_vehicle_that_does_not_fit_the_lanes_is_refused(
 
 @share(0.5)
 @given(intersections(), vehicles(), st.data())
-def test_past_the_branch_nobody_on_the_other_path_is_in_the_way(
+def test_past_the_branch_no_vehicle_on_the_other_path_is_in_the_way(
     intersection: Intersection, vehicle: VehicleType, data: st.DataObject
 ) -> None:
     """Car following ignores a leader whose rear has passed the branch: they must not touch."""
@@ -136,20 +130,3 @@ def test_conflicts_grow_with_clearance_and_hold_wherever_paths_merge(
     assert not (narrow & ~wide).any()
     exits = intersection.movements.exits
     assert narrow[exits[:, None] == exits[None, :]].all()
-
-
-@given(intersections())
-def test_every_movement_has_one_name(intersection: Intersection) -> None:
-    names = [str(m) for m in intersection.movements]
-    assert len(set(names)) == intersection.n * (intersection.n - 1)
-    assert [intersection.parse(name) for name in names] == list(intersection.movements)
-
-
-@given(st.text(max_size=4))
-def test_parse_reads_a_movement_or_refuses(text: str) -> None:
-    intersection = Intersection((0.0, 120.0, 240.0))
-    try:
-        movement = intersection.parse(text)
-    except InputError:
-        return
-    assert str(movement) == text

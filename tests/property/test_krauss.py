@@ -1,4 +1,4 @@
-"""Krauß's law over all ordinary drivers: nobody is hit, stops are exact, one law in both rules."""
+"""Krauß's law over all ordinary drivers: no collisions, exact stops, one law in both rules."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_the_braking_distance_is_the_sum_of_its_steps(v: float, b: float, dt: fl
 
 
 @given(floats(0.1, 20.0), floats(0.0, 20.0), floats(0.01, 150.0), BRAKING, STEPS)
-def test_whoever_drives_stepwise_towards_a_limit_meets_it_where_it_begins(
+def test_driving_stepwise_towards_a_limit_meets_it_where_it_begins(
     v0: float, target: float, distance: float, b: float, dt: float
 ) -> None:
     """Never faster than the limit past its beginning, never braking harder than b to get there."""
@@ -89,7 +89,7 @@ def test_whoever_drives_stepwise_towards_a_limit_meets_it_where_it_begins(
 def test_a_platoon_behind_a_leader_that_brakes_to_a_stop_keeps_its_gaps(
     driver: VehicleType, v0: float, share: float, dt: float
 ) -> None:
-    """From equilibrium, the leader brakes at b: everybody stops `min_gap` behind, none closer."""
+    """From equilibrium, the leader brakes at b: all stop `min_gap` behind, none closer."""
     a, b, headway = driver.acceleration, driver.deceleration, driver.headway
     v = [share * v0] * 4
     s = [-i * (share * v0 * headway + driver.min_gap + STILL) for i in range(4)]

@@ -1,8 +1,8 @@
-"""Traffic that is made up as it goes: vehicles come when it hurts, with the model as oracle.
+"""Traffic that is made up on the way: vehicles come at bad moments, with the model as oracle.
 
 A run's arrivals are fixed when it starts, so each rule adds to the list and runs again from the
-beginning up to now. That costs little, and shows one thing more: what comes later changes nothing
-that was before.
+beginning up to now. That costs little, and also shows that later arrivals do not change earlier
+events.
 """
 
 from __future__ import annotations
@@ -24,18 +24,17 @@ from hypothesis.stateful import (
 from dim import Dim
 from dim.agent import GATES
 from dim.decision import ORDERS
-from dim.perception import See
 from dim.proofs.conformance import Checked
 from minisim.control import Brake, Command, Controller, Observed, Site, View, can_stop
 from minisim.errors import CollisionError
 from minisim.simulation import Simulation
 from scenarios import Scenario, regular
-from tests.builders import replayed
+from tests.builders import Reading, replayed
 
-#: Short roads: from insertion to the yellow zone it takes a few seconds.
+#: Short roads: a vehicle reaches the yellow zone in a few seconds.
 ARM_LENGTH = 80.0
 HORIZON = 2000.0
-#: After so long a few vehicles have left the junction behind [s].
+#: By then a few vehicles have left the junction [s].
 EMPTIED = 30.0
 
 LANES, TURNS = st.integers(0, 4), st.integers(1, 4)
@@ -62,7 +61,7 @@ class Traffic(RuleBasedStateMachine):
 
     @rule(lane=LANES, manoeuvre=TURNS)
     def comes_now(self, lane: int, manoeuvre: int) -> None:
-        """Somebody wants to enter the road."""
+        """A vehicle wants to enter the road."""
         self._add(self.time, lane, manoeuvre)
 
     @rule(tenths=st.integers(1, 100))
@@ -78,15 +77,15 @@ class Traffic(RuleBasedStateMachine):
 
     @rule(first=st.tuples(LANES, TURNS), second=st.tuples(LANES, TURNS), tenths=st.integers(0, 15))
     def a_pair_comes(self, first: tuple[int, int], second: tuple[int, int], tenths: int) -> None:
-        """Two come on an empty road, so fast that the second may revoke what the first was given
-        when that one can no longer stop."""
+        """On an empty road, so close together that the second may revoke the right of way of the
+        first when that one can no longer stop."""
         self._run_to(self.time + EMPTIED)
         self._add(self.time, *first)
         self._add(self.time + tenths / 10, *second)
         self._run_to(self.time + self.lead + 3.0)
 
     def teardown(self) -> None:
-        """In the end everybody has been served."""
+        """In the end every vehicle has been served."""
         if self.trips:
             run = self._simulation().run()
             assert run.columns.arrived.all()
@@ -105,7 +104,7 @@ class Traffic(RuleBasedStateMachine):
             self._obeys(vehicle)
 
     def _obeys(self, vehicle: Observed) -> None:
-        """Who cannot stop any more before the junction has the right of way."""
+        """A vehicle that can no longer stop before the junction has the right of way."""
         b = self.road.profile.vehicle.deceleration
         if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
             assert vehicle.id in self.going
@@ -152,23 +151,14 @@ class Change:
     until: float
 
 
-@dataclass(frozen=True)
-class Indicators:
-    """Everybody, the vehicle too, goes by what the indicators show at the time."""
+def indicators(changes: tuple[Change, ...]) -> Reading:
+    """All vehicles, even the one itself, go by what its indicator shows at the time."""
 
-    changes: tuple[Change, ...]
-    name = "indicators"
-    period = 0.1
+    def shown(view: View, _: Observed, vehicle: Observed) -> int:
+        now = (c for c in changes if c.vehicle == vehicle.id and view.time < c.until - 1e-6)
+        return next((c.shown for c in now), vehicle.manoeuvre)
 
-    def start(self, site: Site) -> See:
-        def see(view: View, ego: Observed) -> View:
-            shown = {c.vehicle: c.shown for c in self.changes if view.time < c.until - 1e-6}
-            return View(
-                view.time,
-                tuple(v._replace(manoeuvre=shown.get(v.id, v.manoeuvre)) for v in view.vehicles),
-            )
-
-        return see
+    return Reading(shown)
 
 
 @dataclass(frozen=True)
@@ -202,8 +192,8 @@ class StallingSession:
 class DisturbedTraffic(Traffic):
     """The same where vehicles stall, anywhere, and change their minds while they still may.
 
-    The model knows neither; what has to hold is that nobody collides, that who cannot stop has
-    the right of way, and that in the end everybody has been served.
+    The model knows neither. But no vehicles may collide, those that cannot stop must have the right
+    of way, and in the end all must have been served.
     """
 
     stalls: tuple[Stall, ...] = ()
@@ -212,7 +202,7 @@ class DisturbedTraffic(Traffic):
     @rule(which=st.integers(0, 20), tenths=st.integers(5, 150))
     @precondition(lambda self: self.trips)
     def stalls_now(self, which: int, tenths: int) -> None:
-        """Somebody in sight, before the junction or inside, comes to a stand for a while."""
+        """A vehicle in sight, before the junction or inside, stands for a while."""
         here = self._view().vehicles
         free = [v.id for v in here if all(s.vehicle != v.id for s in self.stalls)]
         if free:
@@ -222,7 +212,7 @@ class DisturbedTraffic(Traffic):
     @rule(which=st.integers(0, 20), manoeuvre=TURNS)
     @precondition(lambda self: self.trips)
     def changes_indicator(self, which: int, manoeuvre: int) -> None:
-        """Somebody who can still stop wants to go elsewhere, and says so from now on."""
+        """A vehicle that can still stop changes its way, and its indicator from now on."""
         b = self.road.profile.vehicle.deceleration
         here = [v for v in self._view().vehicles if v.distance >= 0.0 and can_stop(v, b)]
         free = [v for v in here if all(c.vehicle != v.id for c in self.changes)]
@@ -243,7 +233,7 @@ class DisturbedTraffic(Traffic):
             self.trips, self.changes = before
 
     def _controller(self) -> Controller:
-        dim = replace(self.dim, perception=Indicators(self.changes))
+        dim = replace(self.dim, perception=indicators(self.changes))
         return Stalling(dim, self.stalls)
 
 

@@ -1,4 +1,4 @@
-"""No two bodies touch and everybody is served, whoever drives."""
+"""No two bodies touch and every vehicle is served, whether humans drive or not."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.builders import replayed, share
 SHARES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
 #: What may be believed without believing in silence, which is unsafe.
 SAFE = ("motion", "signals")
-#: Demand lasts so long, and then an hour is left to serve it [s].
+#: How long demand lasts, and how much time is left to serve it [s].
 DEMANDED, DRAINED = 240.0, 3600.0
 
 
@@ -52,7 +52,7 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
 
 
 def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
-    """A collision raises; whoever was not served is a failure."""
+    """A collision raises; a vehicle that was not served is a failure."""
     run = minisim.simulate(scenario, mixed, seed)
     unserved = (~run.columns.arrived).nonzero()[0].tolist()
     assert unserved == [], f"vehicles {unserved} under {mixed}"
@@ -78,16 +78,16 @@ def seed_of(kinds: tuple[bool, ...], silent: tuple[bool, ...]) -> int:
     raise AssertionError("seeds do not end")
 
 
-#: Every other movement beside each of lane a, up to the rotation of the junction.
+#: Each movement of lane a with each of another lane; the rest are rotations.
 PAIRS = [((0, m), (lane, k)) for m in (1, 2, 3) for lane in (1, 2, 3) for k in (1, 2, 3)]
-#: The second comes so much later [s]: they meet at the line, in its yellow zone, or inside.
+#: How much later the second comes [s]: they meet at the line, in the yellow zone, or inside.
 DELAYS = (0.0, 0.6, 1.7, 3.4)
 
 
 @pytest.mark.parametrize("gate", GATES)
 @pytest.mark.parametrize("kinds", [(True, False), (False, True), (True, True)])
 def test_every_pair_passes_without_waiting_for_ever(gate: str, kinds: tuple[bool, bool]) -> None:
-    """Every two movements on four arms, whoever comes first, announced or not."""
+    """Every two movements on four arms, whichever comes first, announced or not."""
     road = four_way(profile="fair", arm_length=120.0)
     mixed = Mixed(Dim(gate=gate), 0.5)
     for (first, second), delay, quiet in itertools.product(PAIRS, DELAYS, (False, True)):
@@ -96,7 +96,7 @@ def test_every_pair_passes_without_waiting_for_ever(gate: str, kinds: tuple[bool
 
 
 @pytest.mark.parametrize("gate", GATES)
-def test_nobody_waits_in_a_circle(gate: str) -> None:
+def test_no_vehicles_wait_in_a_circle(gate: str) -> None:
     """Four at once, one a lane, straight or to the far side, humans and others in every mixture."""
     road = four_way(profile="fair", arm_length=120.0)
     mixed = Mixed(Dim(gate=gate), 0.5)
@@ -109,7 +109,7 @@ def test_nobody_waits_in_a_circle(gate: str) -> None:
 
 @share(0.2)
 @given(seed=st.integers(0, 1000))
-def test_who_is_human_depends_on_nothing_but_seed_and_share(seed: int) -> None:
+def test_drivers_depend_only_on_seed_and_share(seed: int) -> None:
     fewer = Mixed(Dim(gate="harmonious"), 0.2, Humans(trust="motion")).human(seed, 500)
     more = Mixed(share=0.7).human(seed, 500)
     assert not (fewer & ~more).any()

@@ -1,4 +1,4 @@
-"""Whole simulations over random junctions, demands and seeds: nobody collides, all are served."""
+"""Whole simulations over random junctions, demands and seeds: no collisions, all are served."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import minisim
 from baselines import FixedTime
 from dim import Dim
 from minisim.control import Controller, Plan, Unregulated
-from minisim.engine.collision import touching
+from minisim.engine.collision import near_bodies, touching
 from minisim.results.run import Run
 from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
@@ -28,11 +28,11 @@ seeds = st.integers(0, 2**32 - 1)
 def served_without_collision(scenario: Scenario, controller: Controller, seed: int) -> Run:
     """Run to the last arrival; a collision raises. Checks what must hold of any run."""
     run = minisim.simulate(drained(scenario, seed, PATIENCE), controller, seed=seed, record="all")
-    assert run.columns.arrived.all(), "somebody was never served"
+    assert run.columns.arrived.all(), "a vehicle was never served"
     trace = run.trace[np.lexsort((run.trace["tick"], run.trace["row"]))]
     same = trace["row"][1:] == trace["row"][:-1]
     assert (trace["v"] >= 0.0).all()
-    assert (np.diff(trace["s"])[same] >= 0.0).all(), "somebody reversed"
+    assert (np.diff(trace["s"])[same] >= 0.0).all(), "a vehicle reversed"
     assert trace["a"].min(initial=0.0) >= -run.site.vehicle.max_deceleration
     real = np.diff(trace["v"])[same] / run.site.dt
     assert real.min(initial=0.0) >= -run.site.vehicle.max_deceleration - 1e-6
@@ -57,23 +57,19 @@ def assert_no_overlap_in_lane(run: Run) -> None:
 
 @given(scenarios(), seeds)
 @settings(max_examples=100)
-def test_dim_is_safe_and_serves_everybody(scenario: Scenario, seed: int) -> None:
+def test_dim_is_safe_and_serves_all(scenario: Scenario, seed: int) -> None:
     served_without_collision(scenario, Dim(), seed)
 
 
 @given(scenarios(max_density=500.0), seeds, st.sampled_from(["size", "lanes"]))
 @settings(max_examples=100)
-def test_dim_harmonious_is_safe_and_serves_everybody(
-    scenario: Scenario, seed: int, order: str
-) -> None:
+def test_dim_harmonious_is_safe_and_serves_all(scenario: Scenario, seed: int, order: str) -> None:
     served_without_collision(scenario, Dim(gate="harmonious", order=order), seed)
 
 
 @given(scenarios(), seeds, st.floats(0.0, 4.0))
 @settings(max_examples=100)
-def test_fixed_time_is_safe_and_serves_everybody(
-    scenario: Scenario, seed: int, amber: float
-) -> None:
+def test_fixed_time_is_safe_and_serves_all(scenario: Scenario, seed: int, amber: float) -> None:
     served_without_collision(scenario, FixedTime(amber=amber), seed)
 
 
@@ -103,7 +99,7 @@ def test_broad_phase_never_misses_a_touch(scenario: Scenario, seed: int) -> None
     dt = scenario.profile.dt
     while not sim.finished:
         sim.advance(sim.time + dt)
-        rows, bodies = sim._near_bodies()
+        rows, bodies = near_bodies(sim._vehicles, sim.site)
         found = {tuple(sorted((_id(sim, rows[i]), _id(sim, rows[j])))) for i, j in touching(bodies)}
         assert found <= {c.vehicles for c in sim.collisions}
 
@@ -117,7 +113,7 @@ def _id(sim: Simulation, row: int) -> int:
 def test_a_platoon_stops_at_the_line_one_behind_the_other(
     vehicle, hold_distance: float, speed: float, dt: float
 ) -> None:
-    """The front bumper 0 … 0.3 m before the line, never beyond; nobody touches the one ahead."""
+    """The front bumper 0 … 0.3 m before the line, never beyond; none touches the one ahead."""
     profile = dataclasses.replace(
         four_way().profile, vehicle=vehicle, speed_limit=speed, dt=dt, name="random"
     )

@@ -14,8 +14,9 @@ from minisim.simulation import Run
 from minisim.sumo import simulate
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.paper import Cell, controller_of, reference_value, replay
+from scenarios.paper import Cell, controller_of, replay
 from scenarios.scenario import AS_RUN_SIGNALS, FAIR
+from tests.builders import reference_value
 
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=VehicleType(model="krauss"))
 
@@ -46,7 +47,7 @@ def test_another_model_of_sumo_does_not_drive_them() -> None:
 
 
 @pytest.mark.slow
-def test_the_published_vehicle_agrees_but_for_those_who_follow_a_turning_one() -> None:
+def test_the_published_vehicle_agrees_except_behind_a_turning_one() -> None:
     """The replay of FTS at 350: where they differ, minisim follows a vehicle that turns off until
     the bodies are clear of each other, SUMO until its rear has left the lane.
     """

@@ -27,10 +27,13 @@ import pytest
 import minisim
 from baselines import Actuated, Adaptive, AllWayStop, FixedTime, all_way_stop
 from minisim.control import Controller, Site
+from minisim.junction.conflicts import conflicts
+from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Floats
 from minisim.sumo.host import sumo_home
 from minisim.sumo.network import run_tool, tag, write_xml
+from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.scenario import Scenario
 from tests.builders import replayed
@@ -170,10 +173,11 @@ def alike(ours: Means, theirs: Means) -> bool:
 
 
 def enter_as_sumo_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let whoever is in the junction no longer be in the way of those at the line."""
+    """Let vehicles in the junction no longer be in the way of those at the line."""
 
-    def at_entry(site: Site) -> Floats:
-        return np.where(site.conflicts, 0.01, -np.inf)
+    def at_entry(intersection: Intersection, vehicle: VehicleType) -> Floats:
+        crossing = conflicts(intersection, vehicle) & intersection.movements.apart
+        return np.where(crossing, 0.01, -np.inf)
 
     monkeypatch.setattr(all_way_stop, "clearing_distances", at_entry)
 

@@ -1,4 +1,4 @@
-"""How the paper's values and ours are written beside each other."""
+"""The paper's values and ours side by side, in words and numbers."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from figures import style
-from scenarios.studies.shared.archive import Archive
 from scenarios.studies.shared.paper_comparison import compare, score
+from scenarios.studies.shared.study import Results
 
-#: Study of the paper's grid -> what it is called.
+#: Study of the paper's grid -> words.
 HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes it"}
 
 EXPLAINED = (
@@ -20,10 +20,9 @@ EXPLAINED = (
 )
 
 
-def agreement(archive: Archive, name: str) -> str:
+def agreement(results: Results) -> str:
     """How many of the paper's values lie inside our intervals, in all and by controller."""
-    effort = archive.effort
-    results = archive.study(name)
+    name, effort = results.study.name, results.effort
     if results.good.empty:
         return f"- `{name}`: not run (`{effort.command(name)}`)."
     table = compare(results.good)
@@ -35,19 +34,19 @@ def agreement(archive: Archive, name: str) -> str:
     return (
         f"- `{name}`: {effort.warning}{score(table)} comparable values of the paper lie inside our "
         f"95 % prediction interval; of those that are not comparable, "
-        f"{score(table, comparable=False)}. Inside says that one more run of ours could well give "
-        "the paper's value; where our runs spread widely, near saturation, nearly every value is "
+        f"{score(table, comparable=False)}. Inside means that one more run of ours could well give "
+        "the paper's value. Near saturation, our runs spread so widely that nearly every value is "
         f"inside.\n  By controller: {', '.join(by_series)}."
     )
 
 
 def marked(row: Mapping[Any, Any]) -> str:
-    """The paper's value; † where it is not the run that its label says."""
+    """The paper's value; † if it is not the run that its label says."""
     return f"{row['paper']:.2f}" + ("" if row["comparable"] == "yes" else " †")
 
 
 def range_words(row: Mapping[Any, Any], *, mean: bool = False) -> str:
-    """Our prediction interval, or our mean with it; ↑ where queues still grew."""
+    """Our prediction interval, after our mean if asked for; ↑ if queues still grew."""
     arrow = " ↑" if row["saturated"] else ""
     words = f"{two_digits(row['low'])} … {two_digits(row['high'])}{arrow}"
     if not mean:
@@ -56,7 +55,7 @@ def range_words(row: Mapping[Any, Any], *, mean: bool = False) -> str:
 
 
 def two_digits(value: object) -> str:
-    """A number, or a dash where there is none."""
+    """A number, or a dash if there is none."""
     return f"{value:.2f}" if isinstance(value, float) and math.isfinite(value) else "–"
 
 

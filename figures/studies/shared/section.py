@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from figures.tables import Table
 from scenarios.studies.shared.archive import Archive
+from scenarios.studies.shared.study import Results
 
-#: What is drawn: a picture, or a table to read.
 Drawing = Figure | Table
 
 
@@ -19,34 +19,38 @@ class Item:
     """A figure or table that can be made.
 
     Attributes:
-        name: as on the command line, and of its files.
+        name: on the command line, and of its files.
         title: in one line.
-        build: makes it from results.
-        needs: the studies that it is made from; none for what needs no run.
+        draw: makes it from the results of the studies that it needs, one argument each.
+        needs: those studies.
         in_report: whether the report shows it; otherwise it is a file only.
     """
 
     name: str
     title: str
-    build: Callable[[Archive], Drawing]
+    draw: Callable[..., Drawing]
     needs: tuple[str, ...] = ()
     in_report: bool = True
+
+    def build(self, archive: Archive) -> Drawing:
+        """Make it; raises `MissingRunsError` if it needs runs and there are none."""
+        return self.draw(*archive.need(*self.needs))
 
 
 @dataclass(frozen=True)
 class Section:
-    """What belongs together in the report.
+    """A section of the report.
 
     Attributes:
         heading: above it.
-        items: its figures and tables, in their order.
-        answer: what the study says, in a few sentences at the head of the report.
+        items: its figures and tables, in order.
+        answer: the study's answer in a few sentences, for the head of the report.
         ending: a text below the items.
         appendix: whether it comes after all others.
     """
 
     heading: str
     items: tuple[Item, ...]
-    answer: Callable[[Archive], str] | None = None
+    answer: Callable[[Results], str] | None = None
     ending: Callable[[Archive], str] | None = None
     appendix: bool = False

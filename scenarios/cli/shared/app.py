@@ -1,4 +1,4 @@
-"""The `minisim` command itself; each module beside this one adds its own."""
+"""The app of the `minisim` command, to which each command is added."""
 
 from __future__ import annotations
 

@@ -3,42 +3,34 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from minisim.errors import InputError
+from minisim.errors import InputError, integer
 from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals as ArrivalTable
-    from minisim.results.metrics import Metric
     from scenarios.scenario import Scenario
 
-#: Groups of the options of `minisim run` in its help.
+#: A group of options in the help.
 FILES = "Files"
-SUMO = "SUMO"
 
 ScenarioName = Annotated[
     str,
-    typer.Argument(
-        metavar="SCENARIO",
-        show_default=False,
-        help="three-way, four-way, 6-way, … or custom.",
-    ),
+    typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, … or custom."),
 ]
 ControllerName = Annotated[
     str,
     typer.Option(
-        "--controller",
-        "-c",
-        metavar="SPEC",
-        show_default=False,
+        "--controller", "-c", metavar="SPEC", show_default=False,
         help="Who decides: dim, dim:gate=harmonious, …",
     ),
-]
+]  # fmt: skip
 Humans = Annotated[
     float,
     typer.Option(metavar="SHARE", show_default=False, help="Human drivers among DIM's, 0 … 1."),
@@ -46,13 +38,10 @@ Humans = Annotated[
 Density = Annotated[
     float | None,
     typer.Option(
-        "--density",
-        "-d",
-        metavar="VEH/H",
-        show_default=False,
+        "--density", "-d", metavar="VEH/H",
         help="Mean inflow a lane; 350 unless told.",
     ),
-]
+]  # fmt: skip
 Split = Annotated[
     str | None, typer.Option(metavar="4:3:2:1", help="Shares of the lanes a, b, c, …")
 ]
@@ -60,41 +49,38 @@ Turns = Annotated[str | None, typer.Option(metavar="1:2:1", help="Shares of the 
 ProfileName = Annotated[
     str,
     typer.Option(
-        "--profile",
-        "-p",
-        metavar="NAME",
-        show_default=False,
+        "--profile", "-p", metavar="NAME", show_default=False,
         help="Vehicle and speeds: paper, fair, as_run.",
     ),
-]
+]  # fmt: skip
 Side = Annotated[
-    str,
-    typer.Option(
-        metavar="SIDE",
-        show_default=False,
-        help="Of the traffic: left or right.",
-    ),
+    str, typer.Option(metavar="SIDE", show_default=False, help="Of the traffic: left or right.")
 ]
 Bearings = Annotated[
-    str | None,
-    typer.Option(metavar="0,90,…", help="Of custom's arms, from north."),
+    str | None, typer.Option(metavar="0,90,…", help="Of custom's arms, from north.")
 ]
 Seed = Annotated[
     int,
     typer.Option(
-        "--seed",
-        "-s",
-        metavar="N",
-        show_default=False,
+        "--seed", "-s", metavar="N", show_default=False,
         help="Of the random arrivals; 0 unless told.",
     ),
+]  # fmt: skip
+Order = Annotated[
+    str,
+    typer.Option(
+        metavar="size|lanes",
+        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
+        "(its published runs).",
+    ),
 ]
-Horizon = Annotated[
-    float, typer.Option(metavar="S", show_default=False, help="Simulated time; 3600 unless told.")
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+Folder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write to.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Processes to use; one a core by default."),
 ]
-Warmup = Annotated[
-    float, typer.Option(metavar="S", show_default=False, help="Earlier trips do not count.")
-]
+Quick = Annotated[bool, typer.Option("--quick", help="Fewer and shorter runs: a smoke test.")]
 
 
 def _file_name(text: str) -> Path:
@@ -106,71 +92,21 @@ def _file_name(text: str) -> Path:
 Arrivals = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE",
-        parser=_file_name,
-        rich_help_panel=FILES,
+        metavar="FILE", parser=_file_name, rich_help_panel=FILES,
         help="Replay these: demand_time_s, lane, manoeuvre.",
     ),
-]
-Host = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        show_default=False,
-        rich_help_panel=SUMO,
-        help="What moves vehicles: minisim or sumo.",
-    ),
-]
-SumoModel = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        rich_help_panel=SUMO,
-        help="IDM, Krauss or CC, if not its own.",
-    ),
-]
-Gui = Annotated[bool, typer.Option("--gui", rich_help_panel=SUMO, help="Show the run in sumo-gui.")]
-KeepFiles = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", rich_help_panel=SUMO, help="Keep SUMO's files in a new folder."),
-]
-Order = Annotated[
-    str,
-    typer.Option(
-        metavar="size|lanes",
-        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
-        "(its published runs).",
-    ),
-]
-SumoFcd = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", rich_help_panel=SUMO, help="SUMO's own floating-car data (XML)."),
-]
-Metrics = Annotated[
-    str | None,
-    typer.Option(metavar="A,B", help="Measure these; minisim metrics lists them."),
-]
-By = Annotated[
-    str, typer.Option(metavar="X", show_default=False, help="Table by lane, movement or kind.")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+]  # fmt: skip
 
 
-def chosen_metrics(text: str | None) -> tuple[Metric, ...]:
-    """The metrics that an option names; raises `InputError` for an unknown one."""
-    from minisim.results.metrics import asked_metrics
-
-    return asked_metrics([] if text is None else [name.strip() for name in text.split(",")])
+def processes(jobs: int | None) -> int:
+    """The number of processes that --jobs asks for; one a core where it is not given."""
+    return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
 def build_scenario(
     name: str, bearings: str | None, arrivals: Path | None = None, **options: Any
 ) -> Scenario:
-    """The scenario that the options describe; None stands for an option that was not given.
-
-    Raises:
-        MinisimError: an option that is not allowed.
-    """
+    """The scenario that the options describe; None is an option that was not given."""
     from minisim.arrivals import read_arrivals
     from scenarios.library import scenario_named
 
@@ -186,13 +122,13 @@ def build_scenario(
     return replace(made, recorded=recorded)
 
 
-#: Arrivals that use neither the last lane nor the last manoeuvre by chance: with equal shares on 4
-#: arms (1/2)^30, one in 10^9.
+#: So many arrivals use the last lane or the last manoeuvre. With equal shares on 4 arms, the chance
+#: that they use neither is (1/2)^30, one in 10^9.
 ENOUGH = 30
 
 
 def _check_arms(path: Path, recorded: ArrivalTable, n: int) -> None:
-    """Refuse a table that was recorded on a junction with fewer arms: it would be read wrongly."""
+    """Refuse a table from a junction with fewer arms: its manoeuvres would mean other exits."""
     if len(recorded) < ENOUGH:
         return
     arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)

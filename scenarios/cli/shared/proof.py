@@ -1,4 +1,4 @@
-"""What the commands about DIM's rules share: junction, option --plot, and answers."""
+"""What the commands about DIM's rules share: the junction, the option --plot, and answers."""
 
 from __future__ import annotations
 
@@ -70,16 +70,14 @@ def names(things: Iterable[object]) -> list[str]:
 
 
 def claims_table(name: str, analysis: Analysis) -> Table:
-    """Each claim, with the number of cases in which it was tried, and in which it is false."""
+    """Each claim: the number of cases in which it was tried, and in which it is false."""
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"{name}, {analysis.n} arms: all {analysis.cases} cases, order {analysis.order}",
         title_justify="left", title_style="bold",
     )  # fmt: skip
-    table.add_column("claim")
-    for heading in ("cases", "false"):
-        table.add_column(heading, justify="right")
-    table.add_column("smallest counterexample")
+    for heading in ("claim", "cases", "false", "smallest counterexample"):
+        table.add_column(heading, justify="right" if heading in ("cases", "false") else "left")
     for claim in analysis.claims:
         table.add_row(
             claim.statement,
@@ -94,17 +92,16 @@ def analysis_text(analysis: Analysis) -> Text:
     """Sizes, ties and the worst cases."""
     from dim.proofs.verification import most_cliques
 
-    text = Text()
     sizes = "  ".join(f"{size}: {cases}" for size, cases in analysis.sizes.items())
     ties = "  ".join(f"{tied}: {cases}" for tied, cases in analysis.ties.items())
     share = analysis.tied / analysis.cases
-    text.append("cases by vehicles that go    ", "dim").append(f"{sizes}\n")
-    text.append("cases by largest cliques     ", "dim").append(f"{ties}\n")
-    text.append("cases with a tie             ", "dim").append(f"{analysis.tied} ({share:.0%})\n")
-    text.append("worst case                   ", "dim").append(
-        f"{analysis.most_tied} cliques tie "
-        f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})"
-    )
+    text = Text.assemble(
+        ("cases by vehicles that go    ", "dim"), f"{sizes}\n",
+        ("cases by largest cliques     ", "dim"), f"{ties}\n",
+        ("cases with a tie             ", "dim"), f"{analysis.tied} ({share:.0%})\n",
+        ("worst case                   ", "dim"), f"{analysis.most_tied} cliques tie "
+        f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
+    )  # fmt: skip
     for size, (first, count) in analysis.worst.items():
         cases = "1 case" if count == 1 else f"{count} cases"
         text.append(f"\n{'':29}of size {size}: {cases}, such as {_spaced(first)}")
@@ -115,7 +112,7 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     """Whether it is safe and live, and which lanes can wait for ever."""
     rules = search.protocol
     text = Text.assemble(
-        (f"{name}", "bold"),
+        (name, "bold"),
         f": commit {rules.commit}, gate {rules.gate}, order {rules.order}, "
         f"priorities {rules.priorities}\n",
         ("states       ", "dim"),
@@ -124,13 +121,14 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
     )
     text.append("\nsafe         ", "dim")
     if search.unsafe:
-        text.append("no", "bold red").append(f": {', '.join(map(str, search.unsafe[0]))}")
-        text.append(f"\n{'':13}({len(search.unsafe)} such paths of {len(search.unsafe[0])} events)")
+        first = search.unsafe[0]
+        text.append("no", "bold red").append(f": {_listed(first)}")
+        text.append(f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)")
     else:
         text.append("yes", "bold green").append(": movements in conflict are never inside at once")
     text.append("\nlive         ", "dim")
     if search.stuck is not None:
-        text.append("no", "bold red").append(f": {', '.join(map(str, search.stuck))}")
+        text.append("no", "bold red").append(f": {_listed(search.stuck)}")
     elif search.complete:
         text.append("yes", "bold green").append(": in every state a vehicle can go on")
     else:
@@ -140,10 +138,8 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
         if lasso is None:
             text.append("never starves", "green")
         else:
-            text.append("starves", "yellow").append(
-                f": {', '.join(map(str, lasso.stem))}; then again and again "
-                f"{', '.join(map(str, lasso.cycle))}"
-            )
+            stem, cycle = _listed(lasso.stem), _listed(lasso.cycle)
+            text.append("starves", "yellow").append(f": {stem}; then again and again {cycle}")
     return text
 
 
@@ -165,26 +161,29 @@ def harmony_table(matrix: HarmonyMatrix) -> Table:
 
 def decision_text(explanation: Explanation) -> Text:
     """The graph, its cliques, which vehicles go, and why."""
-    text = Text()
     edges = "  ".join(f"{a}–{b}" for a, b in explanation.edges) or "none"
-    text.append("vehicles         ", "dim").append(_spaced(explanation.participants) + "\n")
-    text.append("in harmony       ", "dim").append(edges + "\n")
-    tied = len(explanation.tied) > 1
+    text = Text.assemble(
+        ("vehicles         ", "dim"), f"{_spaced(explanation.participants)}\n",
+        ("in harmony       ", "dim"), f"{edges}\n",
+    )  # fmt: skip
+    ties = explanation.tied if len(explanation.tied) > 1 else ()
     for k, clique in enumerate(explanation.cliques):
         text.append("maximal cliques  " if k == 0 else " " * 17, "dim")
         text.append(f"{{{_spaced(clique)}}}", "bold" if k == 0 else "")
-        if tied and clique in explanation.tied:
-            text.append("  tied", "yellow")
-        if k == 0:
-            text.append("  ← right of way", "green")
-        text.append("\n")
-    text.append("right of way     ", "dim").append(_spaced(explanation.right_of_way), "bold green")
-    text.append("\nwhy              ", "dim").append(explanation.reason)
-    return text
+        text.append("  tied" if clique in ties else "", "yellow")
+        text.append("  ← right of way\n" if k == 0 else "\n", "green")
+    return text.append_text(Text.assemble(
+        ("right of way     ", "dim"), (_spaced(explanation.right_of_way), "bold green"),
+        ("\nwhy              ", "dim"), explanation.reason,
+    ))  # fmt: skip
 
 
 def _spaced(things: Iterable[object]) -> str:
     return " ".join(names(things))
+
+
+def _listed(things: Iterable[object]) -> str:
+    return ", ".join(names(things))
 
 
 def _mark(harmony: bool, manoeuvre: int) -> Text:

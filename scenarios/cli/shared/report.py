@@ -11,7 +11,7 @@ from rich.text import Text
 
 from minisim.results.metrics import METRICS, SPREAD, Metric, heading
 from minisim.results.summary import GROUPS
-from scenarios.statistics import FILLING
+from scenarios.statistics import FILLING, Interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,34 +19,47 @@ if TYPE_CHECKING:
     from figures.studies.shared.section import Item
     from scenarios.recipe import Recipe
 
-#: Closest calls that every run of the command line shows.
+#: The closest calls that the command line shows of every run.
 CLOSEST = ("min_ttc_s", "min_pet_s")
 
 #: Columns of the table of a run, and of that of a sweep, where no others are asked for.
 RUN_COLUMNS = ("waiting_time_s", "travel_time_s", "depart_delay_s")
 CELL_COLUMNS = (
-    "waiting_time_s",
-    "complete_waiting_time_s",
-    "travel_time_s",
-    "complete_depart_delay_s",
-)
+    "waiting_time_s", "complete_waiting_time_s", "travel_time_s", "complete_depart_delay_s",
+)  # fmt: skip
 
 
-def run_title(summary: Mapping[str, Any]) -> Text:
-    """What was run."""
-    return Text.assemble(
+def run_parts(
+    summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
+) -> Iterator[Text | Table]:
+    """What was run, its table, and what has one number a run.
+
+    The counts are those of `dim.senses.tally`: what wrong perception did.
+    """
+    yield Text.assemble(
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
         f": {summary['density']:g} veh/h/lane, profile {summary['profile']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s",
         f" after a warm-up of {summary['warmup_s']:g} s" if summary["warmup_s"] else "",
         "" if summary["host"] == "minisim" else f", host {summary['host']}",
     )
+    yield _run_table(summary, metrics, by)
+    yield _safety(summary)
+    if counts:
+        yield Text(
+            f"  crossings {counts['crossings']:g}   false grants {counts['false_grants']:g}   "
+            f"disagreement {counts['disagreement_s']:.1f} s   "
+            f"deadlock {counts['deadlock_s']:.1f} s"
+        )
+    for metric in metrics:
+        if metric.per == "run" and not metric.grouped:
+            value = summary[metric.name]
+            shown = "–" if value is None else f"{value:g} {metric.unit}".rstrip()
+            yield Text.assemble(f"  {metric.title or metric.name} ", (shown, "bold"))
 
 
-def run_table(
-    summary: Mapping[str, Any], metrics: Sequence[Metric] = (), by: str = "lane"
-) -> Table:
-    """Means of one run by group and in total, of the metrics that were asked for or of the usual.
+def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -> Table:
+    """Means by group and in total, of the metrics that were asked for or of the usual ones.
 
     Metrics that were asked for have their percentiles too.
     """
@@ -77,15 +90,6 @@ def _run_columns(metrics: Sequence[Metric]) -> dict[str, str]:
     return columns or {name: METRICS[name].heading for name in RUN_COLUMNS}
 
 
-def number_lines(summary: Mapping[str, Any], metrics: Iterable[Metric]) -> Iterator[Text]:
-    """What was asked for and has one number a run only."""
-    for metric in metrics:
-        if metric.per == "run" and not metric.grouped:
-            value = summary[metric.name]
-            shown = "–" if value is None else f"{value:g} {metric.unit}".rstrip()
-            yield Text.assemble(f"  {metric.title or metric.name} ", (shown, "bold"))
-
-
 def metrics_table(metrics: Iterable[Metric]) -> Table:
     """What is measured, in what unit and by which equation."""
     table = Table(box=box.SIMPLE_HEAD)
@@ -97,7 +101,7 @@ def metrics_table(metrics: Iterable[Metric]) -> Table:
     return table
 
 
-def safety_line(summary: Mapping[str, Any]) -> Text:
+def _safety(summary: Mapping[str, Any]) -> Text:
     """Collisions and, where measured, the closest calls of one run."""
     collisions = summary["collisions"]
     line = Text.assemble(
@@ -109,16 +113,6 @@ def safety_line(summary: Mapping[str, Any]) -> Text:
             line.append(f"   {metric.title} ")
             line.append(_seconds(summary[name], f" {metric.unit}"), "bold")
     return line
-
-
-def tally_line(counts: Mapping[str, float]) -> Iterable[Text]:
-    """What wrong perception did, where it was counted (`dim.senses.tally`)."""
-    if counts:
-        yield Text(
-            f"  crossings {counts['crossings']:g}   false grants {counts['false_grants']:g}   "
-            f"disagreement {counts['disagreement_s']:.1f} s   "
-            f"deadlock {counts['deadlock_s']:.1f} s"
-        )
 
 
 def gallery_table(items: Iterable[Item]) -> Table:
@@ -144,6 +138,7 @@ def sweep_table(cells: pd.DataFrame) -> Table:
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
         if cell["runs"]:
             collisions = int(cell["collisions"])
+            unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
             table.add_row(
                 *named,
                 cell["controller"],
@@ -151,64 +146,53 @@ def sweep_table(cells: pd.DataFrame) -> Table:
                 *(_interval(cell, metric) for metric in CELL_COLUMNS),
                 f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
                 Text(str(collisions), style="bold red" if collisions else ""),
-                Text(_settled(cell), style="yellow"),
+                Text(unsettled, style="yellow"),
             )
         else:
             table.add_row(*named, cell["controller"], f"0{failed}", style="red")
     return table
 
 
-def _settled(cell: Mapping[Hashable, Any]) -> str:
-    """Whether queues had settled, where they had not."""
-    return "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
-
-
 def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know of the table: growing queues, capped signals, the first failure."""
-    text = Text()
+    notes = []
     if "too_short" in cells and cells["too_short"].eq(True).any():
-        text.append(
-            "  too short: the roads were still filling, so that nothing can be said of queues; "
-            f"simulate {FILLING:g} travel times or more.\n"
+        notes.append(
+            "too short: the roads were still filling, so that nothing can be said of queues; "
+            f"simulate {FILLING:g} travel times or more."
         )
     if "growing" in cells and cells["growing"].eq(True).any():
-        text.append(
-            "  growing: queues had not settled by the horizon; a mean delay there says how long "
-            "was simulated.\n"
+        notes.append(
+            "growing: queues had not settled by the horizon; a mean delay there says how long was "
+            "simulated."
         )
-    for note in _capped(experiments):
-        text.append(f"  {note}\n")
+    text = Text("\n").join(Text(f"  {note}") for note in (*notes, *_capped(experiments)))
     failures = rows[rows["error"].notna()]
     if len(failures):
         first = failures.iloc[0]
-        text.append(
-            f"  {len(failures)} of {len(rows)} runs failed; the first ({first['controller']}, "
-            f"{first['scenario']}, {first['density']:g} veh/h/lane, seed {first['seed']}): "
-            f"{first['error']}\n",
+        text.append("\n" if text else "").append(
+            f"  {len(failures)} of {len(rows)} runs failed; the first "
+            f"({first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane, seed "
+            f"{first['seed']}): {first['error']}",
             "red",
         )
-    text.rstrip()
     return text
 
 
-def _capped(experiments: Sequence[Recipe]) -> list[str]:
+def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
     """A line for each signal whose demand is beyond Webster's formula."""
     from baselines import FixedTime
 
-    notes: dict[str, None] = {}
-    for experiment in experiments:
-        signal, scenario = experiment.controller, experiment.scenario
-        if isinstance(signal, FixedTime) and signal.timing(scenario.site()).capped:
-            notes[
-                f"{experiment.name}, {scenario.name}, {scenario.density:g} veh/h/lane: the demand "
-                f"is over Webster's capacity; the cycle is capped at {signal.max_cycle:g} s."
-            ] = None
-    return list(notes)
+    return dict.fromkeys(
+        f"{experiment.name}, {scenario.name}, {scenario.density:g} veh/h/lane: the demand is over "
+        f"Webster's capacity; the cycle is capped at {signal.max_cycle:g} s."
+        for experiment in experiments
+        for signal, scenario in [(experiment.controller, experiment.scenario)]
+        if isinstance(signal, FixedTime) and signal.timing(scenario.site()).capped
+    )
 
 
 def _interval(cell: Mapping[Hashable, Any], metric: str) -> str:
-    from scenarios.statistics import Interval
-
     mean = cell.get(metric)
     if mean is None or mean != mean:
         return "–"

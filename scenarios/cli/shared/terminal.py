@@ -19,59 +19,46 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: Characters that stand in for those that the terminal's encoding lacks, one for one: tables keep
+#: Characters in place of those that the terminal's encoding lacks: one for one, so that tables keep
 #: their columns.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
-#: How often progress is told where there is no terminal [s].
+#: How often a line of progress is printed where there is no terminal [s].
 SILENCE = 20.0
 
 
 class Bar:
-    """A progress bar on a terminal."""
+    """Progress: a bar on a terminal; elsewhere a line now and then."""
 
-    def __init__(self, progress: Progress, label: str) -> None:
-        self._progress = progress
-        self._task = progress.add_task(label, total=None)
-
-    def __call__(self, done: int, total: int) -> None:
-        """Show `done` of `total`."""
-        self._progress.update(self._task, completed=done, total=total)
-
-    def label(self, text: str) -> None:
-        """Change the text in front of the bar."""
-        self._progress.update(self._task, description=text)
-
-
-class Lines:
-    """A line of progress now and then, where there is no terminal for a bar."""
-
-    def __init__(self, label: str) -> None:
+    def __init__(self, label: str, progress: Progress | None) -> None:
         self._label = label
+        self._progress = progress
+        self._task = progress.add_task(label, total=None) if progress else None
         self._said = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
-        """Print `done` of `total`, at most once in `SILENCE` seconds."""
-        now = time.monotonic()
-        if now - self._said >= SILENCE:
+        """Show `done` of `total`; a line at most once in `SILENCE` seconds."""
+        if self._progress is not None and self._task is not None:
+            self._progress.update(self._task, completed=done, total=total, description=self._label)
+        elif (now := time.monotonic()) - self._said >= SILENCE:
             self._said = now
             typer.echo(f"{self._label}: {done} of {total}", err=True)
 
     def label(self, text: str) -> None:
-        """Change the text in front of the numbers."""
+        """Change the text in front of the bar, from the next call on."""
         self._label = text
 
 
 @contextmanager
-def bar(label: str) -> Iterator[Bar | Lines]:
+def bar(label: str) -> Iterator[Bar]:
     """A progress bar on stderr that vanishes at the end; lines where stderr is no terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield Lines(label)
+        yield Bar(label, None)
         return
     columns = TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn()
     with Progress(*columns, console=console, transient=True) as progress:
-        yield Bar(progress, label)
+        yield Bar(label, progress)
 
 
 def show(*renderables: Text | Table) -> None:
@@ -94,7 +81,7 @@ def _width(console: Console, renderable: Text | Table) -> int:
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text: nowhere if closed, in plainer characters if need be."""
+    """Let stdout and stderr take any text: in plainer characters if need be; lost if closed."""
     codecs.register_error("minisim-plain", _plain)
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115

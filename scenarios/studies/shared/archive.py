@@ -1,8 +1,8 @@
-"""What figures and reports are made from: results of studies, looked up when first needed."""
+"""Results of studies for figures and reports, looked up when first needed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 class MissingRunsError(MinisimError):
-    """A figure needs runs that were never made."""
+    """A figure needs runs that are not there."""
 
 
 def find_in(store: Store | None) -> Find:
-    """Looks runs up in a store: a failed or outdated run counts as none."""
+    """Looks up runs in a store; failed and outdated runs do not count."""
 
     def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         if store is None:
@@ -36,12 +36,7 @@ def find_in(store: Store | None) -> Find:
 
 
 class Archive:
-    """The results that a store holds.
-
-    Args:
-        find: where the runs are.
-        effort: how many runs a point.
-    """
+    """The results of studies, by name."""
 
     def __init__(self, find: Find, effort: Effort) -> None:
         self.effort = effort
@@ -50,13 +45,13 @@ class Archive:
         )
 
     def need(self, *names: str) -> tuple[Results, ...]:
-        """The results of studies.
+        """The results of these studies.
 
         Raises:
-            MissingRunsError: none of them has a run; says how to make them.
+            MissingRunsError: none of them has a run; the message says how to make them.
         """
         results = tuple(map(self.study, names))
-        if all(each.good.empty for each in results):
+        if names and all(each.good.empty for each in results):
             raise MissingRunsError(
                 f"the store has no run of {' or '.join(names)} with "
                 f"{results[0].study.extent(self.effort)}; make them with: "
@@ -65,44 +60,34 @@ class Archive:
         return results
 
 
-def missing_note(
-    results: Iterable[Results], wanted: Callable[[Point], bool] = lambda _: True
-) -> str:
-    """What a figure shows and what it lacks, in small print.
-
-    Args:
-        results: drawn.
-        wanted: whether a point belongs to the figure.
-    """
-    drawn = tuple(results)
-    effort = drawn[0].effort
+def missing_note(*results: Results, wanted: Callable[[Point], bool] = lambda _: True) -> str:
+    """What a figure of the `wanted` points shows and what it lacks, in small print."""
+    effort = results[0].effort
     runs = {
         f"{point.series} ({each.study.name}, {point.where}, {point.density:g})": count
-        for each in drawn
+        for each in results
         for point, count in each.runs.items()
         if wanted(point)
     }
     fewer = [f"{name} has {n.made}" for name, n in runs.items() if 0 < n.made < n.wanted]
     missing = [name for name, count in runs.items() if not count.made]
     shown = 1 if fewer and missing else 3  # there is room for two lines
-    text = f"{effort.warning}{_extent(runs.values())}, {effort.horizon:g} s each."
+    text = f"{effort.warning}{_extent([*runs.values()])}, {effort.horizon:g} s each."
     if fewer:
         text += f"  Fewer runs: {_listed(fewer, shown)}."
     if missing:
-        text += f"  Not drawn, for there is no run: {_listed(missing, shown)}."
+        text += f"  Not drawn, since there is no run: {_listed(missing, shown)}."
     return text
 
 
-def _extent(runs: Iterable[Runs]) -> str:
-    """How many runs there are: seeds a case, or runs of those wanted where some are missing."""
-    known = list(runs)
-    seeds = sorted({count.wanted for count in known})
+def _extent(runs: Sequence[Runs]) -> str:
+    """The seeds a case; if runs are missing, how many of them there are too."""
+    seeds = sorted({count.wanted for count in runs})
     span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else f"{seeds[0]} seeds"
-    made, wanted = sum(count.made for count in known), sum(count.wanted for count in known)
+    made, wanted = (sum(counts) for counts in zip(*runs, strict=True))
     return span if made == wanted else f"{made} of {wanted} runs ({span} a case)"
 
 
 def _listed(texts: Sequence[str], shown: int) -> str:
-    """The first ones, and how many more there are."""
     more = f"; and {len(texts) - shown} more" if len(texts) > shown else ""
     return f"{'; '.join(texts[:shown])}{more}"

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from minisim.errors import InputError, integer
+from minisim.errors import InputError, integer, show
 from minisim.parameters import checked, declared, part, real, reals, whole
 
 
 def _power_of_two(title: str, value: Any) -> int:
     steps = integer(title, value, low=2)
     if steps.bit_count() != 1:
-        raise InputError(f"{title} must be a power of two, got {steps}")
+        raise InputError(f"{title} must be a power of two, got {show(steps)}")
     return steps
 
 
 @declared(kw_only=True)
 class Search:
-    """How a limit is looked for: by bisection, `seeds` · log₂(`steps`) runs a point."""
+    """How to search for a limit: by bisection, with `seeds` · log₂(`steps`) runs a point."""
 
     step: float = real("demands are multiples of it", "veh/h", above=0, default=10.0)
     steps: int = checked(
@@ -25,11 +25,6 @@ class Search:
     )
     seeds: int = whole("each has a bisection of its own; the seeds 1 … `seeds`", low=1, default=4)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
-
-    @classmethod
-    def quick(cls) -> Search:
-        """A smoke test: rough, and of runs too short to mean anything."""
-        return cls(step=200.0, steps=4, seeds=2, horizon=150.0)
 
     @property
     def rounds(self) -> int:
@@ -51,20 +46,18 @@ class Effort:
 
     @classmethod
     def of(cls, *, quick: bool = False, seeds: int | None = None) -> Effort:
-        """The full effort or the smoke test; another number of seeds where it is given.
-
-        The smoke test has the same points at two demands, for some minutes each.
-        """
-        if quick:
-            return cls(
-                seeds=2 if seeds is None else seeds, horizon=150.0, densities=(150.0, 350.0),
-                search=Search.quick(),
-            )  # fmt: skip
-        return cls() if seeds is None else cls(seeds=seeds)
+        """The full effort, or a smoke test at two demands; `seeds` replaces the number of seeds."""
+        if not quick:
+            return cls() if seeds is None else cls(seeds=seeds)
+        return cls(
+            seeds=2 if seeds is None else seeds, horizon=150.0, densities=(150.0, 350.0),
+            # Rough, and with runs too short to mean anything.
+            search=Search(step=200.0, steps=4, seeds=2, horizon=150.0),
+        )  # fmt: skip
 
     @property
     def warning(self) -> str:
-        """What to say before the numbers of a smoke test; empty otherwise."""
+        """A warning before the numbers of a smoke test; empty otherwise."""
         return "" if self.densities is None else "Smoke test, which means nothing: "
 
     def command(self, *names: str) -> str:

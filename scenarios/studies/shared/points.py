@@ -17,7 +17,7 @@ class Point(Protocol):
 
     @property
     def series(self) -> str:
-        """The line of the figure that it lies on."""
+        """The line of the figure."""
 
     @property
     def arms(self) -> int:
@@ -29,7 +29,7 @@ class Point(Protocol):
 
     @property
     def where(self) -> str:
-        """What tells it from other points of its series, but for the demand."""
+        """What sets it apart from other points of its series, besides demand."""
 
     def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
         """The run of one seed."""
@@ -43,9 +43,8 @@ class ControllerPoint(NamedTuple):
 
     Attributes:
         profile: by name.
-        series: the controller that a reader thinks of, such as "dim", whatever variant of it the
-            study needs.
-        controller: by its name on the command line.
+        series: the controller that a reader thinks of, such as "dim".
+        controller: the variant of it that the study needs, as on the command line.
         arms: of the junction.
         split: of the inflow over the lanes, "balanced" or such as "4:3:2:1".
         density: mean inflow a lane [veh/h].
@@ -61,16 +60,16 @@ class ControllerPoint(NamedTuple):
     humans: float = 0.0
 
     def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:
-        """The run of one seed; collisions are counted, for some published rules have them."""
+        """The run of one seed. Collisions are counted: some published rules have them."""
         make = MAKERS.get(self.arms) or partial(regular, self.arms)
         scenario = make(self.density, split=self.split, profile=self.profile, horizon=horizon)
         controller = controller_named(self.controller, self.profile)
-        label = f"{self.series}-humans-{self.humans:g}" if self.humans else self.series
+        label = f"{self.series}+humans={self.humans:g}" if self.humans else self.series
         return Recipe(scenario, controller, seed, self.humans, label=label, on_collision="record")
 
     @property
     def where(self) -> str:
-        """What tells it from other points of its series, but for the demand."""
+        """What sets it apart from other points of its series, besides demand."""
         humans = f"{self.humans:.0%} humans, " if self.humans else ""
         return f"{humans}{self.arms} arms, {self.split}"
 

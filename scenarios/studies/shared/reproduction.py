@@ -14,21 +14,18 @@ from scenarios.sweep.rows import Row
 from scenarios.sweep.runner import finished
 from scenarios.sweep.store import Store
 
-#: Called with the runs of a study that are done, and their number.
-Report = Callable[[int, int], None]
-
 
 @dataclass(frozen=True)
 class Made:
-    """What one call of `reproduce` did.
+    """What one call of `reproduce` did for a study.
 
     Attributes:
         name: of the study.
-        runs: that it consists of.
-        hours: simulated by them.
-        computed: how many were not in the store before.
-        wall_s: time that it took.
-        cpu_s: processor time of all its runs, whenever they were made.
+        runs: all of its runs.
+        hours: that they simulate.
+        computed: runs that were not in the store before.
+        wall_s: time that the call took.
+        cpu_s: processor time of all runs, whenever they were made.
         failed: rows of failed runs.
     """
 
@@ -41,15 +38,12 @@ class Made:
     failed: tuple[Row, ...]
 
 
-def reproduce(name: str, effort: Effort, store: Store, jobs: int, report: Report) -> Made:
-    """Run a study; what the store has is not run again.
+def reproduce(
+    name: str, effort: Effort, store: Store, jobs: int, progress: Callable[[int, int], None]
+) -> Made:
+    """Run a study in `jobs` processes. Rows go to the store; what it has is not run again.
 
-    Args:
-        name: of the study.
-        effort: how much.
-        store: where the rows go.
-        jobs: processes.
-        report: of progress.
+    `progress` is called with the runs done and the most that there can be.
 
     Raises:
         FileError: the store cannot be written.
@@ -68,9 +62,10 @@ def reproduce(name: str, effort: Effort, store: Store, jobs: int, report: Report
         made: dict[int, Row] = {}
         for k, row in finished(recipes, jobs=jobs, store=store):
             made[k] = row
-            report(len(rows) + len(made), total)
-        rows.extend(made[k] for k in range(len(recipes)))
-        return [made[k] for k in range(len(recipes))]
+            progress(len(rows) + len(made), total)
+        given = [made[k] for k in range(len(recipes))]
+        rows.extend(given)
+        return given
 
     study.collect(effort, run)
     return Made(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,8 +14,11 @@ from scenarios.studies.shared.points import Point
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Gives for each recipe its row of a sweep, or None where it was never run.
+#: Gives the row of each recipe, or None if it was never run.
 Find = Callable[[Sequence[Recipe]], Sequence[Mapping[str, Any] | None]]
+
+#: Column of `with_total_delay`.
+TOTAL_DELAY = "total_delay_s"
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,9 @@ class Study:
     Attributes:
         name: on the command line.
         question: in one line.
-        points: without repetition.
-        few: series -> most seeds, where a run costs too much for more.
-        about_collisions: whether its figures show collisions, so that no list needs to.
+        points: each once.
+        few: series -> most seeds, if more would cost too much.
+        about_collisions: whether its figures show collisions; the report does not list them then.
     """
 
     name: str
@@ -37,51 +40,41 @@ class Study:
     about_collisions: bool = False
 
     def runs(
-        self, seeds: int, horizon: float = 3600.0, points: Iterable[Point] | None = None
+        self, seeds: int, horizon: float = 3600.0, points: Sequence[Point] = ()
     ) -> list[tuple[Point, Recipe]]:
-        """The seeds 1 … `seeds` of all points or some, seed by seed within each point."""
+        """The seeds 1 … `seeds` of `points`, or of all, point by point."""
         return [
             (point, point.recipe(seed, horizon))
-            for point in (self.points if points is None else points)
+            for point in points or self.points
             for seed in range(1, min(seeds, self.few.get(point.series, seeds)) + 1)
         ]
 
     def chosen(self, effort: Effort) -> tuple[Point, ...]:
-        """The points that an effort runs: all where none has one of its demands."""
+        """The points with the effort's demands; all if there is none."""
         wanted = effort.densities
         some = tuple(p for p in self.points if wanted is None or p.density in wanted)
         return some or self.points
 
     def collect(self, effort: Effort, find: Find) -> Results:
-        """Ask for every run.
+        """Ask `find` for the rows of all runs; it runs them or looks them up.
 
-        Args:
-            effort: which points, seeds and horizon.
-            find: gives the rows, by running the recipes or from a store. A study that goes by
-                what it finds asks several times.
+        A study that chooses runs by the results of earlier ones asks several times.
         """
         runs = self.runs(effort.seeds, effort.horizon, self.chosen(effort))
-        rows = find([recipe for _, recipe in runs])
-        return Results.of(
-            self, effort, [(point, row) for (point, _), row in zip(runs, rows, strict=True)]
-        )
+        points, recipes = zip(*runs, strict=True)
+        return Results.of(self, effort, [*zip(points, find(recipes), strict=True)])
 
     def most_runs(self, effort: Effort) -> int:
-        """How many runs `collect` asks for, at most."""
+        """The most runs that `collect` asks for."""
         return len(self.runs(effort.seeds, effort.horizon, self.chosen(effort)))
 
     def extent(self, effort: Effort) -> str:
-        """Which seeds and horizon an effort gives it, in words."""
+        """The seeds and the horizon, in words."""
         return f"the seeds 1 … {effort.seeds} over {effort.horizon:g} s"
 
 
 class Runs(NamedTuple):
-    """How many of a point's runs there are.
-
-    Attributes:
-        made: without failing.
-        wanted: by the effort.
-    """
+    """How many runs of a point were made without failing, and how many the effort wants."""
 
     made: int
     wanted: int
@@ -92,10 +85,10 @@ class Results:
     """What is known about a study.
 
     Attributes:
-        study: what was asked.
-        effort: how much of it was.
-        rows: one for each run that was made: the columns of a sweep, with those of its point.
-        runs: of each point, in their order.
+        study: the study.
+        effort: how much of it was asked for.
+        rows: one a run that was made: the columns of a sweep and those of its point.
+        runs: of each point, in order.
     """
 
     study: Study
@@ -107,7 +100,7 @@ class Results:
     def of(
         cls, study: Study, effort: Effort, asked: Sequence[tuple[Point, Mapping[str, Any] | None]]
     ) -> Results:
-        """From each point that was asked for with the row that came, in order."""
+        """From each point asked for and the row of its run, in order."""
         import pandas as pd
 
         rows = [{**row, **point._asdict()} for point, row in asked if row is not None]
@@ -129,7 +122,14 @@ class Results:
         """The rows of runs that did not fail."""
         return self.rows[self.rows["error"].isna()]
 
-    @property
-    def failed(self) -> pd.DataFrame:
-        """The rows of runs that failed."""
-        return self.rows[self.rows["error"].notna()]
+
+def with_total_delay(rows: pd.DataFrame) -> pd.DataFrame:
+    """Add `total_delay_s`: mean time loss on the road plus mean departure delay, both complete.
+
+    SUMO's total delay is the same, but for trips that have ended. This one includes the vehicles
+    that have not arrived, and those that have not even departed.
+    """
+    lost, late = (
+        rows[column].astype(float) for column in ("complete_time_loss_s", "complete_depart_delay_s")
+    )
+    return rows.assign(total_delay_s=lost + late)

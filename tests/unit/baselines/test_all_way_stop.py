@@ -1,10 +1,9 @@
-"""The all-way stop: who stands at the line, who goes next, and when the way is clear."""
+"""The all-way stop: which vehicle stands at the line, which goes next, and when."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ import pytest
 import minisim
 from baselines import AllWayStop
 from minisim.control import Command, Observed, Plan, Session, Site, View, Wake
-from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios.library import four_way
 from tests.builders import drained, replayed, seen, show
@@ -36,10 +34,6 @@ def session_with(*vehicles: Observed, reaction: float = 1.0) -> Session:
     return session
 
 
-def in_lanes(*vehicles: Observed) -> list[Observed]:
-    return sorted(vehicles, key=lambda v: v.lane)
-
-
 # Stopping.
 
 
@@ -57,7 +51,7 @@ def test_without_reaction_time_it_goes_at_once() -> None:
 
 
 @pytest.mark.parametrize(("distance", "speed"), [(1.1, 0.0), (0.3, 0.11), (0.9, 2.0)])
-def test_who_is_not_at_the_line_or_does_not_stand_does_not_queue(
+def test_a_vehicle_that_moves_or_is_not_at_the_line_does_not_queue(
     distance: float, speed: float
 ) -> None:
     session = AllWayStop().start(SITE)
@@ -65,7 +59,7 @@ def test_who_is_not_at_the_line_or_does_not_stand_does_not_queue(
         assert show(session, time, seen(1, 0, 2, distance, speed)) == []
 
 
-def test_who_starts_to_move_again_has_to_stop_again() -> None:
+def test_a_vehicle_that_moves_again_has_to_stop_again() -> None:
     session = session_with(standing(1, 0))
     assert show(session, 10.5, seen(1, 0, 2, 0.2, 0.3)) == []
     assert show(session, 11.0, standing(1, 0)) == []
@@ -76,7 +70,7 @@ def test_only_the_first_of_a_lane_queues() -> None:
     session = session_with(standing(1, 0))
     second = seen(2, 0, 2, 0.9)
     assert show(session, 11.0, standing(1, 0), second) == ["Go 1"]
-    # The first is let go: now the second is the head, and stands since now.
+    # The first is let go. Now the second is the head, and its standing time starts.
     assert show(session, 11.5, seen(1, 0, 2, -1.0, 1.0), second) == []
     assert show(session, 12.5, seen(1, 0, 2, -5.0, 3.0), second) == ["Go 2"]
 
@@ -84,7 +78,7 @@ def test_only_the_first_of_a_lane_queues() -> None:
 # First come, first served.
 
 
-def test_who_stood_first_goes_first() -> None:
+def test_the_first_to_stand_goes_first() -> None:
     a, b = standing(2, 0), standing(1, 1)
     session = session_with(a, b)
     assert show(session, 10.9, a, b) == ["Go 1"]
@@ -101,15 +95,15 @@ def test_equal_times_go_by_arm() -> None:
     assert show(session, 11.0, a, b) == ["Go 9"]
 
 
-def test_those_who_do_not_conflict_go_together() -> None:
+def test_vehicles_that_do_not_conflict_go_together() -> None:
     a, c = standing(1, 0), standing(2, 2)
     session = session_with(a, c)
     assert show(session, 10.9, a, c) == ["Go 1"]
     assert show(session, 11.0, seen(1, 0, 2, 0.2, 0.3), c) == ["Go 2"]
 
 
-def test_nobody_overtakes_a_conflicting_vehicle_that_has_waited_longer() -> None:
-    # a2 goes; b2 has to wait for it; c2 does not conflict with a2, but with b2, who was first.
+def test_no_vehicle_overtakes_a_conflicting_one_that_has_waited_longer() -> None:
+    # a2 goes; b2 has to wait for it; c2 does not conflict with a2, but with b2, which was first.
     a, b, c = standing(1, 0), standing(2, 1), standing(3, 2)
     session = session_with(a, b, c)
     assert show(session, 10.8, a, b, c) == ["Go 1"]
@@ -119,8 +113,8 @@ def test_nobody_overtakes_a_conflicting_vehicle_that_has_waited_longer() -> None
     assert show(session, 14.1, b, c) == []
 
 
-def test_a_later_vehicle_that_conflicts_with_nobody_overtakes() -> None:
-    # d1 turns left into a, out of everybody's way but that of who leaves by a.
+def test_a_later_vehicle_without_conflicts_overtakes() -> None:
+    # d1 turns left into a: it is in the way only of vehicles that leave by a.
     a, b, d = standing(1, 0), standing(2, 1), standing(3, 3, 1)
     assert not SITE.conflicts[SITE.intersection.index(Movement(3, 1)), [1, 4]].any()
     session = session_with(a, b, d)
@@ -129,7 +123,7 @@ def test_a_later_vehicle_that_conflicts_with_nobody_overtakes() -> None:
 
 
 def test_a_younger_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
-    # Everybody's reaction starts with his own standstill, but the order is that of standing.
+    # The reaction time of each starts with its own standstill, but the order is that of standing.
     a, b = standing(1, 0), standing(2, 1)
     session = AllWayStop().start(SITE)
     assert show(session, 9.0, a) == []
@@ -147,7 +141,7 @@ def test_a_lone_vehicle_stops_for_the_reaction_time() -> None:
     entry = run.site.intersection.approach_length
     still = frame[(frame["speed_mps"] == 0.0) & (frame["s_m"] > 400.0)]
     assert entry - 0.3 <= still["s_m"].min() <= still["s_m"].max() < entry
-    # One step more: the wait is noticed at the end of the step in which it is over.
+    # One step more: a wait ends with the step in which it is over.
     assert run.summary()["waiting_time_s"] == pytest.approx(1.1, abs=0.11)
 
 
@@ -201,18 +195,12 @@ def test_it_carries_what_was_measured_in_the_field() -> None:
     assert 1200 < capacity < 1600
 
 
-def test_nobody_is_passed_over_for_ever() -> None:
+def test_every_vehicle_gets_its_turn() -> None:
     run = minisim.simulate(
         drained(four_way(350, split=(8, 8, 8, 1), profile="fair", horizon=600.0), 1, 2000.0),
         AllWayStop(),
     )
     trips = run.columns
     assert trips.arrived.all()
-    # Lane d has hardly a queue of its own, so nobody there waits for long.
+    # Lane d has hardly a queue of its own, so no vehicle there waits for long.
     assert trips.waiting_time[trips.lane == 3].max() < 40.0
-
-
-@pytest.mark.parametrize("reaction", [-0.1, float("nan"), "1", None, True, 61.0])
-def test_bad_parameters_are_named(reaction: Any) -> None:
-    with pytest.raises(InputError, match="reaction"):
-        AllWayStop(reaction=reaction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,22 +11,21 @@ import pytest
 import minisim
 from baselines import Reservation
 from baselines.prediction import Following, Leader, courses, predict
-from baselines.reservation import Manager, ReservationSession
+from baselines.reservation import ReservationSession
 from minisim.control import Go, Hold, Observed, Unregulated, View, Wake
 from minisim.errors import InputError
 from minisim.junction.partings import branch
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
 from scenarios.scenario import Profile
-from tests.builders import replayed
+from tests.builders import replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")
 SITE = FAIR_FOUR.site(1)
 ENTRY = SITE.intersection.approach_length
 
 
-def car(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 14.0) -> Observed:
-    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+car = partial(seen, speed=14.0)
 
 
 def session(**options: Any) -> ReservationSession:
@@ -77,7 +76,7 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
     assert np.allclose(follower[1], second["v"][: len(follower[1])], atol=1e-6)
 
 
-def test_who_does_not_get_through_is_not_predicted() -> None:
+def test_a_vehicle_that_does_not_get_through_is_not_predicted() -> None:
     motion, way = Following.of(SITE), courses(SITE)[0]
     assert predict(motion, way, -400.0, 14.0, horizon=5.0) is None
 
@@ -85,12 +84,11 @@ def test_who_does_not_get_through_is_not_predicted() -> None:
 # --- the protocol -----------------------------------------------------------------------------
 
 
-def test_who_asks_first_gets_it_and_who_would_meet_it_does_not() -> None:
+def test_the_first_to_ask_gets_it_and_one_that_would_meet_it_does_not() -> None:
     run = session()
     assert decide(run, 0.0, car(1, 0, 2, 28.0)) == [Go(1)]
-    seen = run.manager.slots[1]
-    k = 5
-    again = car(1, 0, 2, -float(seen.s[k]), float(seen.v[k]))
+    slot = run.manager.slots[1]
+    again = car(1, 0, 2, -float(slot.s[5]), speed=float(slot.v[5]))
     assert decide(run, 0.5, again, car(2, 1, 2, 26.0)) == []
     assert list(run.manager.slots) == [1]
 
@@ -118,14 +116,14 @@ def test_the_buffer_is_kept() -> None:
     assert 5 <= min(gaps) <= 6
 
 
-def test_into_one_exit_lane_nobody_goes_before_an_earlier_holder() -> None:
+def test_into_one_exit_lane_no_vehicle_goes_before_an_earlier_holder() -> None:
     """b1 could turn south long before a2, which is far away, gets there: it may not overtake."""
     run = session(reach=150.0)
     assert decide(run, 0.0, car(1, 0, 2, 140.0)) == [Go(1)]
-    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 1, 5.0, 5.0)) == []
+    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 1, 5.0, speed=5.0)) == []
     run = session(reach=150.0)  # into another exit it goes
     decide(run, 0.0, car(1, 0, 2, 140.0))
-    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 2, 5.0, 5.0)) == [Go(2)]
+    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 2, 5.0, speed=5.0)) == [Go(2)]
 
 
 def test_a_follower_asks_only_behind_a_holder() -> None:
@@ -143,7 +141,7 @@ def test_requests_are_considered_in_the_order_of_the_first() -> None:
     assert decide(run, 0.0, *blocked) == []
     # c2 is gone; b2 asked first, a2 (nearer, earlier in the view) conflicts with it.
     run.manager.slots.clear()
-    assert decide(run, 1.0, car(3, 0, 2, 15.0, 5.0), car(2, 1, 2, 18.0, 5.0)) == [Go(2)]
+    assert decide(run, 1.0, car(3, 0, 2, 15.0, speed=5.0), car(2, 1, 2, 18.0, speed=5.0)) == [Go(2)]
 
 
 # --- what safety rests on ---------------------------------------------------------------------
@@ -152,7 +150,7 @@ def test_requests_are_considered_in_the_order_of_the_first() -> None:
 def test_a_holder_that_differs_is_predicted_anew_and_keeps_what_still_fits() -> None:
     run = session()
     decide(run, 0.0, car(1, 0, 2, 28.0))
-    assert decide(run, 0.5, car(1, 0, 2, 23.0, 10.0)) == []
+    assert decide(run, 0.5, car(1, 0, 2, 23.0, speed=10.0)) == []
     assert run.manager.slots[1].start == 5
     assert run.manager.slots[1].v[0] == 10.0
 
@@ -174,7 +172,7 @@ def test_a_late_holder_that_no_longer_fits_is_held_when_it_can_stop() -> None:
     assert set(run.manager.slots) == {9}
 
 
-def test_who_can_not_stop_keeps_its_reservation_and_the_other_yields() -> None:
+def test_a_vehicle_that_cannot_stop_keeps_its_reservation_and_the_other_yields() -> None:
     """21.8 m are needed to stop from 14 m/s; the other is as predicted, and still loses its own."""
     run, other = just_behind(car(1, 0, 2, 28.0))
     late = car(1, 0, 2, 21.5)  # predicted at 14 m
@@ -201,7 +199,7 @@ def test_speeds_that_differ_from_driver_to_driver_do_no_harm() -> None:
     assert run.collisions == ()
 
 
-def test_at_low_demand_nobody_is_delayed_and_below_the_all_way_stop_at_350() -> None:
+def test_no_delay_at_low_demand_and_less_than_the_all_way_stop_at_350() -> None:
     """SUMO's all-way stop with 1 s of hold loses 7.6 s at 350 veh/h/lane; a lone turn 1–2 s."""
     run = minisim.simulate(four_way(10, profile="fair"), Reservation(), seed=1)
     free = minisim.simulate(
@@ -214,12 +212,10 @@ def test_at_low_demand_nobody_is_delayed_and_below_the_all_way_stop_at_350() -> 
     assert busy.summary()["time_loss_s"] < 5.9  # the all-way stop without any hold
 
 
-def test_bad_input() -> None:
-    for options in ({"reach": 0}, {"buffer": -1}, {"period": 0}):
-        with pytest.raises(InputError):
-            Reservation(**options)  # type: ignore[arg-type]
+def test_vehicles_that_cannot_be_predicted_are_refused() -> None:
     with pytest.raises(InputError, match="CruiseVehicle"):
         Reservation().start(four_way(profile=AS_RUN).site(0))
-    with pytest.raises(InputError, match="site"):
-        Manager(None, 0.5)  # type: ignore[arg-type]
-    assert math.isclose(Reservation().start(SITE).plan.sight, 14.0**2 / 9.0 + 7.0)
+
+
+def test_by_default_they_ask_as_late_as_they_can() -> None:
+    assert session().plan.sight == pytest.approx(14.0**2 / 9.0 + 7.0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import pickle
 import re
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,12 +48,8 @@ def four() -> list[list[int]]:
 def test_geometry_gives_the_papers_matrix_entry_by_entry(n: int, vehicle: VehicleType) -> None:
     ours = HarmonyMatrix.from_geometry(MAKERS[n]().intersection, vehicle)
     theirs = HarmonyMatrix.paper(n)
-    assert ours.movements == theirs.movements
-    for a in ours.movements:
-        for b in ours.movements:
-            assert ours[a, b] == theirs[a, b], (str(a), str(b))
-    assert ours == theirs
     assert ours.disagreements(theirs) == ()
+    assert ours == theirs
 
 
 def test_the_paper_matrix_of_four_arms_is_the_printed_table() -> None:
@@ -76,11 +74,6 @@ def test_the_paper_has_three_matrices(n: int) -> None:
         HarmonyMatrix.paper(n)
 
 
-def test_a_number_of_arms_is_a_number() -> None:
-    with pytest.raises(InputError, match=r"^number of arms must be an integer"):
-        HarmonyMatrix.paper("4")  # type: ignore[arg-type]
-
-
 def test_vehicles_of_one_lane_are_never_in_harmony() -> None:
     intersection = Intersection((0.0, 80.0, 190.0, 260.0))
     matrix = HarmonyMatrix.from_geometry(intersection, clearance=0.0)
@@ -91,19 +84,17 @@ def test_vehicles_of_one_lane_are_never_in_harmony() -> None:
 def test_movements_into_one_exit_lane_are_in_conflict() -> None:
     for n in (3, 4, 5, 6):
         matrix = HarmonyMatrix.from_geometry(Intersection(tuple(360 * i / n for i in range(n))))
-        for a in matrix.movements:
-            for b in matrix.movements:
-                if (a.origin + a.manoeuvre) % n == (b.origin + b.manoeuvre) % n:
-                    assert not matrix[a, b], (n, str(a), str(b))
+        for a, b in itertools.product(matrix.movements, repeat=2):
+            if (a.origin + a.manoeuvre) % n == (b.origin + b.manoeuvre) % n:
+                assert not matrix[a, b], (n, str(a), str(b))
 
 
 def test_a_regular_junction_looks_the_same_from_every_arm() -> None:
     n = 5
     matrix = HarmonyMatrix.from_geometry(five_way().intersection)
-    for a in matrix.movements:
-        for b in matrix.movements:
-            turned = [Movement((m.origin + 1) % n, m.manoeuvre) for m in (a, b)]
-            assert matrix[a, b] == matrix[turned[0], turned[1]]
+    for a, b in itertools.product(matrix.movements, repeat=2):
+        turned = [Movement((m.origin + 1) % n, m.manoeuvre) for m in (a, b)]
+        assert matrix[a, b] == matrix[turned[0], turned[1]]
 
 
 def test_values_are_read_only_and_owned() -> None:
@@ -258,19 +249,11 @@ def test_unreadable_and_unwritable_paths(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(FileError, match=r"^cannot read harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot read harmony matrix.*: [^\[]+$"):
         HarmonyMatrix.from_csv(path)
-    with pytest.raises(FileError, match=r"^cannot write harmony matrix"):
+    with pytest.raises(FileError, match=r"^cannot write "):
         HarmonyMatrix.paper(3).to_csv(path)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_reason_of_the_system_is_told_without_its_number(tmp_path: Path) -> None:
-    path = tmp_path / "missing" / "m.csv"
-    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
-        HarmonyMatrix.from_csv(path)
-    with pytest.raises(FileError, match=r"m\.csv: No such file or directory$"):
-        HarmonyMatrix.paper(3).to_csv(path)
 
 
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])
@@ -281,11 +264,14 @@ def test_a_path_is_text(path: object) -> None:
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]
 
 
-def test_from_geometry_checks_its_arguments() -> None:
-    intersection = four_way().intersection
-    with pytest.raises(InputError, match="intersection must be an Intersection"):
-        HarmonyMatrix.from_geometry("four-way")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="vehicle must be a VehicleType"):
-        HarmonyMatrix.from_geometry(intersection, 5)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="clearance"):
-        HarmonyMatrix.from_geometry(intersection, clearance=-1)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("four-way",), "intersection must be an Intersection"),
+        ((four_way().intersection, 5), "vehicle must be a VehicleType"),
+        ((four_way().intersection, None, -1), "clearance"),
+    ],
+)
+def test_from_geometry_checks_its_arguments(arguments: tuple[Any, ...], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        HarmonyMatrix.from_geometry(*arguments)

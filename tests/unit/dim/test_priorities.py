@@ -1,4 +1,4 @@
-"""Lane priorities that change with time: by hand, and the same for all whenever they came."""
+"""Lane priorities that change with time: by hand, and the same for all vehicles."""
 
 from __future__ import annotations
 
@@ -15,32 +15,28 @@ from dim.controller import DimSession
 from dim.priorities import (
     SAME_TIME,
     TURN_TIME,
-    Watch,
+    PassingTimes,
     longest_waiting,
     memory_of,
     rotating,
-    turn_at,
 )
-from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
+from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.strategies import scenarios
-from tests.builders import digest, drained
-
-
-def car(vehicle: int, lane: int, distance: float, manoeuvre: int = 2) -> Observed:
-    return Observed(vehicle, lane, manoeuvre, distance, 0.0, 4.0)
-
+from tests.builders import digest, drained, seen
 
 # --- by hand ---------------------------------------------------------------------------------
 
 
 def test_turns_follow_the_clock() -> None:
-    assert turn_at(0.0, 4, 10.0) == (0, 10.0)
-    assert turn_at(9.9, 4, 10.0) == (0, 10.0)
-    assert turn_at(10.0, 4, 10.0) == (1, 20.0)
-    assert turn_at(40.0, 4, 10.0) == (0, 50.0)
-    assert turn_at(2.9999999, 3, 3.0) == (1, 6.0)  # a rounding error before the end of a turn
+    for time, n, turn, first, until in (
+        (0.0, 4, 10.0, 0, 10.0), (9.9, 4, 10.0, 0, 10.0), (10.0, 4, 10.0, 1, 20.0),
+        (40.0, 4, 10.0, 0, 50.0),
+        (2.9999999, 3, 3.0, 1, 6.0),  # a rounding error before the end of a turn
+    ):  # fmt: skip
+        ranking = rotating(time, n, turn)
+        assert (ranking.ranks.index(0), ranking.until) == (first, until)
 
 
 def test_ranks_rotate() -> None:
@@ -56,7 +52,7 @@ def test_a_turn_is_longer_than_a_crossing() -> None:
 
 def test_the_longest_wait_comes_first() -> None:
     ranking = longest_waiting(30.0, 4, {0: 29.0, 2: 25.0, 3: 27.0}, memory=8.0, turn_time=100.0)
-    assert ranking.ranks == (2, 3, 0, 1)  # c, d, a; nobody waits on b
+    assert ranking.ranks == (2, 3, 0, 1)  # c, d, a; none waits on b
     assert ranking.until == 33.0  # then c's wait counts no more
 
 
@@ -81,11 +77,11 @@ def test_ranks_hold_until_a_wait_reaches_the_memory_or_the_turn_ends() -> None:
     assert longest_waiting(0.0, 3, {1: 0.0}, SAME_TIME, 100.0).until == 100.0
 
 
-def test_who_has_just_come_is_before_nobody() -> None:
+def test_a_vehicle_that_has_just_come_is_before_none() -> None:
     assert longest_waiting(0.0, 3, {2: 0.0}, 8.0, 100.0).ranks == (1, 2, 0)
 
 
-def test_memory_is_how_long_everybody_has_watched() -> None:
+def test_memory_is_how_long_each_vehicle_has_watched() -> None:
     """100 m range, yellow zone from 8 m: 92 m at 40 km/h."""
     site = four_way().site()
     assert memory_of(site, Zones()) == pytest.approx(92.0 / (40.0 / 3.6))
@@ -97,29 +93,17 @@ def test_memory_is_how_long_everybody_has_watched() -> None:
     assert memory_of(site, Zones(), 8.5) == pytest.approx(0.5 / (40.0 / 3.6))
 
 
-def test_a_watch_notes_who_passes_the_start() -> None:
-    watch = Watch(8.0)
-    assert watch.look(1.0, [car(1, 0, 8.1)]) == {}
-    assert watch.look(2.0, [car(1, 0, 7.9), car(5, 2, 3.0)]) == {0: 2.0, 2: 2.0}
-    assert Watch(8.0).look(2.0, [car(1, 0, 8.0), car(5, 2, 0.0)]) == {0: 2.0, 2: 2.0}
-    assert watch.look(3.0, [car(1, 0, -1.0), car(2, 0, 6.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 2.0}
-    assert watch.look(4.0, [car(2, 0, 2.0)]) == {0: 3.0}
-    assert watch.look(5.0, [car(2, 0, 2.0), car(5, 2, 3.0)]) == {0: 3.0, 2: 5.0}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"turn_time": 0.9}, "turn_time"),
-        ({"turn_time": 3600.5}, "turn_time"),
-        ({"turn_time": "10"}, "turn_time"),
-        ({"sensor_range": 0.0}, "sensor_range"),
-        ({"priorities": "rotate"}, "unknown priorities 'rotate'.*did you mean 'rotating'"),
-    ],
-)
-def test_arguments_are_checked(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Dim(**arguments)  # type: ignore[arg-type]
+def test_passing_times_by_hand() -> None:
+    watch = PassingTimes(8.0)
+    assert watch.look(1.0, [seen(1, 0, 2, 8.1)]) == {}
+    assert watch.look(2.0, [seen(1, 0, 2, 7.9), seen(5, 2, 2, 3.0)]) == {0: 2.0, 2: 2.0}
+    assert PassingTimes(8.0).look(2.0, [seen(1, 0, 2, 8.0), seen(5, 2, 2, 0.0)]) == {0: 2.0, 2: 2.0}
+    assert watch.look(3.0, [seen(1, 0, 2, -1.0), seen(2, 0, 2, 6.0), seen(5, 2, 2, 3.0)]) == {
+        0: 3.0,
+        2: 2.0,
+    }
+    assert watch.look(4.0, [seen(2, 0, 2, 2.0)]) == {0: 3.0}
+    assert watch.look(5.0, [seen(2, 0, 2, 2.0), seen(5, 2, 2, 3.0)]) == {0: 3.0, 2: 5.0}
 
 
 # --- the session -----------------------------------------------------------------------------
@@ -135,25 +119,20 @@ def words(commands: Iterable[Command]) -> list[str]:
 
 def test_a_session_looks_again_when_the_turn_ends() -> None:
     session = Dim(priorities="rotating").start(four_way().site())
-    both = (car(0, 0, 2.2), car(1, 1, 2.2))  # a2 and b2 are in conflict
+    both = (seen(0, 0, 2, 2.2), seen(1, 1, 2, 2.2))  # a2 and b2 are in conflict
     assert words(session.decide(View(9.0, both))) == ["go 0", "wake 10"]
     assert words(session.decide(View(10.0, both))) == ["hold 0", "go 1", "wake 20"]
     alone = (both[0],)
-    assert words(session.decide(View(11.0, alone))) == ["go 0"]  # nobody waits: no wake-up
+    assert words(session.decide(View(11.0, alone))) == ["go 0"]  # none waits: no wake-up
 
 
-def test_a_session_lets_go_who_waits_longest() -> None:
+def test_the_longest_waiting_lane_goes() -> None:
     session = Dim(priorities="waiting").start(four_way().site())
-    first, second = car(1, 1, 2.2), car(0, 0, 2.2)
+    first, second = seen(1, 1, 2, 2.2), seen(0, 0, 2, 2.2)
     assert words(session.decide(View(1.0, (first,)))) == ["go 1"]
     assert words(session.decide(View(3.0, (second, first)))) == ["wake 9.28"]
     # Both have waited for 8.28 s, which is as much as counts; it is b's turn from 10 s on.
     assert words(session.decide(View(12.0, (second, first)))) == ["wake 20"]
-
-
-def test_names() -> None:
-    assert Dim(priorities="rotating").name == "dim:priorities=rotating"
-    assert Dim(order="lanes", priorities="waiting").name == "dim:order=lanes,priorities=waiting"
 
 
 @given(
@@ -202,14 +181,14 @@ class ObserversSession:
         self.start = recipe.dim.zones.yellow_start + 1e-6
         self.memory = memory_of(site, recipe.dim.zones, recipe.dim.sensor_range)
         self.n = site.intersection.n
-        self.ours = Watch(self.start)
-        self.watches: dict[int, Watch] = {}
+        self.ours = PassingTimes(self.start)
+        self.watches: dict[int, PassingTimes] = {}
 
     def decide(self, view: View) -> Iterable[Command]:
         ours = self.ours.look(view.time, view.vehicles)
         common = longest_waiting(view.time, self.n, ours, self.memory).ranks
         for ego in view.vehicles:
-            watch = self.watches.setdefault(ego.id, Watch(self.start))
+            watch = self.watches.setdefault(ego.id, PassingTimes(self.start))
             own = longest_waiting(
                 view.time, self.n, watch.look(view.time, view.vehicles), self.memory
             ).ranks
@@ -227,15 +206,15 @@ def disagreements(reach: float, sensor_range: float, density: float) -> dict[str
     return tally
 
 
-def test_late_vehicles_rank_the_lanes_as_those_who_were_there() -> None:
-    """Whoever has watched from 100 m on knows as much as the others about every wait."""
+def test_late_vehicles_rank_the_lanes_as_those_that_were_there() -> None:
+    """A vehicle that has watched from 100 m on knows as much as the others about every wait."""
     tally = disagreements(reach=100.0, sensor_range=100.0, density=300.0)
     assert tally["looks"] > 2000
     assert tally["differ"] == 0
 
 
 def test_with_shorter_sensors_than_agreed_they_do_not() -> None:
-    """The assumption matters: who sees 12 m only, but counts as if it saw 100, differs."""
+    """The assumption matters: a vehicle that sees only 12 m but counts as if it saw 100 differs."""
     assert disagreements(reach=12.0, sensor_range=100.0, density=300.0)["differ"] > 0
 
 
@@ -245,7 +224,7 @@ def test_with_shorter_sensors_than_agreed_they_do_not() -> None:
     st.integers(0, 200),
     st.integers(0, 200),
 )
-def test_whoever_has_watched_for_the_memory_agrees(
+def test_an_observer_that_has_watched_for_the_memory_agrees(
     passed: dict[int, int], memory: int, early: int, later: int
 ) -> None:
     """In tenths of a second: passing times, and an observer that began `early` before it must."""

@@ -1,4 +1,4 @@
-"""Figures and tables of results: each is made from a store of formulas, and says what it shows."""
+"""Figures and tables of results, made from rows of simple formulas, and the report."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import io
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,28 +15,28 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from baselines import webster
 from dim import HarmonyMatrix
 from figures import plots, style
 from figures import reproduction_report as report
 from figures.gallery import GALLERY, SECTIONS, item_named, write
-from figures.junction.tables import harmony_table, webster_table
+from figures.junction.schematic import harmony_table, webster_table
 from figures.tables import WRITERS, Table, save_table
-from minisim.errors import FileError, InputError
+from minisim.errors import InputError
 from scenarios import studies
 from scenarios.controllers import RIVALS
-from scenarios.paper import SERIES, Cell, reference_value
+from scenarios.paper import SERIES, Cell
 from scenarios.recipe import Recipe
 from scenarios.studies import NAMES, study_named
+from scenarios.studies.fairness import PRIORITIES
 from scenarios.studies.shared.archive import Archive, MissingRunsError, missing_note
 from scenarios.studies.shared.effort import Effort, Search
 from scenarios.studies.shared.reproduction import Made
 from scenarios.sweep.cells import saturated
 from scenarios.sweep.keys import key_of
 from tests import ROOT
-from tests.builders import capacity_of, synthetic_find, synthetic_row
+from tests.builders import capacity_of, reference_value, synthetic_find, synthetic_row
 
 SEARCH = Search(step=20.0, steps=64, seeds=2)
 EFFORT = Effort(seeds=2, search=SEARCH)
@@ -46,9 +47,28 @@ def archive() -> Archive:
     return Archive(synthetic_find, EFFORT)
 
 
-def partial_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
+def partial_find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
     """A store without adaptive signals."""
-    return [None if e.label == "adaptive" else synthetic_row(e) for e in experiments]
+    return [None if e.label == "adaptive" else synthetic_row(e) for e in recipes]
+
+
+EMPTY = Archive(lambda asked: [None] * len(asked), EFFORT)
+
+
+def figure_of(name: str, archive: Archive) -> Figure:
+    drawing = GALLERY[name].build(archive)
+    assert isinstance(drawing, Figure)
+    return drawing
+
+
+def table_of(name: str, archive: Archive) -> Table:
+    drawing = GALLERY[name].build(archive)
+    assert isinstance(drawing, Table)
+    return drawing
+
+
+def texts_of(figure: Figure) -> list[str]:
+    return [" ".join(text.get_text().split()) for text in figure.texts]
 
 
 # --- the gallery -----------------------------------------------------------------------------
@@ -61,20 +81,17 @@ def test_everything_can_be_made_and_nothing_is_cut_off(name: str, archive: Archi
         assert drawing.rows
         return
     drawing.draw_without_rendering()
-    texts = [t for t in drawing.findobj(match=lambda a: hasattr(a, "get_text")) if t.get_text()]
-    boxes = [(t.get_text(), t.get_window_extent()) for t in texts if t.get_visible()]
-    for text, box in boxes:
-        inside = box.x0 >= -1 and box.x1 <= drawing.bbox.x1 + 1 and box.y1 <= drawing.bbox.y1 + 1
-        assert inside or not box.width, text
+    for text in drawing.findobj(match=lambda a: hasattr(a, "get_text")):
+        box = text.get_window_extent()
+        if text.get_text() and text.get_visible() and box.width:
+            assert -1 <= box.x0 <= box.x1 <= drawing.bbox.x1 + 1, text
+            assert box.y1 <= drawing.bbox.y1 + 1, text
     legends = [legend.get_window_extent() for legend in drawing.legends]
-    for i, one in enumerate(legends):
-        for other in legends[i + 1 :]:
-            assert not one.overlaps(other)
+    assert not any(one.overlaps(other) for one, other in combinations(legends, 2))
 
 
 def test_every_study_is_drawn_and_every_need_is_a_study() -> None:
-    needed = {need for item in GALLERY.values() for need in item.needs}
-    assert needed == set(NAMES)
+    assert {need for item in GALLERY.values() for need in item.needs} == set(NAMES)
 
 
 def test_the_study_of_the_guide_is_complete(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,24 +116,19 @@ def test_unknown_figure_names_the_nearest() -> None:
 
 @pytest.mark.parametrize("name", ["worst-case", "losses-table", "gate"])
 def test_same_results_same_bytes(name: str, archive: Archive, tmp_path: Path) -> None:
-    folders = [tmp_path / "one", tmp_path / "two"]
-    for folder in folders:
-        folder.mkdir()
-        write(GALLERY[name].build(archive), folder, name)
-    suffixes = style.FORMATS if isinstance(GALLERY[name].build(archive), Figure) else WRITERS
-    for suffix in suffixes:
-        one, two = ((folder / f"{name}.{suffix}").read_bytes() for folder in folders)
-        assert one == two
+    written = [
+        [file.read_bytes() for file in write(GALLERY[name].build(archive), tmp_path, name)]
+        for _ in range(2)
+    ]
+    assert len(written[0]) == 3
+    assert written[0] == written[1]
 
 
 def test_nothing_to_draw_says_how_to_make_it() -> None:
-    empty = Archive(lambda asked: [None] * len(asked), EFFORT)
-    for name, item in GALLERY.items():
+    for item in GALLERY.values():
         if item.needs:
             with pytest.raises(MissingRunsError, match=r"minisim reproduce --only .* --seeds 2"):
-                item.build(empty)
-        else:
-            assert item.build(empty), name
+                item.build(EMPTY)
 
 
 @pytest.mark.parametrize("study", ["text", "as-run"])
@@ -136,16 +148,14 @@ def test_one_of_two_studies_is_drawn(name: str, study: str) -> None:
     assert [len(axes.get_legend_handles_labels()[0]) > 0 for axes in drawing.axes] == [
         study == "as-run", study == "text",
     ]  # fmt: skip
-    assert any("no run" in text.get_text() for text in drawing.texts)
+    assert any("no run" in text for text in texts_of(drawing))
 
 
 def test_what_is_missing_is_said_in_the_picture() -> None:
-    figure = GALLERY["fair"].build(Archive(partial_find, EFFORT))
-    assert isinstance(figure, Figure)
-    notes = [" ".join(t.get_text().split()) for t in figure.texts if "no run" in t.get_text()]
-    assert len(notes) == 1
-    assert "adaptive (fair, 4 arms, balanced, 50)" in notes[0]
-    assert "9 more" in notes[0]
+    figure = figure_of("fair", Archive(partial_find, EFFORT))
+    (note,) = [text for text in texts_of(figure) if "no run" in text]
+    assert "adaptive (fair, 4 arms, balanced, 50)" in note
+    assert "9 more" in note
 
 
 def test_small_print_counts_the_runs_that_there_are() -> None:
@@ -155,24 +165,18 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
         lost = ("all-way-stop", 2)
         return [None if (e.label, e.seed) == lost else synthetic_row(e) for e in asked]
 
-    figure = GALLERY["fair"].build(Archive(find, EFFORT))
-    assert isinstance(figure, Figure)
-    (note,) = [" ".join(t.get_text().split()) for t in figure.texts if "s each" in t.get_text()]
+    (note,) = [t for t in texts_of(figure_of("fair", Archive(find, EFFORT))) if "s each" in t]
     assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5))
-    assert missing_note([archive.study("as-run")]).startswith("3 to 5 seeds, 3600")
+    assert missing_note(archive.study("as-run")).startswith("3 to 5 seeds, 3600")
 
 
 def test_losses_end_where_the_runs_do() -> None:
     archive = Archive(synthetic_find, Effort(seeds=2, densities=(150.0, 350.0)))
-    table = GALLERY["losses-table"].build(archive)
-    assert isinstance(table, Table)
-    assert "demands tried, 150 to 350." in table.notes[0]
-    figure = GALLERY["losses"].build(archive)
-    assert isinstance(figure, Figure)
-    for axes in figure.axes:
+    assert "demands tried, 150 to 350." in table_of("losses-table", archive).notes[0]
+    for axes in figure_of("losses", archive).axes:
         assert axes.get_xticks().tolist() == [150.0, 350.0]
         bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
         assert bars
@@ -188,59 +192,38 @@ def test_losses_end_where_the_runs_do() -> None:
 # --- what the pictures say -------------------------------------------------------------------
 
 
-def hollow(figure: Figure, panel: int) -> list[Line2D]:
-    return [line for line in figure.axes[panel].lines if line.get_markerfacecolor() == "none"]
-
-
 def test_the_paper_s_values_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = GALLERY["waiting-4321"].build(archive)
-    assert isinstance(figure, Figure)
-    for panel in (0, 1):
-        found = hollow(figure, panel)
-        assert len(found) == len(SERIES)
-        for line, (published, series) in zip(found, SERIES.items(), strict=True):
+    figure = figure_of("waiting-4321", archive)
+    for axes in figure.axes:
+        hollow = [line for line in axes.lines if line.get_markerfacecolor() == "none"]
+        for line, (published, series) in zip(hollow, SERIES.items(), strict=True):
             assert line.get_marker() == style.look(series).marker
             wanted = {
-                reference_value(Cell("4:3:2:1", d, 4), "waiting_time_s", published)
+                reference_value(Cell("4:3:2:1", d, 4, published), "waiting_time_s")
                 for d in (150, 200, 250, 300, 350)
             }
             assert set(np.asarray(line.get_ydata(), float).tolist()) == wanted
-        crossed = [line for line in figure.axes[panel].lines if line.get_marker() == "x"]
+        crossed = [line for line in axes.lines if line.get_marker() == "x"]
         assert [len(np.asarray(line.get_xdata())) for line in crossed] == [0, 5, 5, 5]
 
 
 def test_our_means_are_drawn_where_they_are(archive: Archive) -> None:
-    figure = GALLERY["fair"].build(archive)
-    assert isinstance(figure, Figure)
+    figure = figure_of("fair", archive)
     (results,) = archive.need("fair")
     handles = figure.axes[0].get_legend_handles_labels()[0]
-    assert len(handles) == len(RIVALS)
     for handle, series in zip(handles, RIVALS, strict=True):
         rows = results.good[results.good["series"] == series]
         means = rows.groupby("density")["complete_waiting_time_s"].mean()
         np.testing.assert_allclose(np.asarray(handle.lines[0].get_ydata(), float), means)
-
-
-def test_growing_queues_get_an_arrow(archive: Archive) -> None:
-    figure = GALLERY["fair"].build(archive)
-    assert isinstance(figure, Figure)
-    (results,) = archive.need("fair")
-    cells = results.good.groupby(["series", "density"])
-    grown = sum(saturated(cell) for _, cell in cells)
+    grown = sum(saturated(cell) for _, cell in results.good.groupby(["series", "density"]))
     arrows = [t for t in figure.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
-    assert len(arrows) == grown > 0
+    assert len(arrows) == grown > 0, "where queues grow"
 
 
-def test_series_are_told_apart_without_colour() -> None:
-    together = [
-        RIVALS,
-        ("dim", "dim:priorities=rotating", "dim:priorities=waiting"),
-        ("dim-3", "dim-4", "dim-5"),
-    ]
-    for group in together:
-        looks = [style.look(name) for name in group]
-        assert len({look.marker for look in looks}) == len(looks)
-        assert len({look.colour for look in looks}) == len(looks)
+@pytest.mark.parametrize("series", [RIVALS, PRIORITIES, ("dim-3", "dim-4", "dim-5")])
+def test_series_are_told_apart_without_colour(series: Sequence[str]) -> None:
+    _, colours, markers, _ = zip(*map(style.look, series), strict=True)
+    assert len(set(colours)) == len(set(markers)) == len(series)
 
 
 def test_log_axis_shows_plain_numbers() -> None:
@@ -275,17 +258,14 @@ def test_harmony_table_is_the_published_matrix(arms: int) -> None:
 
 
 def test_lane_table_has_the_paper_s_numbers(archive: Archive) -> None:
-    table = GALLERY["lanes"].build(archive)
-    assert isinstance(table, Table)
-    found = {(row[0], row[1]): row[2] for row in table.rows}
-    assert found["4-way", "d"] == "10.21"
-    assert found["5-way", "e"] == "146.11"
-    assert found["3-way", "a"] == "0.46 †", "its run stopped early"
+    printed = {row[:2]: row[2] for row in table_of("lanes", archive).rows}
+    assert printed["4-way", "d"] == "10.21"
+    assert printed["5-way", "e"] == "146.11"
+    assert printed["3-way", "a"] == "0.46 †", "its run stopped early"
 
 
 def test_capacity_table_has_what_the_rows_hold(archive: Archive) -> None:
-    table = GALLERY["capacity-table"].build(archive)
-    assert isinstance(table, Table)
+    table = table_of("capacity-table", archive)
     first = dict(zip(table.headings, table.rows[0], strict=True))
     assert first["controller"] == "DIM"
     for arms in (3, 4, 5, 6):
@@ -318,17 +298,14 @@ FEW = ("webster", "gate", "losses-table", "comparison-text")
 
 
 def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a few figures: all of them are made above."""
+    """With a few figures only: all of them are made above."""
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
     pictures = tmp_path / "figures"
-    pictures.mkdir()
     failed = {"controller": "x", "scenario": "four-way", "density": 1.0, "seed": 3, "error": "no"}
     made = [Made("text", 700, 700.0, 699, 12.3, 45.6, (failed,))]
     drawn: list[int] = []
-    count = report.write_report(
-        Archive(partial_find, EFFORT), made, 2, tmp_path, pictures,
-        lambda done, total: drawn.append(done),
-    )  # fmt: skip
+    archive = Archive(partial_find, EFFORT)
+    count = report.write_report(archive, made, 2, tmp_path, lambda done, total: drawn.append(done))
     assert count == len(FEW) == len(drawn)
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "![clear against harmonious gate](figures/gate.png)" in text
@@ -341,27 +318,21 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "**13** " in text
     assert "**9a** " in text
     assert "None in any run." in text, "no collision"
-    empty = Archive(lambda asked: [None] * len(asked), EFFORT)
-    assert report.write_report(empty, made, 1, tmp_path, pictures, lambda done, total: None) == 1
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    assert "the store has no run of gate" in text
-    with pytest.raises(FileError, match="not inside"):
-        report.write_report(empty, made, 1, pictures, tmp_path, lambda done, total: None)
+    assert report.write_report(EMPTY, made, 1, tmp_path, lambda done, total: None) == 1
+    assert "the store has no run of gate" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
 def test_a_report_on_one_study_has_nothing_of_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
-    pictures = tmp_path / "figures"
-    pictures.mkdir()
     made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
     count = report.write_report(
-        Archive(synthetic_find, EFFORT), made, 2, tmp_path, pictures,
-        lambda done, total: None, parts=("gate",),
+        Archive(synthetic_find, EFFORT), made, 2, tmp_path, lambda done, total: None,
+        parts=("gate",),
     )  # fmt: skip
     assert count == 1
-    assert {file.stem for file in pictures.iterdir()} == {"gate"}
+    assert {file.stem for file in (tmp_path / "figures").iterdir()} == {"gate"}
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
     assert headings == [
@@ -377,7 +348,7 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
         return [{**synthetic_row(e), "collisions": 2 * (e.label == "dim")} for e in asked]
 
     report.write_report(
-        Archive(find, Effort.of(quick=True)), [], 1, tmp_path, tmp_path, lambda done, total: None,
+        Archive(find, Effort.of(quick=True)), [], 1, tmp_path, lambda done, total: None,
         parts=("as-run",),
     )  # fmt: skip
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
@@ -393,7 +364,5 @@ def test_the_report_keeps_its_appendix_for_the_end() -> None:
 
 
 def test_causes_that_share_a_number_are_named_once(archive: Archive) -> None:
-    table = GALLERY["comparison-as-run"].build(archive)
-    assert isinstance(table, Table)
-    for row in table.rows:
+    for row in table_of("comparison-as-run", archive).rows:
         assert len(row[-1].split()) == len(set(row[-1].split()))

@@ -66,14 +66,8 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"intersection": "four-way"}, "intersection must be an Intersection"),
-        ({"vehicle": None}, "vehicle must be a VehicleType"),
-        ({"speed_limit": 0}, "speed_limit"),
         ({"demand": (1.0, 2.0)}, "demand must be 4 numbers"),
         ({"demand": (1.0, 2.0, 3.0, -1.0)}, "demand must be 4 numbers"),
-        ({"demand": 350.0}, "demand .* must be a sequence"),
-        ({"dt": 0.6}, "dt"),
-        ({"seed": -1}, "seed"),
         ({"vehicle": VehicleType(length=12.0, width=2.5)}, r"12 × 2\.5 m do not fit lanes of 3\.2"),
         ({"vehicle": VehicleType(width=3.3)}, "do not fit lanes"),
     ],
@@ -87,15 +81,8 @@ def test_sites_are_checked(change: dict[str, object], message: str) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"hold_distance": -1}, "hold_distance"),
-        ({"sight": -1}, "sight"),
-        ({"marks": (1.0, -1001.0)}, "mark"),
-        ({"reach": -1}, "reach"),
-        ({"marks": 3.0}, "marks .* must be a sequence"),
-        ({"period": 0}, "period"),
         ({"markings": ("red",)}, "marking must be a Marking"),
         ({"markings": Marking("red", 30, 8)}, "markings must be a tuple"),
-        ({"lanes_open": 1}, "lanes_open must be a bool"),
     ],
 )
 def test_plans_are_checked(change: dict[str, object], message: str) -> None:
@@ -103,18 +90,9 @@ def test_plans_are_checked(change: dict[str, object], message: str) -> None:
         Plan(**change)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("red", 8.0, 30.0), r"start of marking red .* above 30"),
-        (("red", 8.0, -1.0), "end of a marking .* at least 0, got -1"),
-        (("red", 30.0, 8.0, 0.0), "speed of a marking .* above 0"),
-        ((5, 30.0, 8.0), "name of a marking must be a str"),
-    ],
-)
-def test_markings_are_checked(arguments: tuple[object, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Marking(*arguments)  # type: ignore[arg-type]
+def test_a_marking_starts_before_it_ends() -> None:
+    with pytest.raises(InputError, match=r"start of marking red .* above 30"):
+        Marking("red", 8.0, 30.0)
 
 
 def test_unregulated_opens_every_lane_and_says_nothing() -> None:

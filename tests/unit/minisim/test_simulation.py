@@ -8,12 +8,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import minisim
-from baselines import FixedTime
 from dim import Dim
 from minisim.control import (
     LATERAL_ACCELERATION,
@@ -27,6 +27,7 @@ from minisim.control import (
     Open,
     Plan,
     Unregulated,
+    View,
     Wake,
 )
 from minisim.errors import CollisionError, ControllerError, InputError
@@ -36,7 +37,7 @@ from minisim.simulation import Simulation
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.scenario import Profile
-from tests.builders import Fixed, digest, replayed
+from tests.builders import Fixed, Scripted, digest, replayed
 
 STRAIGHT = (0.0, 0, 2)
 OPEN = Plan(lanes_open=True)
@@ -98,52 +99,25 @@ def test_marking_slows_ahead_of_its_start_and_ends() -> None:
 
 
 def test_advice_caps_the_speed_and_infinity_lifts_it() -> None:
-    class Advisor:
-        plan = Plan(lanes_open=True, marks=(400.0, 300.0))
-        advised = 0
-
-        def decide(self, view):
-            self.advised += 1
-            return [Advise(0, (math.inf, 8.0, math.inf)[self.advised - 1])] if view.time else []
-
-    @dataclasses.dataclass(frozen=True)
-    class Recipe:
-        name: str = "advisor"
-
-        def start(self, site):
-            session = Advisor()
-            session.plan = dataclasses.replace(session.plan, sight=450.0)
-            return session
-
-    run = minisim.simulate(
-        replayed(four_way(profile="fair"), STRAIGHT, horizon=200.0), Recipe(), record="all"
+    advised = iter((8.0, math.inf))
+    advisor = Scripted(
+        lambda view: [Advise(0, next(advised))] if view.time else [],
+        Plan(lanes_open=True, marks=(400.0, 300.0), sight=450.0),
     )
+    scenario = replayed(four_way(profile="fair"), STRAIGHT, horizon=200.0)
+    run = minisim.simulate(scenario, advisor, record="all")
     entry = run.site.intersection.approach_length
     capped = run.trajectories.query(f"{entry - 330} < s_m < {entry - 305}")["speed_mps"]
     assert capped.to_numpy() == pytest.approx(8.0, abs=0.3)
     assert run.trajectories["speed_mps"].iloc[-1] > 13.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Timed:
-    """Looks every step; commands at set times [s]."""
-
-    script: dict[float, tuple[Command, ...]]
-    reach: float = 0.0
-    is_open: bool = True
-    name: str = "timed"
-
-    def start(self, site):
-        plan = Plan(lanes_open=self.is_open, period=site.dt, reach=self.reach)
-        return _TimedSession(self.script, plan)
-
-
-class _TimedSession:
-    def __init__(self, script, plan):
-        self.plan, self._script = plan, script
-
-    def decide(self, view):
-        return self._script.get(round(view.time, 6), ())
+def timed(
+    script: dict[float, tuple[Command, ...]], reach: float = 0.0, is_open: bool = True
+) -> Scripted:
+    """A controller that gives commands at set times [s]."""
+    plan = Plan(lanes_open=is_open, period=FAIR.dt, reach=reach)
+    return Scripted(lambda view: script.get(view.time, ()), plan)
 
 
 def braked(
@@ -152,7 +126,7 @@ def braked(
     """One vehicle at 14 m/s, straight on; it is in view up to `reach` past the entry [m]."""
     profile = dataclasses.replace(FAIR, vehicle=vehicle)
     scenario = replayed(four_way(profile=profile), STRAIGHT, horizon=60.0)
-    return minisim.simulate(scenario, Timed(script, reach), record="all")
+    return minisim.simulate(scenario, timed(script, reach), record="all")
 
 
 LAWS = {model: CruiseVehicle() if model == "cc" else VehicleType(model=model) for model in MODELS}
@@ -194,12 +168,12 @@ def test_the_harder_of_two_brakings_counts() -> None:
     """A vehicle held at its line at 4.5 m/s² is not braked more softly by a command of 1."""
     scenario = replayed(four_way(profile="fair"), STRAIGHT, horizon=60.0)
     held = minisim.simulate(scenario, Fixed(Plan()), record="all").trace["a"].min()
-    told = minisim.simulate(scenario, Timed({33.0: (Brake(0, 1.0),)}, is_open=False), record="all")
+    told = minisim.simulate(scenario, timed({33.0: (Brake(0, 1.0),)}, is_open=False), record="all")
     assert told.trace["a"].min() == pytest.approx(held) == pytest.approx(-4.5)
 
 
 def test_braking_ends_when_the_vehicle_leaves_the_view() -> None:
-    """Nobody sees it any more, so nobody could lift it."""
+    """No session sees it any more, so none could lift it."""
     free = braked(LAWS["idm"], {}, reach=0.0)
     soft = braked(LAWS["idm"], {35.0: (Brake(0, 1.0),)}, reach=0.0)
     assert soft.trace["v"].min() == pytest.approx(12.5, abs=0.7)
@@ -250,73 +224,37 @@ def test_go_releases_one_vehicle_and_open_a_lane() -> None:
 def test_hold_after_the_hold_line_stops_before_the_junction() -> None:
     """Revoked inside the green zone: it stands there, and does not creep to the junction."""
 
-    @dataclasses.dataclass(frozen=True)
-    class Revoking:
-        name: str = "revoking"
+    def revoke(view: View) -> list[Command]:
+        if view.time == 0.0:
+            return [Go(0)]
+        return [Hold(0)] if view.vehicles[0].distance < 11.0 else []
 
-        def start(self, site):
-            class Revoke:
-                plan = Plan(hold_distance=20.0, marks=(20.0, 10.0), sight=60.0, lanes_open=False)
-                views = 0
-
-                def decide(self, view):
-                    self.views += 1
-                    if self.views == 1:
-                        return [Go(0)]
-                    return [Hold(0)] if view.vehicles[0].distance < 11.0 else []
-
-            return Revoke()
-
+    revoking = Scripted(revoke, Plan(hold_distance=20.0, marks=(20.0, 10.0), sight=60.0))
     slow = dataclasses.replace(FAIR, speed_limit=6.0)
-    run = minisim.simulate(
-        replayed(four_way(profile=slow), STRAIGHT, horizon=300.0), Revoking(), record="all"
-    )
+    scenario = replayed(four_way(profile=slow), STRAIGHT, horizon=300.0)
+    run = minisim.simulate(scenario, revoking, record="all")
     distance = run.site.intersection.approach_length - run.trajectories["s_m"].iloc[-1]
     assert 10.0 - 6.0**2 / 9.0 - 0.6 - 0.3 < distance < 10.0 - 6.0**2 / 9.0 + 0.3
     assert run.trajectories["speed_mps"].iloc[-1] == 0.0
 
 
-def test_wake_ups_come_on_the_tick() -> None:
+@pytest.mark.parametrize(
+    ("plan", "answer", "step"),
+    [
+        (Plan(), lambda view: [Wake(view.time + 0.7)], 0.7),
+        (Plan(period=0.5), lambda view: (), 0.5),
+    ],
+    ids=["wake", "period"],
+)
+def test_wake_ups_come_on_the_tick(plan: Plan, answer: Any, step: float) -> None:
     times: list[float] = []
 
-    @dataclasses.dataclass(frozen=True)
-    class Clock:
-        name: str = "clock"
+    def note(view: View) -> Any:
+        times.append(view.time)
+        return answer(view)
 
-        def start(self, site):
-            class Session:
-                plan = Plan()
-
-                def decide(self, view):
-                    times.append(view.time)
-                    return [Wake(view.time + 0.7)]
-
-            return Session()
-
-    minisim.simulate(replayed(four_way(), (50.0, 0, 1), horizon=7.0), Clock())
-    assert times == pytest.approx([0.7 * k for k in range(11)])
-
-
-def test_period_wakes_every_so_often() -> None:
-    count = 0
-
-    @dataclasses.dataclass(frozen=True)
-    class Counter:
-        name: str = "counter"
-
-        def start(self, site):
-            class Session:
-                plan = Plan(period=0.5)
-
-                def decide(self, view):
-                    nonlocal count
-                    count += 1
-                    return ()
-
-            return Session()
-
-    minisim.simulate(replayed(four_way(), (50.0, 0, 1), horizon=10.0), Counter())
-    assert count == 21
+    minisim.simulate(replayed(four_way(), (50.0, 0, 1), horizon=7.0), Scripted(note, plan))
+    assert times == pytest.approx(np.arange(0.0, 7.01, step))
 
 
 def test_collision_stops_the_run_with_a_replayable_report() -> None:
@@ -398,20 +336,6 @@ def test_compiled_and_plain_kernel_give_equal_runs() -> None:
     assert _digest_elsewhere() == _digest_elsewhere(MINISIM_JIT="0")
 
 
-def test_every_controller_meets_the_same_arrivals() -> None:
-    scenario = four_way(250, horizon=900.0)
-    ours, theirs = (minisim.simulate(scenario, c, seed=4).trips for c in (Dim(), FixedTime()))
-    for column in ("demand_time_s", "lane", "manoeuvre"):
-        assert (ours[column] == theirs[column]).all()
-
-
-def test_a_run_leaves_no_trace_in_the_next() -> None:
-    scenario, controller = four_way(250, horizon=400.0), Dim()
-    first = digest(minisim.simulate(scenario, controller, seed=1))
-    minisim.simulate(scenario, controller, seed=2)
-    assert digest(minisim.simulate(scenario, controller, seed=1)) == first
-
-
 def test_advancing_in_pieces_is_the_same_run() -> None:
     scenario = four_way(300, horizon=300.0)
     whole = minisim.simulate(scenario, Dim(), seed=6)
@@ -444,21 +368,11 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
 @pytest.mark.parametrize(
     "command",
     [
-        Go(99),
-        Hold(-1),
-        Open(4),
-        Close(-1),
-        Advise(0, -1.0),
-        Brake(0, -1.0),
-        Brake(9, 1.0),
-        Brake(0, math.inf),
-        Wake(0.0),
-        "go",
-        None,
-        Go("x"),
+        Go(99), Hold(-1), Go("x"), Open(4), Close(-1), Advise(0, -1.0), Brake(0, -1.0),
+        Brake(9, 1.0), Brake(0, math.inf), Wake(0.0), "go", None,
     ],
     ids=repr,
-)
+)  # fmt: skip
 def test_bad_commands_are_named(command: object) -> None:
     scenario = replayed(four_way(), STRAIGHT, horizon=10.0)
     with pytest.raises(ControllerError, match="fixed"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from minisim.errors import InputError
-from minisim.streams import STREAMS, stream
+from minisim.streams import STREAMS, Draws, stream
 
 
 @pytest.mark.parametrize("name", STREAMS)
@@ -43,3 +43,16 @@ def test_unknown_names_and_negative_seeds_are_refused() -> None:
         stream(1, "arrival")
     with pytest.raises(InputError, match="seed must be an integer of at least 0, got -1"):
         stream(-1, "arrivals")
+
+
+def test_draws_belong_to_their_question() -> None:
+    draws, again = Draws(1, "perception"), Draws(1, "perception")
+    numbers = [draws.uniform(1, k) for k in range(1000)]
+    assert [again.uniform(1, k) for k in reversed(range(1000))] == numbers[::-1]
+    assert len(set(numbers)) == 1000
+    assert sum(numbers) / 1000 == pytest.approx(0.5, abs=4 * (1 / 12000) ** 0.5)
+    assert draws.uniform(1, 2) != Draws(2, "perception").uniform(1, 2)
+    assert draws.uniform(1, 2) != Draws(1, "drivers").uniform(1, 2)
+    normal = [draws.normal(2, k) for k in range(1000)]
+    assert sum(normal) / 1000 == pytest.approx(0.0, abs=4 / 1000**0.5)
+    assert sum(z * z for z in normal) / 1000 == pytest.approx(1.0, abs=4 * (2 / 1000) ** 0.5)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from minisim.control import Controller
 from minisim.errors import InputError
 from minisim.testing import check_controller
 from scenarios import four_way
@@ -186,8 +185,3 @@ def test_what_is_wrong_is_one_sentence(folder: Path, spec: str, message: str) ->
         controller_named(spec)
     assert "\n" not in str(error.value)
     assert sys.modules["json"] is json
-
-
-@pytest.mark.usefixtures("folder")
-def test_it_is_a_controller_as_any_other() -> None:
-    assert isinstance(controller_named("own_mine:Mine"), Controller)

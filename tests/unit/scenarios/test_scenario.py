@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import pickle
 
 import numpy as np
@@ -12,14 +11,7 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.vehicle import VehicleType
-from scenarios.scenario import (
-    FAIR,
-    PAPER,
-    PROFILES,
-    Profile,
-    Scenario,
-    profile_named,
-)
+from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario, profile_named
 
 FOUR = Intersection((0.0, 90.0, 180.0, 270.0))
 DEMAND = Demand(density=350.0)
@@ -74,59 +66,36 @@ def test_arrivals_come_from_the_demand_and_the_seed_alone() -> None:
 
 def test_recorded_arrivals_replace_the_demand() -> None:
     recorded = table((0.0, 0, 1), (1.0, 0, 2), (2.0, 3, 3))
-    scenario = Scenario(
-        name="x", intersection=FOUR, demand=DEMAND, horizon=1800.0, recorded=recorded
-    )
+    scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND, horizon=1800, recorded=recorded)
     assert scenario.arrivals(1) is recorded
     assert scenario.rates == pytest.approx((4.0, 0.0, 0.0, 2.0))
     assert scenario.density == pytest.approx(1.5)
 
 
-def test_scenarios_are_frozen_hashable_and_survive_pickling() -> None:
+def test_scenarios_are_values() -> None:
     scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND)
     again = pickle.loads(pickle.dumps(scenario))
     assert again == scenario
     assert hash(again) == hash(scenario)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        scenario.horizon = 1.0  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"name": 4}, "scenario name"),
-        ({"intersection": (0, 90, 180)}, "intersection must be"),
-        ({"demand": 350}, "demand must be a Demand"),
-        ({"profile": "paper"}, "profile must be a Profile"),
-        ({"horizon": 0}, "horizon .* above 0"),
-        ({"horizon": -1}, "horizon"),
-        ({"warmup": -1}, r"warmup \[s\] must be at least 0"),
         ({"warmup": 60, "horizon": 60}, r"warmup \[s\] must be below 60"),
         ({"demand": Demand(density=350, split=(1, 1, 1))}, "split has 3 shares for 4 lanes"),
         ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
         ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
         ({"demand": Demand(density=900, model="shifted", min_headway=4)}, "leave no room for"),
-        ({"recorded": "file.csv"}, "recorded must be an Arrivals"),
         ({"recorded": table((0.0, 4, 1))}, "lane e is not in the geometry"),
         ({"recorded": table((0.0, 0, 4))}, "manoeuvre 4 does not exist with 4 arms"),
     ],
 )
-def test_scenarios_are_checked(change: dict[str, object], message: str) -> None:
+def test_parts_of_a_scenario_fit_together(change: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Scenario(**{**BASE, **change})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"name": None}, "profile name"),
-        ({"vehicle": "car"}, "vehicle must be a VehicleType"),
-        ({"speed_limit": 0}, "speed_limit"),
-        ({"depart_speed": 15}, "depart_speed .* at most 14"),
-        ({"dt": 0}, "dt"),
-    ],
-)
-def test_profiles_are_checked(change: dict[str, object], message: str) -> None:
-    options = {"name": "x", "vehicle": VehicleType(), "speed_limit": 14.0}
-    with pytest.raises(InputError, match=message):
-        Profile(**{**options, **change})  # type: ignore[arg-type]
+def test_no_vehicle_departs_faster_than_the_limit() -> None:
+    with pytest.raises(InputError, match=r"depart_speed .* at most 14"):
+        Profile(name="x", vehicle=VehicleType(), speed_limit=14.0, depart_speed=15.0)

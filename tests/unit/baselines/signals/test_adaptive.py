@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 import minisim
 from baselines import Adaptive, FixedTime
-from baselines.signals.adaptive import DelayRule, time_loss
-from baselines.signals.phases import PhaseSession, Verdict
-from minisim.control import Observed, View
+from baselines.signals.adaptive import DelaySession, time_loss
+from baselines.signals.phases import Verdict
+from minisim.control import Observed, Session, Site, View
 from minisim.errors import InputError
 from minisim.testing import small_scenario
 from scenarios.library import four_way
@@ -19,20 +17,20 @@ from tests.builders import drive, replayed, seen, show
 
 SITE = four_way(profile="fair").site()
 LIMIT = 14.0
-#: Far away on lane b: it keeps a green of another lane from going on for want of anybody else.
+#: Far away on lane b: it keeps the green of another lane from going on because all lanes are empty.
 OTHER = seen(99, 1, 1, 80.0, 14.0)
 
 
 def verdict(
     *vehicles: Observed, elapsed: float, lost: float = 2.0, signal: Adaptive | None = None
 ) -> Verdict:
-    """Of lane a's phase; everybody came onto a detector so that `lost` seconds are lost by now."""
-    rule = DelayRule(signal or Adaptive(), SITE)
+    """Of lane a's phase; each vehicle has lost `lost` seconds on its detector by now."""
+    session = DelaySession(signal or Adaptive(), SITE)
     now = 1000.0
     for v in vehicles:
         since = lost + (100.0 - v.distance) / LIMIT
-        rule.see(View(now - since, (v._replace(distance=100.0),)))
-    return rule.judge(View(now, vehicles), 0, elapsed)
+        session.see(View(now - since, (v._replace(distance=100.0),)))
+    return session.judge(View(now, vehicles), 0, elapsed)
 
 
 PASS_ON = Verdict(1, 0.0)
@@ -55,7 +53,7 @@ def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
     # One vehicle meets a red light: what it has lost by the time when it stands.
     watched: list[tuple[float, float]] = []
 
-    class Watching(DelayRule):
+    class Watching(DelaySession):
         def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
             for v in view.vehicles:
                 if v.id in self._entered:
@@ -66,11 +64,8 @@ def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
     class Red:
         name = "red"
 
-        def start(self, site: Any) -> PhaseSession:
-            return PhaseSession(
-                site, Watching(Adaptive(), site), detector_range=100.0, marks=(100.0,),
-                min_green=0.5, amber=0.0,
-            )  # fmt: skip
+        def start(self, site: Site) -> Session:
+            return Watching(Adaptive(amber=0.0, min_green=0.5), site)
 
     run = minisim.simulate(
         replayed(four_way(profile="fair"), (0.0, 0, 2), horizon=60.0), Red(), record="all"
@@ -82,7 +77,7 @@ def test_time_loss_on_the_road_is_that_of_the_trip_table() -> None:
     assert loss > 20.0
 
 
-# The rule.
+# The session.
 
 
 def test_a_delayed_vehicle_prolongs_by_the_time_to_the_line_at_the_limit() -> None:
@@ -95,17 +90,17 @@ def test_the_last_of_several_counts() -> None:
 
 
 @pytest.mark.parametrize(("lost", "prolonged"), [(0.99, False), (1.01, True)])
-def test_who_lost_a_second_at_most_prolongs_nothing(lost: float, prolonged: bool) -> None:
+def test_a_second_lost_at_most_prolongs_nothing(lost: float, prolonged: bool) -> None:
     found = verdict(seen(1, 0, 2, 70.0, 14.0), OTHER, elapsed=10.0, lost=lost)
     assert (found != PASS_ON) is prolonged
 
 
-def test_who_has_passed_the_line_prolongs_nothing() -> None:
+def test_a_vehicle_that_has_passed_the_line_prolongs_nothing() -> None:
     assert verdict(seen(1, 0, 2, 0.0, 5.0), OTHER, elapsed=10.0) == PASS_ON
     assert verdict(seen(1, 0, 2, -3.0, 5.0), OTHER, elapsed=10.0) == PASS_ON
 
 
-def test_who_cannot_pass_before_the_longest_green_prolongs_nothing() -> None:
+def test_a_vehicle_that_cannot_pass_before_the_longest_green_prolongs_nothing() -> None:
     # 56 m are 4 s, 28 m are 2 s: the second can pass before 50 s, the first cannot.
     queue = [seen(2, 0, 1, 28.0), seen(3, 0, 3, 56.0)]
     assert verdict(*queue, OTHER, elapsed=46.5) == (0, 2.0)
@@ -122,11 +117,11 @@ def test_the_shortest_green_is_kept() -> None:
     assert verdict(OTHER, elapsed=3.0) == PASS_ON
 
 
-def test_a_green_goes_on_while_nobody_else_is_there() -> None:
+def test_a_green_goes_on_while_no_other_lane_has_a_vehicle() -> None:
     assert verdict(elapsed=3.0) == (0, 1.0)
     assert verdict(seen(1, 0, 2, 7.0), elapsed=3.0) == (0, 1.0)
     assert verdict(seen(1, 0, 2, 70.0), elapsed=3.0) == (0, 5.0)
-    # Somebody beyond the detector is nobody; somebody whose rear is still on his lane is not.
+    # A vehicle beyond the detector does not count; one whose rear is still on its lane does.
     assert verdict(seen(1, 1, 2, 100.5), elapsed=3.0) == (0, 1.0)
     assert verdict(seen(1, 1, 2, -4.9), elapsed=3.0) == PASS_ON
     assert verdict(seen(1, 1, 2, -5.1), elapsed=3.0) == (0, 1.0)
@@ -143,13 +138,13 @@ def test_the_longest_green_ends_it_but_for_an_idle_signal_that_may_go_on() -> No
 
 
 def test_the_last_lane_is_followed_by_the_first() -> None:
-    rule = DelayRule(Adaptive(), SITE)
-    assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in range(4)] == [1, 2, 3, 0]
+    session = DelaySession(Adaptive(), SITE)
+    assert [session.judge(View(0.0, ()), k, 50.0).lane for k in range(4)] == [1, 2, 3, 0]
 
 
 def test_the_greens_come_in_the_given_order() -> None:
-    rule = DelayRule(Adaptive(order=(2, 1, 0, 3)), SITE)
-    assert [rule.judge(View(0.0, ()), k, 50.0).lane for k in (2, 1, 0, 3)] == [1, 0, 3, 2]
+    session = DelaySession(Adaptive(order=(2, 1, 0, 3)), SITE)
+    assert [session.judge(View(0.0, ()), k, 50.0).lane for k in (2, 1, 0, 3)] == [1, 0, 3, 2]
     answers = drive(Adaptive(order=(2, 1, 0, 3)), SITE, 60.0)
     assert answers == {0: ["Open 2"], 50: ["Close 2"], 52: ["Open 1"]}
 
@@ -158,7 +153,7 @@ def test_the_greens_come_in_the_given_order() -> None:
 
 
 def test_on_an_empty_junction_every_green_lasts_as_long_as_it_may() -> None:
-    """As SUMO's does."""
+    """As under SUMO's signal."""
     assert drive(Adaptive(), SITE, 170.0) == {
         0: ["Open 0"], 50: ["Close 0"], 52: ["Open 1"], 102: ["Close 1"], 104: ["Open 2"],
         154: ["Close 2"], 156: ["Open 3"],
@@ -166,8 +161,8 @@ def test_on_an_empty_junction_every_green_lasts_as_long_as_it_may() -> None:
     assert drive(Adaptive(extend_max_green=True), SITE, 500.0) == {0: ["Open 0"]}
 
 
-def test_with_somebody_on_every_lane_each_has_the_shortest_green_in_turn() -> None:
-    # They come onto their detectors at every moment, so nobody has lost a second.
+def test_with_vehicles_on_every_lane_each_has_the_shortest_green_in_turn() -> None:
+    # They come onto their detectors at every moment, so none has lost a second.
     def fresh(time: float) -> tuple[Observed, ...]:
         return tuple(seen(int(time * 10) * 4 + lane, lane, 1, 90.0, 14.0) for lane in range(4))
 
@@ -217,26 +212,12 @@ def test_it_waits_less_than_the_fixed_time_signal() -> None:
     assert adaptive < 0.6 * fixed
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"detector_range": 0.0}, "detector_range"),
-        ({"detector_range": "100"}, "detector_range"),
-        ({"min_time_loss": -1.0}, "min_time_loss"),
-        ({"min_green": 0.0}, "min_green"),
-        ({"max_green": float("nan")}, "max_green"),
-        ({"min_green": 20.0, "max_green": 10.0}, "max_green must be at least min_green, 20 s"),
-        ({"extend_max_green": 1}, "extend_max_green"),
-        ({"amber": -1.0}, "amber"),
-        ({"order": "abc"}, "order must be a sequence of lanes"),
-        ({"order": (0, 1.5)}, "lane in order"),
-    ],
-)
-def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Adaptive(**arguments)
-
-
-def test_an_order_that_does_not_fit_the_junction_is_refused() -> None:
+def test_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(InputError, match="max_green must be at least min_green, 20 s"):
+        Adaptive(min_green=20.0, max_green=10.0)
+    with pytest.raises(InputError, match="order must be a sequence of lanes"):
+        Adaptive(order="abc")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="lane in order"):
+        Adaptive(order=(0, 1.5))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="order must be the lanes 0 … 3"):
         Adaptive(order=(0, 1, 2)).start(SITE)

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import dataclasses
+from functools import partial
 
-import pytest
-
-from baselines.signals.heads import Colour, Heads, Phase, Program, committed, stopping_sight
+from baselines.signals.heads import Colour, Heads, committed, stopping_sight
 from minisim.control import COMMIT_MARGIN, Observed, View
-from minisim.errors import InputError
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
+from tests.builders import said
+from tests.builders import seen as observed
 
 RED, AMBER, GREEN = Colour.RED, Colour.AMBER, Colour.GREEN
+seen = partial(observed, speed=10.0)
+
 #: Comfortable braking of the vehicles of the small scenario [m/s²].
 BRAKING = 4.5
 
 
-def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 10.0) -> Observed:
-    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
-
-
 def heads_showing(*colours: Colour) -> Heads:
-    """Heads of the 4-arm junction that show these colours, with nobody around."""
+    """Heads of the 4-arm junction that show these colours, with no vehicle around."""
     heads = Heads(small_scenario(4).site(0))
     heads.show(View(0.0, ()), colours)
     assert heads.colours == list(colours)
@@ -30,29 +27,32 @@ def heads_showing(*colours: Colour) -> Heads:
 
 
 def show(heads: Heads, vehicles: list[Observed], *wanted: Colour) -> list[str]:
-    """The answer in words; as a reader would say it."""
-    commands = heads.show(View(10.0, tuple(vehicles)), wanted)
-    return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
+    """The answer in words."""
+    return said(heads.show(View(10.0, tuple(vehicles)), wanted))
 
 
 # Committed: 10 m/s needs 10²/9 = 11.11 m to stop, plus the margin.
 
 
-def test_only_those_who_cannot_stop_are_committed() -> None:
+def test_only_vehicles_that_cannot_stop_are_committed() -> None:
     needed = 10.0**2 / 9.0 + COMMIT_MARGIN
     lane = [seen(1, 0, 1, needed - 0.01), seen(2, 0, 1, 25.0), seen(3, 0, 1, 40.0)]
     assert [v.id for v in committed(lane, BRAKING)] == [1]
     assert committed([seen(1, 0, 1, needed + 0.01)], BRAKING) == []
 
 
-def test_everybody_before_a_committed_vehicle_goes_too() -> None:
+def test_every_vehicle_before_a_committed_vehicle_goes_too() -> None:
     # The first two could stop; the third comes too fast to stop before the junction.
-    lane = [seen(1, 0, 1, 8.0, 2.0), seen(2, 0, 1, 16.0, 8.0), seen(3, 0, 1, 21.0, 14.0)]
+    lane = [
+        seen(1, 0, 1, 8.0, speed=2.0),
+        seen(2, 0, 1, 16.0, speed=8.0),
+        seen(3, 0, 1, 21.0, speed=14.0),
+    ]
     assert [v.id for v in committed(lane, BRAKING)] == [1, 2, 3]
 
 
 def test_a_vehicle_standing_at_the_line_is_not_committed() -> None:
-    assert committed([seen(1, 0, 1, 0.1, 0.0), seen(2, 0, 1, 7.6, 0.0)], BRAKING) == []
+    assert committed([seen(1, 0, 1, 0.1, speed=0.0), seen(2, 0, 1, 7.6, speed=0.0)], BRAKING) == []
 
 
 def test_vehicles_inside_the_junction_need_nothing() -> None:
@@ -103,8 +103,8 @@ def test_a_head_waits_for_a_committed_vehicle_that_is_not_there_yet() -> None:
     coming = seen(7, 0, 2, 9.0)
     show(heads, [coming], AMBER, RED, RED, RED)
 
-    # It has slowed down behind somebody and could stop by now, but keeps its right of way.
-    slower = seen(7, 0, 2, 4.0, 1.0)
+    # It has slowed down behind another vehicle and could stop by now, but keeps its right of way.
+    slower = seen(7, 0, 2, 4.0, speed=1.0)
     assert show(heads, [slower], RED, GREEN, RED, RED) == []
     assert show(heads, [seen(7, 0, 2, -1.0)], RED, GREEN, RED, RED) == []
     assert show(heads, [], RED, GREEN, RED, RED) == ["Open 1"]
@@ -113,7 +113,7 @@ def test_a_head_waits_for_a_committed_vehicle_that_is_not_there_yet() -> None:
 def test_a_head_does_not_wait_for_a_held_vehicle_however_near() -> None:
     heads = Heads(small_scenario(4).site(0))
     # Braking to its line on the last metre, it could not stop half a metre earlier.
-    braking = seen(1, 0, 2, 0.4, 1.6)
+    braking = seen(1, 0, 2, 0.4, speed=1.6)
     assert show(heads, [braking], RED, GREEN, RED, RED) == ["Open 1"]
 
 
@@ -139,52 +139,6 @@ def test_without_any_amber_the_next_lane_waits_for_the_committed() -> None:
     assert show(heads, [seen(1, 0, 2, 3.0)], RED, GREEN, RED, RED) == ["Close 0", "Go 1"]
     assert heads.colours == [RED] * 4
     assert show(heads, [], RED, GREEN, RED, RED) == ["Open 1"]
-
-
-# Programs.
-
-
-def test_a_program_shows_its_phases_in_turn() -> None:
-    program = Program((Phase((0,), 5.0, 2.0, 1.0), Phase((1, 2), 3.0, 0.0, 0.0)))
-
-    assert program.cycle == 11.0
-    shown = {t: program.colours(t, 3) for t in (0.0, 4.99, 5.0, 7.0, 8.0, 10.99, 11.0, 115.5)}
-    assert shown == {
-        0.0: [GREEN, RED, RED],
-        4.99: [GREEN, RED, RED],
-        5.0: [AMBER, RED, RED],
-        7.0: [RED, RED, RED],
-        8.0: [RED, GREEN, GREEN],
-        10.99: [RED, GREEN, GREEN],
-        11.0: [GREEN, RED, RED],
-        115.5: [AMBER, RED, RED],
-    }
-    switches = [program.next_switch(t) for t in (0.0, 5.0, 7.5, 8.0, 11.0)]
-    assert switches == [5.0, 7.0, 8.0, 11.0, 16.0]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        {"lanes": ()},
-        {"lanes": (-1,)},
-        {"lanes": (0.5,)},
-        {"lanes": "ab"},
-        {"lanes": (0,), "green": 0.0},
-        {"lanes": (0,), "amber": -1.0},
-        {"lanes": (0,), "all_red": float("nan")},
-    ],
-)
-def test_an_impossible_phase_is_an_error(arguments: dict[str, object]) -> None:
-    with pytest.raises(InputError):
-        Phase(**{"green": 5.0, **arguments})  # type: ignore[arg-type]
-
-
-def test_a_program_needs_phases() -> None:
-    with pytest.raises(InputError, match="at least one phase"):
-        Program(())
-    with pytest.raises(InputError, match="Phase"):
-        Program((5.0,))  # type: ignore[arg-type]
 
 
 def test_sight_reaches_beyond_the_longest_way_to_stop() -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 import minisim
 from baselines import LongestQueue
-from baselines.signals.longest_queue import QueueRule
+from baselines.signals.longest_queue import QueueSession
 from minisim.control import Observed, View
-from minisim.errors import InputError
 from scenarios.library import four_way, regular
 from tests.builders import drive, seen, show
 
@@ -28,9 +25,9 @@ def queues(*lengths: int) -> list[Observed]:
 
 def choices(*views: tuple[int, list[Observed]]) -> list[int]:
     """The lanes chosen one after the other; each view with the lane that is green in it."""
-    rule = QueueRule(LongestQueue(), SITE)
+    session = QueueSession(LongestQueue(), SITE)
     return [
-        rule.judge(View(10.0 * k, tuple(vehicles)), lane, 10.0).lane
+        session.judge(View(10.0 * k, tuple(vehicles)), lane, 10.0).lane
         for k, (lane, vehicles) in enumerate(views, start=1)
     ]
 
@@ -40,7 +37,7 @@ def test_the_longest_queue_goes_next() -> None:
     assert choices((2, queues(2, 3, 5, 4))) == [2]
 
 
-def test_a_queue_is_who_is_before_the_line_and_on_the_detector() -> None:
+def test_a_queue_is_all_vehicles_on_the_detector_before_the_line() -> None:
     inside = [seen(k, 1, 2, -1.0 - k, 5.0) for k in range(3)]
     far = [seen(10 + k, 2, 2, 101.0 + 10 * k, 14.0) for k in range(3)]
     coming = [seen(20, 3, 2, 99.0, 14.0)]
@@ -53,7 +50,7 @@ def test_an_empty_junction_keeps_its_green() -> None:
 
 def test_among_equal_queues_the_one_that_waits_longest_goes() -> None:
     even = queues(2, 2, 2, 2)
-    # Who was never green comes first, in the order of the arms; then by the last green.
+    # A lane that was never green comes first, in the order of the arms; then by the last green.
     assert choices((2, even), (0, even), (1, even), (3, even), (2, even)) == [0, 1, 3, 2, 0]
 
 
@@ -99,17 +96,3 @@ def test_the_busier_lanes_get_more_green() -> None:
     held = frame[~frame["right_of_way"] & (frame["s_m"] < run.site.intersection.approach_length)]
     share = held.groupby("lane").size() / frame.groupby("lane").size()
     assert max(share["a"], share["b"]) < min(share["c"], share["d"])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"interval": 0.0}, "interval"),
-        ({"interval": None}, "interval"),
-        ({"detector_range": -1.0}, "detector_range"),
-        ({"amber": float("inf")}, "amber"),
-    ],
-)
-def test_bad_parameters_are_named(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        LongestQueue(**arguments)

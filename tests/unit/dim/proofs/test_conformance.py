@@ -98,7 +98,7 @@ def test_by_the_papers_rule_it_rolls_unseen_into_the_junction() -> None:
     assert checked.steps == 6  # arrive, look, roll, commit, enter, look
 
 
-def test_by_the_papers_rule_nobody_backs_out_of_being_committed() -> None:
+def test_by_the_papers_rule_a_committed_vehicle_stays_committed() -> None:
     checked = session(Dim(commit="paper"))
     checked.decide(view(0.0, seen(1, 0, 2, 6.0, 1.0)))
     checked.decide(view(1.0, seen(1, 0, 2, 0.9, 1.0)))  # past half of the green zone of 2 m

@@ -16,7 +16,7 @@ from dim.proofs.protocol import (
     Front,
     Protocol,
     State,
-)
+)  # fmt: skip
 from minisim.errors import InputError
 
 PAPER = HarmonyMatrix.paper(3)
@@ -97,7 +97,7 @@ def test_the_nearest_unsafe_states_are_all_found_and_none_beyond() -> None:
     assert sorted(words) == ["arrive", "arrive", "commit", "commit", "enter", "enter", "look"]
 
 
-def test_stuck_is_who_is_there_and_cannot_go_on() -> None:
+def test_stuck_vehicles_are_there_and_cannot_go_on() -> None:
     class Mute(Protocol):
         def look(self, state: State) -> State:
             return state
@@ -148,7 +148,7 @@ ENTER = Event("enter", 1, 2)
         (True, [(State((None, ENTERS, None), 8), ENTER)]),  # others follow b2
     ],
 )  # fmt: skip
-def test_fair_circles_leave_nobody_out(fair: bool, steps: list[tuple[State, Event]]) -> None:
+def test_fair_cycles_leave_no_vehicle_out(fair: bool, steps: list[tuple[State, Event]]) -> None:
     assert is_fair(Protocol(PAPER), tuple(steps)) is fair
 
 

@@ -19,7 +19,7 @@ from dim.proofs.protocol import (
     Front,
     Protocol,
     State,
-)
+)  # fmt: skip
 
 A1, A2, B1, B2, C1, C2 = (1 << k for k in range(6))
 
@@ -52,14 +52,14 @@ def test_events_in_words() -> None:
     assert (Event("look").lane, Event("look").manoeuvre) == (-1, 0)
 
 
-def test_on_an_empty_junction_anybody_may_arrive_and_nothing_else() -> None:
+def test_on_an_empty_junction_any_vehicle_may_arrive_and_nothing_else_happens() -> None:
     steps = happens(protocol(), protocol().start)
     assert list(steps) == [f"arrive {lane}{j}" for lane in "abc" for j in (1, 2)]
     assert steps["arrive b2"] == state(front("b2"))
     assert not any(after.came for after in steps.values())
 
 
-def test_nobody_arrives_before_a_front_vehicle() -> None:
+def test_no_vehicle_arrives_before_a_front_vehicle() -> None:
     steps = happens(protocol(), state(front("a1", COMMITTED, True), front("c2", COMMITTED, True)))
     assert [word for word in steps if word.startswith("arrive")] == ["arrive b1", "arrive b2"]
 
@@ -97,7 +97,7 @@ def test_by_the_papers_rule_it_rolls_first_and_never_slows_down() -> None:
     assert [w for w in steps if not w.startswith("arrive")] == ["enter c2"]
 
 
-def test_everybody_inside_may_leave_first() -> None:
+def test_any_vehicle_inside_may_leave_first() -> None:
     before = state(inside=A1 | B2 | C2)
     steps = {w: after for w, after in happens(protocol(), before).items() if "leave" in w}
     assert {w: after.inside for w, after in steps.items()} == {
@@ -105,13 +105,13 @@ def test_everybody_inside_may_leave_first() -> None:
     }  # fmt: skip
 
 
-def test_who_enters_leaves_the_others_as_they_are() -> None:
+def test_a_vehicle_that_enters_leaves_the_others_as_they_are() -> None:
     before = state(front("a1"), front("b1", COMMITTED, True), inside=C1, came=(1, 0))
     after = happens(protocol(priorities="waiting"), before)["enter b1"]
     assert after == state(front("a1"), inside=C1 | B1, came=(0,))
 
 
-def test_the_clear_gate_leaves_things_as_they_are_while_somebody_crosses() -> None:
+def test_the_clear_gate_leaves_things_as_they_are_while_a_vehicle_crosses() -> None:
     rules = protocol()
     assert goes(rules, state(front("a1"), front("b2", WAITING, True), inside=C2)) == "b"
     assert goes(rules, state(front("a1"), front("b1", COMMITTED, False))) == "b"
@@ -119,7 +119,7 @@ def test_the_clear_gate_leaves_things_as_they_are_while_somebody_crosses() -> No
     assert goes(rules, state(front("a2"), front("b2", WAITING, True))) == "a"
 
 
-def test_the_harmonious_gate_keeps_out_who_is_in_conflict() -> None:
+def test_the_harmonious_gate_keeps_out_vehicles_in_conflict() -> None:
     rules = protocol(gate="harmonious")
     assert goes(rules, state(front("a1"), front("b2"), inside=C1)) == "a"
     assert goes(rules, state(front("a1"), front("b1"), front("c1", COMMITTED, True))) == "abc"
@@ -146,7 +146,7 @@ def test_conflicts_inside(inside: int, pair: str | None) -> None:
     assert (conflict and " ".join(map(str, conflict))) == pair
 
 
-def test_a_turn_ends_after_a_decision_or_when_nobody_is_there() -> None:
+def test_a_turn_ends_after_a_decision_or_when_no_vehicle_is_there() -> None:
     rules = protocol(priorities="rotating")
     steps = happens(rules, rules.start)
     assert steps["turn"] == rules.start._replace(turn=1)
@@ -175,7 +175,7 @@ def test_after_its_turn_a_lane_comes_last_and_the_others_clockwise() -> None:
     assert goes(rules, state(front("a2"), front("b2"))._replace(turn=2)) == "a"
 
 
-def test_who_came_first_goes_first() -> None:
+def test_the_first_to_come_goes_first() -> None:
     rules = protocol(priorities="waiting")
     steps = happens(rules, state(front("c2"), came=(2,)))
     after = steps["arrive a2"]

@@ -2,45 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from dim import DecisionTable, Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception, Perception
+from dim import Dim, Mixed, Monitor, NoisyPerception, Perception
 from dim.controller import DimSession
-from dim.perception import See
 from minisim import simulate
-from minisim.control import Observed, Session, Site, View
+from minisim.control import Observed, Session, View
 from minisim.testing import small_scenario
-from tests.builders import said, seen
+from tests.builders import Reading, said, seen
 
 SITE = small_scenario(4).site(0)
 NONE = {"crossings": 0, "false_grants": 0, "disagreement_s": 0.0, "deadlock_s": 0.0}
 
 
-@dataclass(frozen=True)
-class Told:
-    """Vehicles are told what to take another's manoeuvre for: (observer, vehicle) -> read."""
-
-    readings: tuple[tuple[tuple[int, int], int], ...] = ()
-    name: str = "told"
-    period: float | None = field(default=0.1)
-
-    def start(self, site: Site) -> See:
-        told = dict(self.readings)
-
-        def see(view: View, ego: Observed) -> View:
-            return View(
-                view.time,
-                tuple(
-                    v._replace(manoeuvre=told.get((ego.id, v.id), v.manoeuvre))
-                    for v in view.vehicles
-                ),
-            )
-
-        return see
+def told(readings: dict[tuple[int, int], int] | None = None) -> Reading:
+    """Observers read another's manoeuvre as told: (observer, vehicle) -> read."""
+    wrong = readings or {}
+    return Reading(lambda _, ego, v: wrong.get((ego.id, v.id), v.manoeuvre))
 
 
 def session(perception: Perception, **rules: Any) -> DimSession:
@@ -72,9 +54,9 @@ def test_counting_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_right_readings_have_nothing_to_count(dim: Dim | Mixed) -> None:
     """But the crossings: all vehicles, human drivers too, have crossed at the end."""
     if isinstance(dim, Mixed):
-        dim = replace(dim, dim=replace(dim.dim, perception=Told()))
+        dim = replace(dim, dim=replace(dim.dim, perception=told()))
     else:
-        dim = replace(dim, perception=Told())
+        dim = replace(dim, perception=told())
     run = simulate(small_scenario(4, drain=300.0), dim, 1)
     assert run.counts == {**NONE, "crossings": len(run.columns.lane)}
     assert np.all(run.columns.arrived)
@@ -94,7 +76,7 @@ def test_wrong_readings_are_counted_among_human_drivers() -> None:
 
 def test_a_right_of_way_that_the_truth_does_not_give_is_false() -> None:
     """a2 and b2 conflict, a goes; b takes a for a left turn, which is in harmony with b2."""
-    tally = session(Told((((2, 1), 1),)))
+    tally = session(told({(2, 1): 1}))
     waiting = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1)
     assert show(tally, 0.0, *waiting) == "Go 1, Go 2"
     assert tally.counts == {**NONE, "false_grants": 1}
@@ -105,7 +87,7 @@ def test_a_right_of_way_that_the_truth_does_not_give_is_false() -> None:
 
 def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
     """b2 and d2 outvote a1, but for a b2 is b1, with which it goes."""
-    tally = session(Told((((1, 2), 1), ((1, 4), 1))))
+    tally = session(told({(1, 2): 1, (1, 4): 1}))
     assert show(tally, 0.0, seen(1, 0, 2, 2.1)) == "Go 1"
     assert tally.counts["false_grants"] == 0
     assert "Hold 1" not in show(
@@ -117,8 +99,8 @@ def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
 def test_one_wrong_reading_can_stop_all_vehicles() -> None:
     """a2, b2 and d3 all conflict, so a goes; but for a d is d2, which goes with b2."""
     trio = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1)
-    assert show(session(Told()), 0.0, *trio) == "Go 1"
-    tally = session(Told((((1, 4), 2),)))
+    assert show(session(told()), 0.0, *trio) == "Go 1"
+    tally = session(told({(1, 4): 2}))
     assert show(tally, 0.0, *trio) == ""
     assert show(tally, 2.5, *trio) == ""
     assert tally.counts == {**NONE, "deadlock_s": 2.5, "disagreement_s": 2.5}
@@ -126,7 +108,7 @@ def test_one_wrong_reading_can_stop_all_vehicles() -> None:
 
 def test_times_are_rounded_to_a_microsecond() -> None:
     """0.1 + 0.2 is 0.3; in floating point, a bit more."""
-    tally = session(Told((((1, 4), 2),)))
+    tally = session(told({(1, 4): 2}))
     for time in (0.0, 0.1, 0.1 + 0.2):
         show(tally, time, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1))
     assert tally.counts == {**NONE, "deadlock_s": 0.3, "disagreement_s": 0.3}
@@ -135,7 +117,7 @@ def test_times_are_rounded_to_a_microsecond() -> None:
 
 
 def test_crossings_are_counted_however_rarely_one_looks() -> None:
-    tally = session(Told())
+    tally = session(told())
     show(tally, 0.0, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1))
     show(tally, 1.0, seen(1, 0, 2, -3.0), seen(2, 1, 2, 2.1))
     assert tally.counts["crossings"] == 1
@@ -144,7 +126,7 @@ def test_crossings_are_counted_however_rarely_one_looks() -> None:
 
 
 def test_a_vehicle_at_the_entry_has_not_crossed_it() -> None:
-    tally = session(Told())
+    tally = session(told())
     for time, distance, crossings in ((0.0, 2.1, 0), (1.0, 0.5, 0), (2.0, 0.0, 0), (3.0, -0.1, 1)):
         show(tally, time, seen(1, 0, 2, distance))
         assert tally.counts["crossings"] == crossings
@@ -152,7 +134,7 @@ def test_a_vehicle_at_the_entry_has_not_crossed_it() -> None:
 
 def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
     for distance, crossings in ((8.0, 1), (8.001, 0)):  # that leaves between two looks
-        tally = session(Told())
+        tally = session(told())
         show(tally, 5.0, seen(1, 0, 2, distance, 5.0))
         show(tally, 9.0)
         assert tally.counts == {**NONE, "crossings": crossings}
@@ -160,13 +142,13 @@ def test_counting_begins_with_the_first_view_and_at_the_yellow_zone() -> None:
 
 @pytest.mark.parametrize(("gate", "lasts"), [("clear", 0.0), ("harmonious", 2.5)])
 def test_a_vehicle_that_must_wait_anyway_does_not_disagree(gate: str, lasts: float) -> None:
-    """While c1 crosses, nobody new enters by the paper's gate; for a, d is d3, no left turn."""
+    """While c1 crosses, no other enters by the paper's gate; a reads d1 as d3."""
     views = [
         (time, seen(1, 0, 1, 2.1), seen(2, 1, 1, 2.1), seen(3, 2, 1, -3.0, 5.0),
          seen(4, 3, 1, 2.1))
         for time in (0.0, 2.5)
     ]  # fmt: skip
-    tally = session(Told((((1, 4), 3),)), gate=gate)
+    tally = session(told({(1, 4): 3}), gate=gate)
     for view in views:
         show(tally, *view)
     assert tally.counts["disagreement_s"] == lasts
@@ -180,14 +162,6 @@ def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> N
     assert run.collisions
     assert run.counts["false_grants"] >= len(run.collisions)
     assert run.counts["disagreement_s"] > 0.0
-
-
-def test_lanes_first_lets_the_first_lane_go_in_every_case() -> None:
-    """All 255 cases of four arms; the largest clique leaves it out in some."""
-    for order, always in (("lanes", True), ("size", False)):
-        table = DecisionTable(HarmonyMatrix.paper(4), order)
-        goes = [table.lanes(table.case(case)) >> case[0].origin & 1 for case in table]
-        assert all(goes) is always
 
 
 @pytest.mark.parametrize("confidence", [None, 0.9])

@@ -17,7 +17,7 @@ from minisim.carfollowing import (
     engine_lag,
     semi_implicit,
 )
-from minisim.control import Advise, Command, Plan, Site, Unregulated, View
+from minisim.control import Advise, Plan, Unregulated
 from minisim.engine.cruise import accelerate, build_cruise
 from minisim.engine.state import (
     DRIVING,
@@ -33,6 +33,7 @@ from scenarios import AS_RUN, Scenario, four_way
 from scenarios.library import MAKERS
 from scenarios.paper import controller_of, replay
 from scenarios.published import published_ways
+from tests.builders import Fixed, Scripted, replayed
 
 DT = AS_RUN.dt
 
@@ -42,8 +43,8 @@ def arrivals(*rows: tuple[float, int, int]) -> Arrivals:
     return Arrivals(np.array(time, float), np.array(lane), np.array(manoeuvre))
 
 
-def scenario(*rows: tuple[float, int, int], horizon: float = 200.0) -> Scenario:
-    return four_way(profile="as_run", recorded=arrivals(*rows), horizon=horizon)
+def scenario(*rows: tuple[float, int, int]) -> Scenario:
+    return replayed(four_way(profile="as_run"), *rows, horizon=200.0)
 
 
 def trace(*rows: tuple[float, int, int], until: float, controller: object = None) -> minisim.Run:
@@ -111,7 +112,7 @@ def test_sixteen_steps_of_the_start_count_as_waiting() -> None:
 
 
 def test_speed_limits_mean_nothing() -> None:
-    """Nobody slows for a turn; the cruise speed holds all the way."""
+    """No vehicle slows for a turn; the cruise speed holds all the way."""
     run = minisim.simulate(scenario((0.0, 0, 3)), Unregulated(), record="all")
     frame = run.trajectories
     inside = frame[(frame["s_m"] > 480.0) & (frame["s_m"] < 520.0)]
@@ -120,19 +121,8 @@ def test_speed_limits_mean_nothing() -> None:
 
 
 def test_platoons_settle_at_the_gap_of_the_law() -> None:
-    class Slow:
-        name = "slow"
-
-        def start(self, site: Site) -> SlowSession:
-            return SlowSession()
-
-    class SlowSession:
-        plan = Plan(lanes_open=True, period=1.0, sight=500.0)
-
-        def decide(self, view: View) -> list[Command]:
-            return [Advise(0, 5.0)] if view.time < 2.0 else []
-
-    frame = trace((0.0, 0, 2), (3.0, 0, 2), until=90.0, controller=Slow()).trajectories
+    slow = Fixed(Plan(lanes_open=True), (Advise(0, 5.0),))
+    frame = trace((0.0, 0, 2), (3.0, 0, 2), until=90.0, controller=slow).trajectories
     last = frame[frame["time_s"] == 90.0].set_index("vehicle")
     gap = last.loc[0, "s_m"] - 4.0 - last.loc[1, "s_m"]
     # the ACC's 1.5·v + 2 lies beyond minGap 2
@@ -150,19 +140,11 @@ def test_insertion_waits_for_min_gap_and_nothing_else() -> None:
 def test_advice_of_zero_stops_within_a_metre_one_step_later() -> None:
     """SUMO's quirk: a desired speed of 0 asks for standstill within one step, from the next on."""
 
-    class Stop:
-        name = "stop"
-
-        def start(self, site: Site) -> StopSession:
-            return StopSession()
-
-    class StopSession:
-        plan = Plan(lanes_open=True, marks=(100.0,), sight=100.0)
-
-        def decide(self, view: View) -> list[Command]:
-            return [Advise(vehicle.id, 0.0) for vehicle in view.vehicles]
-
-    frame = trace((0.0, 0, 2), until=60.0, controller=Stop()).trajectories
+    stop = Scripted(
+        lambda view: [Advise(vehicle.id, 0.0) for vehicle in view.vehicles],
+        Plan(lanes_open=True, marks=(100.0,), sight=100.0),
+    )
+    frame = trace((0.0, 0, 2), until=60.0, controller=stop).trajectories
     s, v, a = (frame[c].to_numpy() for c in ("s_m", "speed_mps", "acceleration_mps2"))
     first = int(np.argmax(s >= 392.8))
     alpha = DT / (0.5 + DT)
@@ -174,19 +156,8 @@ def test_advice_of_zero_stops_within_a_metre_one_step_later() -> None:
 
 
 def test_closed_lanes_hold_it() -> None:
-    class Never:
-        name = "never"
-
-        def start(self, site: Site) -> NeverSession:
-            return NeverSession()
-
-    class NeverSession:
-        plan = Plan(hold_distance=2.0)
-
-        def decide(self, view: View) -> list[Command]:
-            return []
-
-    frame = trace((0.0, 0, 2), until=80.0, controller=Never()).trajectories
+    never = Fixed(Plan(hold_distance=2.0))
+    frame = trace((0.0, 0, 2), until=80.0, controller=never).trajectories
     assert frame["speed_mps"].iloc[-1] == 0.0
     assert 490.2 <= frame["s_m"].iloc[-1] <= 490.8
     assert frame["acceleration_mps2"].min() > -1.6
@@ -204,14 +175,12 @@ def test_cruise_control_and_model_go_together() -> None:
         VehicleType(model="cc")
     with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
         CruiseVehicle(model="idm")
-    with pytest.raises(InputError, match=r"lag \[s\]"):
-        CruiseVehicle(lag=-1.0)
 
 
-# --- who is followed -----------------------------------------------------------------------------
+# --- which vehicle is followed -------------------------------------------------------------------
 
 
-def test_who_joins_its_exit_slows_the_first_vehicle_of_another_lane() -> None:
+def test_a_vehicle_bound_for_the_same_exit_slows_the_first_of_another_lane() -> None:
     """d1 and b3 leave by arm a: b3 follows d1 from the moment that d1 is inside."""
     alone = trace((1.0, 1, 3), until=45.0).trajectories.set_index("time_s")["speed_mps"]
     both = trace((0.0, 3, 1), (1.0, 1, 3), until=45.0).trajectories
@@ -224,7 +193,7 @@ def test_who_joins_its_exit_slows_the_first_vehicle_of_another_lane() -> None:
     assert later.min() < -0.1
 
 
-def test_who_only_crosses_does_not_slow_an_approaching_vehicle() -> None:
+def test_a_crossing_vehicle_does_not_slow_an_approaching_one() -> None:
     alone = trace((2.0, 0, 2), until=36.0).trajectories["speed_mps"].to_numpy()
     both = trace((0.0, 1, 2), (2.0, 0, 2), until=36.0).trajectories
     second = both.loc[both["vehicle"] == 1, "speed_mps"].to_numpy()
@@ -274,7 +243,7 @@ def chosen(
     return [float(vehicles["a"][row]) for row in rows]
 
 
-def test_of_two_who_join_the_radar_shows_the_one_with_less_room() -> None:
+def test_of_two_merging_vehicles_the_radar_shows_the_one_with_less_room() -> None:
     """SUMO 1.28, published arrivals of 4 arms at 350 veh/h, 1546.08 s: a1 looks at c3 and d2.
 
     Behind d2 are 49.42 m, behind the slower c3 50.44 m; with the speeds added it would be c3.
@@ -289,10 +258,10 @@ def test_of_two_who_join_the_radar_shows_the_one_with_less_room() -> None:
     ("ahead", "acceleration"),
     [
         (506.9371341949611, 0.244816),  # still inside: the radar shows it, as if bumper to bumper
-        (507.04277405851946, 0.26953906033426733),  # in the exit lane, its rear beside: nobody
+        (507.04277405851946, 0.26953906033426733),  # in the exit lane, its rear beside: no leader
     ],
 )
-def test_who_has_entered_the_exit_lane_from_beside_restrains_nobody(
+def test_a_vehicle_beside_in_the_exit_lane_holds_no_other_back(
     ahead: float, acceleration: float
 ) -> None:
     """SUMO 1.28, the same run at 1547.33 s: d2 beside c3, which it overlaps."""
@@ -404,9 +373,8 @@ def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
     ):
         junction = MAKERS[arms](profile="as_run").intersection
         assert junction.approach_length == pytest.approx(approach, abs=0.01)
-        for path in junction.paths[: arms - 1]:
-            wanted = lengths[path.movement.manoeuvre - 1]
-            assert path.exit - path.entry == pytest.approx(wanted, abs=0.011)
+        drawn = [path.exit - path.entry for path in junction.paths[: arms - 1]]
+        assert drawn == pytest.approx(lengths, abs=0.011)
 
 
 @pytest.mark.parametrize(

@@ -21,23 +21,15 @@ PLACE = SITE.intersection, SITE.vehicle
 
 
 def pairs(site: Site) -> list[tuple[int, int]]:
-    movements = site.intersection.movements
-    return [
-        (p, q)
-        for p, one in enumerate(movements)
-        for q, other in enumerate(movements)
-        if one.origin != other.origin
-    ]
+    """Movements of different lanes."""
+    return list(map(tuple, np.argwhere(site.intersection.movements.apart).tolist()))
 
 
 @pytest.mark.parametrize("site", SITES, ids=["3", "4"])
 def test_movements_in_harmony_have_no_forbidden_region_and_all_others_have(site: Site) -> None:
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     for p, q in pairs(site):
-        assert (region(site.intersection, site.vehicle, p, q) is None) == matrix.values[p, q], (
-            p,
-            q,
-        )
+        assert (region(site.intersection, site.vehicle, p, q) is None) == matrix.values[p, q]
 
 
 def test_outside_its_region_bodies_keep_their_distance() -> None:
@@ -63,8 +55,8 @@ def test_outside_its_region_bodies_keep_their_distance() -> None:
     assert tested > 500
 
 
-def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
-    """And `ever` what is so at this or a later position of the second."""
+def test_a_region_is_all_within_a_step_of_where_bodies_come_near() -> None:
+    """And `ever` is so at this or a later position of the second."""
     p, q = 1, 4  # a2, b2
     shared = region(*PLACE, p, q)
     assert shared is not None
@@ -81,20 +73,13 @@ def test_an_area_is_all_within_a_step_of_where_bodies_come_near() -> None:
         assert shared.ever[x, y] == (distance[rows, max(y - 1, 0) :] <= CLEARANCE).any()
 
 
-def test_an_area_is_the_others_mirrored() -> None:
-    for p, q in pairs(SITE):
-        shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
-        if shared is not None:
-            assert mirrored is not None
-            assert (shared.close == mirrored.close.T).all()
-
-
-def test_whoever_has_stopped_in_time_is_in_nobodys_way() -> None:
-    """However far the other goes: that is what `room` is."""
+def test_a_vehicle_that_has_stopped_in_time_is_in_no_others_way() -> None:
+    """However far the other goes; and a region is that of the other, mirrored."""
     for p, q in pairs(SITE):
         shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
         if shared is None or mirrored is None:
             continue
+        assert (shared.close == mirrored.close.T).all()
         for x in np.arange(0.0, shared.close.shape[0] * STEP, STEP):
             for y in np.arange(0.0, shared.close.shape[1] * STEP, 4 * STEP):
                 if shared.room(x, y) > 0.0:
@@ -133,14 +118,14 @@ BY_HAND = Region(
         (0.0, 3.0 * STEP, math.inf, math.inf),
     ],
 )
-def test_how_far_it_is_to_an_area_by_hand(
+def test_how_far_it_is_to_a_region_by_hand(
     first: float, second: float, room: float, way: float
 ) -> None:
     assert BY_HAND.room(first, second) == pytest.approx(room)
     assert BY_HAND.way(first, second) == pytest.approx(way)
 
 
-def test_where_an_area_ends_by_hand() -> None:
+def test_where_a_region_ends_by_hand() -> None:
     ends = [BY_HAND.ends(second * STEP) for second in (-9.0, 0.0, 0.9, 1.0, 2.0, 3.0)]
     assert ends == [5 * STEP, 5 * STEP, 5 * STEP, 3 * STEP, 0.0, 0.0]
 
@@ -158,10 +143,9 @@ def test_when_bodies_touch_by_hand() -> None:
     assert not BY_HAND.touches(there[:2], then[:2])
 
 
-def test_who_has_a_decimetre_gets_past_who_has_none_does_not() -> None:
-    """Where two once stood in each other's way for ever: 13 cm for one, a touch for the other."""
-    names = [str(movement) for movement in SITE.intersection.movements]
-    a2, b3 = names.index("a2"), names.index("b3")
+def test_a_vehicle_with_a_decimetre_gets_past_one_without_does_not() -> None:
+    """Two once stood in each other's way for ever: 13 cm for one, a touch for the other."""
+    a2, b3 = map(SITE.intersection.index, ("a2", "b3"))
     assert passes(*PLACE, b3, 4.94, a2, 3.56)
     assert not passes(*PLACE, a2, 3.56, b3, 4.94)
     shared = region(*PLACE, b3, a2)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import xml.etree.ElementTree as ET
 from dataclasses import replace
-from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
@@ -17,16 +17,7 @@ from dim import Dim
 from dim.humans.mixed import Mixed
 from minisim.control import Unregulated
 from minisim.errors import InputError
-from minisim.results.metrics import (
-    MEANS,
-    METRICS,
-    SAFETY,
-    TABLE,
-    Metric,
-    heading,
-    metric_named,
-    recording,
-)
+from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, Metric, heading, recording
 from minisim.results.run import Run
 from minisim.testing import small_scenario
 from scenarios import four_way
@@ -98,13 +89,10 @@ def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
         (Metric("m", lambda run: "5"), "metric 'm' must give one finite number or None, got '5'"),
         (Metric("m", lambda run: math.inf), "metric 'm' must give one finite number"),
         (Metric("m", lambda run: np.zeros(3)), 'got array.*; per="trip" takes an array'),
-        (
-            Metric("m", lambda run: 1.0, per="trip"),
-            "'m' must give one finite number a trip, an arr",
-        ),
+        (Metric("m", lambda run: 1.0, per="trip"), "must give one finite number a trip, an array"),
         (Metric("m", lambda run: run.trips, per="trip"), "metric 'm' must give one finite number"),
         (
-            Metric("m", lambda run: run.columns.lane / np.zeros(1) + np.inf, per="trip"),
+            Metric("m", lambda run: np.full(len(run.columns.lane), np.inf), per="trip"),
             "metric 'm' must give one finite number a trip",
         ),
         ("min_tcc_s", "unknown metric 'min_tcc_s'.*did you mean 'min_ttc_s'"),
@@ -112,7 +100,6 @@ def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
         (5, "unknown metric 5"),
     ],
 )
-@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
 def test_what_is_no_metric(run: Run, metric: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         run.summary([metric])
@@ -163,7 +150,6 @@ def test_headings() -> None:
     assert heading("complete_waiting_time_s") == "waiting, with unfinished [s]"
     assert heading("trips") == "trips"
     assert heading("mine") == "mine"
-    assert metric_named(METRICS["trips"]) is metric_named("trips")
 
 
 # --- warm-up ---------------------------------------------------------------------------------
@@ -195,44 +181,21 @@ def test_a_warmup_is_shorter_than_the_run() -> None:
 # --- how a run shows itself -----------------------------------------------------------------
 
 
-class Tags(HTMLParser):
-    """Checks that every element is closed, and collects the text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.cells: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        assert not attrs, "no colours, no styles"
-        if tag != "br":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.cells.append(data)
-
-
 def test_a_run_in_a_notebook_is_valid_html_with_escaped_names() -> None:
     scenario = replace(small_scenario(demand_time=60.0), name="<script>a&b\n")
     run = minisim.simulate(scenario, Unregulated(), on_collision="record")
-    page = Tags()
-    page.feed(run._repr_html_())
-    page.close()
-    assert page.open == []
-    assert page.cells[0].startswith("<script>a&b, unregulated: ")
-    lanes = run.summary()["lanes"]
-    for lane in "abcd":
-        at = page.cells.index(lane)
-        assert page.cells[at + 1] == str(lanes[lane]["trips"])
+    page = ET.fromstring(run._repr_html_().replace("<br>", "<br/>"))
+    assert not any(element.attrib for element in page.iter()), "no colours, no styles"
+    cells = list(page.itertext())
+    assert cells[0].startswith("<script>a&b, unregulated: ")
+    for lane, means in run.summary()["lanes"].items():
+        assert cells[cells.index(lane) + 1] == str(means["trips"])
 
 
 def test_a_repr_is_short_and_has_the_means(run: Run) -> None:
     lines = repr(run).splitlines()
     assert len(lines) <= 5
-    assert "four-way, dim-humans-0.4: 250 veh/h/lane, profile fair, seed 3, 300 s" in lines[0]
+    assert "four-way, dim+humans=0.4: 250 veh/h/lane, profile fair, seed 3, 300 s" in lines[0]
     assert f"waiting {run.summary()['waiting_time_s']:.2f} s" in repr(run)
     odd = replace(run, scenario=replace(small_scenario(), name="a\n" * 500))
     assert len(repr(odd).splitlines()) <= 5

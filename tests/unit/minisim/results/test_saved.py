@@ -65,7 +65,10 @@ def check_same(ours: Run, theirs: Run) -> None:
 def test_what_is_saved_comes_back(
     scenario: Any, controller: Any, seed: int, record: str | None, tmp_path: Path
 ) -> None:
-    scenario = dataclasses.replace(scenario, horizon=30.0, warmup=5.0)
+    recorded = Arrivals(np.array([6.0, 13.0]), np.array([0, 2]), np.array([1, 1]))
+    scenario = dataclasses.replace(
+        scenario, horizon=30.0, warmup=5.0, recorded=recorded if seed % 4 == 0 else None
+    )
     run = minisim.simulate(scenario, controller, seed, record=record, on_collision="record")
     run.save(tmp_path / "run")
     loaded = Run.load(tmp_path / "run")
@@ -75,15 +78,6 @@ def test_what_is_saved_comes_back(
     check_same(run, minisim.simulate(
         loaded.scenario, loaded.controller, seed, record=record, on_collision="record"
     ))  # fmt: skip
-
-
-def test_recorded_arrivals_come_back(tmp_path: Path) -> None:
-    recorded = Arrivals(np.array([0.1, 3.0]), np.array([0, 2]), np.array([1, 3]))
-    scenario = dataclasses.replace(four_way(horizon=60.0), recorded=recorded)
-    run = minisim.simulate(scenario, Dim())
-    run.save(tmp_path / "run")
-    again = Run.load(tmp_path / "run")
-    check_same(run, minisim.simulate(again.scenario, again.controller))
 
 
 @dataclass(frozen=True)
@@ -160,7 +154,6 @@ def rewritten(file: Path, **changes: Any) -> Path:
         ({"controller": {"class": "minisim.errors:show", "fields": {}}}, "damaged.*is no class"),
         ({"controller": {"class": "dim.controller:Dim", "fields": {}}}, "damaged.*other fields"),
         ({"site": 5}, "damaged.*site must be a Site"),
-        ({"collisions": [[1]]}, "is damaged"),
         ({"scenario": {"tuple": 5}}, "is damaged"),
     ],
 )
@@ -222,7 +215,7 @@ def test_what_cannot_be_written_or_made() -> None:
     for odd in (object(), len, 1j, Others(), {1: object()}):
         with pytest.raises(InputError, match="cannot be saved"):
             written(odd)
-    for odd in ({"float": "1"}, {"a": 1}, [1], {"class": "dim.controller:Dim"}):
+    for odd in ({"float": "1"}, {"a": 1}, [{}], {"class": "dim.controller:Dim"}):
         with pytest.raises(MinisimError, match="no value of a run"):
             made(odd)
     assert math.isnan(made(written(math.nan)))

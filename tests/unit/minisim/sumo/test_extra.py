@@ -1,4 +1,4 @@
-"""Without the extra `sumo` everything else works, and who asks for SUMO is told what to install."""
+"""Without the extra `sumo` everything else works, and a run in SUMO says what to install."""
 
 from __future__ import annotations
 

@@ -55,31 +55,6 @@ def test_a_wrong_store_is_refused_before_a_folder_is_made(
     assert "it is a file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "why"),
-    [
-        (["figures", "maps", "fairnes"], "did you mean 'fairness'"),
-        (["figures", "webster", "gate"], "gate: drawn from results; give them with --store"),
-        (["figures", "webster", "--store", "STORE"], "there is no store"),
-        (["figures", "--seeds", "1"], "seeds must be an integer 2 … 10000, got 1"),
-        (["reproduce", "--seeds", "1"], "seeds must be an integer"),
-        (["reproduce", "--jobs", "0"], "--jobs must be an integer 1 … 1024, got 0"),
-        (["reproduce", "--only", "fare"], "did you mean 'fair'"),
-    ],
-)
-def test_refused_before_anything_is_written(
-    arguments: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = [a.replace("STORE", str(tmp_path / "runs.sqlite")) for a in arguments]
-    folder = tmp_path / "out"
-    assert main([*arguments, "--out", str(folder)]) == 2
-    error = capsys.readouterr().err
-    assert why in error
-    assert error.count("\n") == 1
-    assert not folder.exists()
-    assert not (tmp_path / "runs.sqlite").exists()
-
-
 def test_an_empty_store_says_what_makes_its_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -98,41 +98,6 @@ def test_the_papers_grid(
         assert some.collect(effort, find_in(kept)).missing == ()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["FILE", "--jobs", "0"], "--jobs must be an integer 1"),
-        (["FILE", "--seeds", "0"], "--seeds must be an integer 1"),
-        (["FILE", "--seeds", "many"], "many"),
-        (["FILE", "--horizon", "-5"], "--horizon [s] must be above 0"),
-        (["FILE", "--horizon", "nan"], "--horizon [s] must be above 0"),
-        (["FILE", "--horizon", "inf"], "--horizon [s] must be above 0 and at most 1e+07, got inf"),
-        (["FILE", "--jobs", "2", "--scheduler", "tcp://x:1"], "give one"),
-        (["FILE", "--export", "rows.txt"], "suffix of rows.txt"),
-        (["FILE", "--export", "missing/rows.csv"], "there is no folder"),
-        (["fare"], "unknown study 'fare'; allowed: paper, text, as-run"),
-        (["papers"], "did you mean 'paper'"),
-        (["missing.toml"], "cannot read experiments from missing.toml"),
-        ([], "Missing argument"),
-    ],
-)
-def test_bad_input(
-    arguments: list[str],
-    message: str,
-    file: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    store = tmp_path / "s.db"
-    given = [str(file) if a == "FILE" else a for a in arguments]
-    assert main(["sweep", *given, "--out", str(store)]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert captured.err.count("\n") == 1
-    assert captured.out == ""
-    assert not store.exists()
-
-
 def test_results_do_not_go_over_the_experiments(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -159,7 +124,7 @@ def test_the_extra_is_named_where_it_is_missing(
     ("number", "code", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
-def test_whoever_is_ended_leaves_a_store_and_says_how_to_go_on(
+def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
     number: signal.Signals, code: int, word: str, tmp_path: Path
 ) -> None:
     file, path = tmp_path / "e.toml", tmp_path / "s.db"

@@ -26,6 +26,7 @@ from minisim.errors import InputError, SumoError
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
 from minisim.results.run import Run
+from minisim.results.trajectories import LANE, MANOEUVRE
 from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
@@ -34,7 +35,6 @@ from scenarios.crossval import (
     Case,
     Result,
     crossvalidate,
-    drawn_cases,
     film,
     replayed_cases,
     runs,
@@ -51,10 +51,11 @@ from scenarios.crossval.comparison import (
     times,
 )
 from scenarios.crossval.report import markdown, summary, table
-from scenarios.paper import GREENS, GRID, PHASES, Cell, reference_value, replay
+from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
 from scenarios.published import published_arrivals
 from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from scenarios.statistics import ks_distance, mean_interval
+from tests.builders import reference_value
 
 END = 100.0
 LANES = (0, 1, 0, 1)
@@ -84,14 +85,6 @@ def pair(seed: int = 1, waiting_sumo: Sequence[float] = (0, 1, 2, 3.5)) -> Pair:
 # --- statistics ------------------------------------------------------------------------------
 
 
-def test_ks_distance_of_shifted_steps() -> None:
-    """0 … 9 against the same plus k: k of 10 lie beyond, so the distance is k/10."""
-    sample = np.arange(10.0)
-    for k in range(11):
-        assert ks_distance(sample, sample + k) == pytest.approx(k / 10.0)
-    assert ks_distance([0.0], [0.0, 1.0, 2.0, 3.0]) == 0.75
-
-
 @given(
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
@@ -112,18 +105,22 @@ def test_ks_distance_needs_numbers(bad: object) -> None:
 
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
-    rows = {(row.lane, row.metric): row for row in compare([pair()], 2)}
-    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b") for metric in MEANS}
-    everyone = rows["all", "waiting_time_s"]
-    assert everyone.trips == (4, 3)
-    assert everyone.minisim.mean == pytest.approx(1.5)
-    assert everyone.sumo.mean == pytest.approx((0 + 1 + 3.5) / 3)
-    assert everyone.difference.mean == pytest.approx(0.0)
-    assert math.isnan(everyone.difference.half_width), "one seed tells no spread"
-    assert everyone.ks == pytest.approx(1 / 3), "at 3: 4 of 4 against 2 of 3"
-    assert everyone.within == pytest.approx(3 / 4), "the third waited 2 s so far in both"
+    rows = {(row.lane, row.metric): row for row in compare([pair()], 3)}
+    assert set(rows) == {(lane, metric) for lane in ("all", "a", "b", "c") for metric in MEANS}
+    overall = rows["all", "waiting_time_s"]
+    assert overall.trips == (4, 3)
+    assert overall.minisim.mean == pytest.approx(1.5)
+    assert overall.sumo.mean == pytest.approx((0 + 1 + 3.5) / 3)
+    assert overall.difference.mean == pytest.approx(0.0)
+    assert math.isnan(overall.difference.half_width), "one seed tells no spread"
+    assert overall.ks == pytest.approx(1 / 3), "at 3: 4 of 4 against 2 of 3"
+    assert overall.within == pytest.approx(3 / 4), "the third waited 2 s so far in both"
     assert rows["a", "travel_time_s"].within == pytest.approx(1 / 2), "the third is far apart"
     assert rows["b", "travel_time_s"].difference.mean == pytest.approx((0.05 + 1.0) / 2)
+    empty = rows["c", "travel_time_s"]
+    assert empty.trips == (0, 0)
+    values = (empty.minisim.mean, empty.sumo.mean, empty.difference.mean, empty.ks, empty.within)
+    assert all(map(math.isnan, values)), "a lane without trips is no error"
 
 
 def test_differences_are_paired_by_seed() -> None:
@@ -138,18 +135,6 @@ def test_differences_are_paired_by_seed() -> None:
     row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
-
-
-def test_a_lane_without_trips_is_nan_not_an_error() -> None:
-    row = next(r for r in compare([pair()], 3) if r.lane == "c")
-    assert row.trips == (0, 0)
-    values = (row.minisim.mean, row.sumo.mean, row.difference.mean, row.ks, row.within)
-    assert all(map(math.isnan, values))
-
-
-def test_without_a_run_there_is_nothing_to_compare() -> None:
-    with pytest.raises(InputError, match="at least one run"):
-        compare([], 4)
 
 
 def test_same_trips_need_both_times() -> None:
@@ -178,17 +163,20 @@ def test_the_first_divergence_is_the_first_in_demand() -> None:
 def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
     def frame(shift: dict[tuple[int, float], float]) -> pd.DataFrame:
         rows = [
-            (time, vehicle, 10.0 * time + shift.get((vehicle, time), 0.0), 10.0)
+            (time, vehicle, 10.0 * time + shift.get((vehicle, time), 0.0), 10.0, "a", 2)
             for time in (1.0, 2.0, 3.0)
             for vehicle in (4, 5, 6)
         ]
-        return pd.DataFrame(rows, columns=["time_s", "vehicle", "s_m", "speed_mps"])
+        return pd.DataFrame(
+            rows, columns=["time_s", "vehicle", "s_m", "speed_mps", LANE, MANOEUVRE]
+        )
 
     same = frame({})
     assert first_parting(same, frame({(4, 1.0): 0.4})) is None
     found = first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
     assert found is not None
     assert (found.time, found.vehicle, found.positions) == (2.0, 6, (20.0, 18.0))
+    assert found.movement == "a2"
 
 
 @pytest.mark.parametrize(
@@ -208,16 +196,6 @@ def test_tolerances(tolerance: Tolerance, value: float, difference: float, holds
 # --- cells -----------------------------------------------------------------------------------
 
 
-def test_drawn_cases_are_the_product() -> None:
-    cases = drawn_cases(
-        ["four-way", "three-way"], ["dim", "fixed-time"], [150, 350], ["balanced"], "fair", 600
-    )
-    assert len({case.name for case in cases}) == 8
-    assert cases[0].name == "four-way balanced 150 dim"
-    assert not cases[0].same_law
-    assert cases[0].reference("waiting_time_s", "all") is None
-
-
 def test_replays_are_the_published_grid_and_its_numbers() -> None:
     cases = replayed_cases([], ["dim"], [], [], "as_run", 3600.0)
     assert [case.published for case in cases] == list(GRID)
@@ -228,8 +206,7 @@ def test_replays_are_the_published_grid_and_its_numbers() -> None:
     assert short[0].reference("waiting_time_s", "all") is None, "the paper's are of an hour"
 
 
-def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> None:
-    """What ran, not what the label says; the numbers are those of the label."""
+def test_replays_have_the_vehicle_and_controller_that_ran_and_the_numbers_of_the_label() -> None:
     (v2ic,) = replayed_cases([], ["v2ic"], [350], ["4:3:2:1"], None, 3600.0)
     assert v2ic.name == "four-way 4:3:2:1 350 v2ic"
     assert v2ic.recipe().controller == V2ICAsRun(approach_speed=14.0)
@@ -245,12 +222,9 @@ def test_replays_of_the_others_have_their_vehicle_controller_and_numbers() -> No
     assert unbalanced.scenario.profile == AS_RUN
     assert unbalanced.recipe().controller == FixedTime(greens=5.0, order=PHASES)
     assert balanced.reference_tolerance("travel_time_s") == Tolerance(0.0, 2.0)
-
-
-def test_dims_arms_have_the_names_of_their_run() -> None:
-    (case,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
-    assert case.recipe().controller == AsRunDim(names="acbd")
-    assert case.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
+    (dim,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
+    assert dim.recipe().controller == AsRunDim(names="acbd"), "its arms have other names"
+    assert dim.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
 
 
 def test_published_arrivals_with_another_vehicle() -> None:
@@ -265,7 +239,6 @@ def test_published_arrivals_with_another_vehicle() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((["four-wy"], [], []), "junction of a published run"),
         (([], [400], []), "no dim run of 400 veh/h; it has 150, 200, 250, 300, 350"),
         (
             (["five-way"], [], ["4:3:2:1"]),
@@ -293,21 +266,23 @@ def test_own_arrivals_stand_beside_comparable_numbers_only() -> None:
 # --- verdicts and report ---------------------------------------------------------------------
 
 
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs see what a test puts in place of SUMO."""
+    monkeypatch.setattr(runs, "processes", ThreadPoolExecutor)
+
+
 def result(case: Case, *pairs: Pair) -> Result:
-    return Result(
-        case=case, pairs=pairs, rows=tuple(compare(pairs, 4)), agreement=agreement(pairs),
-        collisions=(0, 0), failures=(), sumo="SUMO 1.0", divergence=first_divergence(pairs[0]),
-    )  # fmt: skip
+    return Result(case, pairs, sumo="SUMO 1.0")
 
 
-def test_own_laws_are_judged_by_their_means() -> None:
+def test_own_laws_are_judged_by_means_and_the_same_law_trip_by_trip() -> None:
     fair = Case(four_way(profile="fair"), "dim")
     assert result(fair, pair()).hosts_agree
     waits = Pair(1, pair().minisim, trips([9, 9, 9, 9], [50, 51, 52, 53], [True] * 4))
     assert not result(fair, waits).hosts_agree
-
-
-def test_the_same_law_is_judged_trip_by_trip() -> None:
+    none = trips([0.0] * 4, [50.0] * 4, [False] * 4)
+    assert result(fair, Pair(1, none, none)).hosts_agree is None, "no trip ended"
     same = Case(four_way(profile="as_run"), "dim")
     assert not result(same, pair()).hosts_agree, "means agree, half of the trips do not"
     assert result(same, Pair(1, pair().minisim, pair().minisim)).hosts_agree
@@ -333,23 +308,15 @@ def test_replays_are_judged_by_the_papers_means() -> None:
     assert "Against the paper" not in markdown([drawn], "x", {})
 
 
-def test_the_table_has_one_row_a_cell_lane_and_metric() -> None:
-    case = Case(four_way(150, profile="fair"), "dim")
-    frame = table([result(case, pair(1), pair(2))])
-    assert len(frame) == 5 * len(MEANS)
-    assert frame["error"].isna().all()
-    row = frame[(frame["lane"] == "all") & (frame["metric"] == "waiting_time_s")].iloc[0]
-    assert (row["seeds"], row["trips_minisim"], row["trips_sumo"]) == (2, 8, 6)
-
-
-def test_a_run_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def die(*_: object, **__: object) -> None:
         raise SumoError("SUMO's process died | after 3.0 s")
 
     monkeypatch.setattr("minisim.sumo.simulate", die)
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "1.0")
     case = Case(four_way(150, profile="fair", horizon=20), "dim")
-    with ThreadPoolExecutor(1) as executor:
-        (failed,) = film(crossvalidate([case], [1, 2], executor), executor)
+    (failed,) = film(crossvalidate([case], [1, 2], folder=tmp_path))
+    assert list(tmp_path.iterdir()) == [], "a run that fails is not kept"
     assert [(f.host, f.seed) for f in failed.failures] == [("sumo", 1), ("sumo", 2)]
     assert failed.hosts_agree is None, "what never ran is no disagreement"
     frame = table([failed])
@@ -374,11 +341,6 @@ def test_verdicts_over_few_trips_are_marked() -> None:
     assert "few trips |" not in markdown([many], "x", {})
 
 
-def test_without_a_finished_trip_there_is_no_verdict() -> None:
-    none = trips([0.0] * 4, [50.0] * 4, [False] * 4)
-    assert result(Case(four_way(150), "dim"), Pair(1, none, none)).hosts_agree is None
-
-
 def test_runs_of_sumo_are_kept_and_used_again(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -393,8 +355,7 @@ def test_runs_of_sumo_are_kept_and_used_again(
     case = Case(four_way(300, profile="fair", horizon=90), "dim")
 
     def agreement_of(what: Case) -> float:
-        with ThreadPoolExecutor(1) as executor:
-            return crossvalidate([what], [1, 2], executor, folder=tmp_path)[0].agreement
+        return crossvalidate([what], [1, 2], folder=tmp_path)[0].agreement
 
     assert agreement_of(case) == agreement_of(case) == 1.0
     assert sorted(ran) == [1, 2], "the second time nothing is run in SUMO"
@@ -407,28 +368,12 @@ def test_runs_of_sumo_are_kept_and_used_again(
     assert len(ran) == 5, "another controller is another run"
 
 
-def test_a_run_of_sumo_that_fails_is_not_kept(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    def die(*_: object, **__: object) -> None:
-        raise SumoError("SUMO's process died")
-
-    monkeypatch.setattr("minisim.sumo.simulate", die)
-    monkeypatch.setattr("importlib.metadata.version", lambda _: "1.0")
-    with ThreadPoolExecutor(1) as executor:
-        case = Case(four_way(150, profile="fair", horizon=20), "dim")
-        (failed,) = crossvalidate([case], [1], executor, folder=tmp_path)
-    assert len(failed.failures) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_fault_of_the_program_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*_: object, **__: object) -> None:
         raise ZeroDivisionError("oops")
 
     monkeypatch.setattr(runs, "_run", wrong)
-    with ThreadPoolExecutor(1) as executor:
-        (failed,) = crossvalidate([Case(four_way(150), "dim")], [1], executor)
+    (failed,) = crossvalidate([Case(four_way(150), "dim")], [1])
     assert [f.error for f in failed.failures] == ["ZeroDivisionError: oops"] * 2
 
 
@@ -436,13 +381,12 @@ def compared(monkeypatch: pytest.MonkeyPatch, simulate_instead: object) -> Resul
     """A short case with something else in place of SUMO."""
     monkeypatch.setattr("minisim.sumo.simulate", simulate_instead)
     case = Case(four_way(300, profile="fair", horizon=150), "dim")
-    with ThreadPoolExecutor(1) as executor:
-        return film(crossvalidate([case], [1], executor), executor)[0]
+    return film(crossvalidate([case], [1]))[0]
 
 
 def test_a_host_that_does_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     same = compared(monkeypatch, simulate)
-    assert (same.agreement, same.divergence, same.film) == (1.0, None, None)
+    assert (same.agreement, same.divergence, same.parting) == (1.0, None, None)
     assert "No trip differs: four-way balanced 300 dim." in markdown([same], "x", {})
     assert [n for n, _, _ in crossval_figures([same])] == ["trips_four-way_balanced_dim"]
 
@@ -455,12 +399,13 @@ def test_a_host_with_another_controller(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
     result = compared(monkeypatch, other)
     assert 0.0 < result.agreement < 1.0
-    assert result.film is not None
-    assert result.film.parting is not None
-    both = [frame.set_index(["time_s", "vehicle"])["s_m"]
-            for frame in (result.film.minisim, result.film.sumo)]  # fmt: skip
-    where = result.film.parting.time, result.film.parting.vehicle
-    assert (both[0][where], both[1][where]) == result.film.parting.positions
+    assert result.parting is not None
+    where = result.parting.time, result.parting.vehicle
+    both = tuple(
+        frame.set_index(["time_s", "vehicle"])["s_m"][where]
+        for frame in (result.parting.minisim, result.parting.sumo)
+    )
+    assert both == result.parting.positions
     figures = {name: figure for name, _, figure in crossval_figures([result])}
     parting = figures["parting_four-way_balanced_300_dim"]
     assert [axes.get_ylabel() for axes in parting.axes] == [f"lane {lane} [m]" for lane in "abcd"]
@@ -484,44 +429,6 @@ def test_means_are_drawn_over_density() -> None:
 
 
 # --- command line ----------------------------------------------------------------------------
-
-BAD = [
-    (("four-wy",), "unknown scenario"),
-    (("-c", "dm"), "did you mean 'dim'"),
-    (("-d", "-5"), "-5"),
-    (("--split", "4:x"), "4:x"),
-    (("-p", "fare"), "did you mean 'fair'"),
-    (("--seeds", "0"), "--seeds"),
-    (("--jobs", "0"), "--jobs"),
-    (("--horizon", "-1"), "horizon"),
-    (("--horizon", "0"), "horizon"),
-    (("--replay", "--seeds", "2"), "--seeds does not go with --replay"),
-    (("--replay", "6-way"), "unknown junction of a published run"),
-    (("--replay", "-d", "400"), "no dim run of 400"),
-    (("--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("--replay", "five-way", "-c", "v2ic"), "no v2ic run of five-way"),
-    (("three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
-    (("-p", "as_run", "-c", "reservation"), "reservation cannot serve four-way at 150"),
-]
-
-
-@pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a) for a, _ in BAD])
-def test_bad_input_is_one_line_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], named: str
-) -> None:
-    code = main(["crossval", *arguments, "--out", str(tmp_path / "new")])
-    captured = capsys.readouterr()
-    assert (code, captured.out, captured.err.count("\n")) == (2, "", 1)
-    assert named in captured.err
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_in_place_of_the_folder_is_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    (tmp_path / "afile").write_text("")
-    assert main(["crossval", "--quick", "--out", str(tmp_path / "afile")]) == 2
-    assert "afile: it is a file" in capsys.readouterr().err
 
 
 def test_without_sumo_the_install_command_is_told(

@@ -25,9 +25,9 @@ def test_gini_closed_forms() -> None:
 
 @given(st.lists(st.floats(0.0, 1e4), min_size=1, max_size=8), st.floats(0.1, 100.0))
 def test_gini_ignores_scale_order_and_repetition(values: list[float], scale: float) -> None:
-    found = gini(values)
-    assert 0.0 <= found <= 1.0 - 1.0 / len(values) + 1e-9
-    assert gini([scale * v for v in reversed(values)]) == pytest.approx(found, abs=1e-9)
+    plain = gini(values)
+    assert 0.0 <= plain <= 1.0 - 1.0 / len(values) + 1e-9
+    assert gini([scale * v for v in reversed(values)]) == pytest.approx(plain, abs=1e-9)
     assert gini(values * 2) == pytest.approx(gini(values, [2.0] * len(values)), abs=1e-9)
 
 
@@ -38,8 +38,6 @@ def test_gini_refuses(wrong: Any) -> None:
 
 
 def test_worst_lane_of_rows() -> None:
-    experiment = fair("dim", 4, 200.0).recipe(1)
-    rows = lane_waits(pd.DataFrame([synthetic_row(experiment)]), 4)
-    row = rows.iloc[0]
+    row = lane_waits(pd.DataFrame([synthetic_row(fair("dim", 4, 200.0).recipe(1))]), 4).iloc[0]
     assert row["worst_lane_s"] == row["lanes_d_complete_waiting_time_s"]
     assert row["gini"] == pytest.approx(0.25), "lanes 1 : 2 : 3 : 4"

@@ -1,4 +1,4 @@
-"""Averages over seeds, paired differences, prediction intervals and growing queues."""
+"""Averages over seeds, paired differences, metrics of a caller and keys of recipes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
-from minisim.results.metrics import AVERAGED, Metric, queue_growth
+from minisim.results.metrics import AVERAGED, Metric
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, three_way
@@ -22,9 +22,7 @@ from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.statistics import (
     GROWTH_SCORE,
-    growing,
     mean_interval,
-    prediction_interval,
 )
 from scenarios.sweep import sweep
 from scenarios.sweep.cells import CELL, cells, differences, pairs, saturated
@@ -34,98 +32,6 @@ from scenarios.sweep.store import Store
 from tests.builders import free_flow
 
 Floats = npt.NDArray[np.float64]
-
-
-def test_prediction_interval_by_hand() -> None:
-    # Mean 3, s² = 10/4, t(0.975, 4) = 2.776 (Abramowitz & Stegun, table 26.10).
-    interval = prediction_interval([1, 2, 3, 4, 5])
-    assert interval.mean == 3.0
-    assert interval.half_width == pytest.approx(2.7764 * math.sqrt(2.5 * 1.2), abs=1e-4)
-    assert math.isnan(prediction_interval([1.0]).half_width)
-    with pytest.raises(InputError):
-        prediction_interval([])
-
-
-def test_prediction_interval_holds_the_next_value_as_often_as_it_says() -> None:
-    draws = np.random.default_rng(7).normal(10, 3, size=(2000, 6))
-    inside = 0
-    for *known, new in draws.tolist():
-        mean, half_width, _ = prediction_interval(known)
-        inside += abs(new - mean) <= half_width
-    # Binomial(2000, 0.95): sd 9.7; four of them are a false alarm of 6e-5.
-    assert inside == pytest.approx(1900, abs=39)
-
-
-# --- growing queues --------------------------------------------------------------------------
-
-
-def test_queue_growth_by_hand() -> None:
-    # Quarters of 10 s. Second, [10, 20): the first trip is there for 5 s. Last, [30, 40): the
-    # second for 10 s, the third for 4 s, the fourth not yet.
-    demand = np.array([0.0, 25.0, 36.0, 40.0])
-    leave = np.array([15.0, math.inf, math.inf, math.inf])
-    assert queue_growth(demand, leave, 40.0) == pytest.approx(1.4 - 0.5)
-
-
-def md1(rng: np.random.Generator, load: float, horizon: float = 3600.0) -> tuple[Floats, Floats]:
-    """An hour of an M/D/1 queue with 350 arrivals on average: demand and leaving times."""
-    demand = np.sort(rng.uniform(0.0, horizon, rng.poisson(350)))
-    service = load * horizon / 350
-    leave = np.empty_like(demand)
-    last = 0.0
-    for k, time in enumerate(demand.tolist()):
-        last = max(time, last) + service
-        leave[k] = last
-    return demand, np.where(leave <= horizon, leave, math.inf)
-
-
-def flagged(load: float, runs: int = 200) -> int:
-    rng = np.random.default_rng(11)
-    hours = [md1(rng, load) for _ in range(runs)]
-    return sum(growing(queue_growth(*hour, 3600.0), len(hour[0])) for hour in hours)
-
-
-def test_an_md1_queue_grows_above_its_capacity_only() -> None:
-    assert flagged(0.5) == 0
-    assert flagged(0.9) == 0
-    assert flagged(0.95) <= 2, "0.2 % each: 3 of 200 have a chance of 1 %"
-    assert flagged(1.3) > 150, "88 % each"
-
-
-def test_growth_is_the_surplus() -> None:
-    # Far above capacity: the queue grows by λ − μ, for half the horizon between the two windows.
-    rng = np.random.default_rng(5)
-    grown = [queue_growth(*md1(rng, 1.5), 3600.0) for _ in range(50)]
-    surplus = 350 * (1 - 1 / 1.5) / 2
-    # The sd of one is √(5/12·350) = 12.1.
-    assert np.mean(grown) == pytest.approx(surplus, abs=4 * 12.1 / math.sqrt(50))
-
-
-def test_a_free_walk_varies_as_stated() -> None:
-    # Arrivals and independent departures of a rate λ each: a walk of variance 2λ a second.
-    rng = np.random.default_rng(3)
-    rate, end, grown = 0.2, 3600.0, []
-    for _ in range(400):
-        demand = np.sort(rng.uniform(0, end, rng.poisson(rate * end)))
-        leave = np.sort(rng.uniform(0, end, rng.poisson(rate * end)))
-        # Negative presences are what makes it free: only the difference of counts matters.
-        size = min(len(demand), len(leave))
-        surplus = demand[size:], np.full(len(demand) - size, math.inf)
-        paired = (
-            np.concatenate([demand[:size], surplus[0]]),
-            np.concatenate([leave[:size], surplus[1]]),
-        )
-        late = leave[size:]
-        count = present(paired[0], end) - present(np.concatenate([leave[:size], late]), end)
-        grown.append(count)
-    expected = 2 * 5 / 12 * rate * end
-    # The variance of a variance of 400 normal values: sd √(2/399) = 7 %.
-    assert np.var(grown, ddof=1) == pytest.approx(expected, rel=4 * 0.071)
-
-
-def present(times: Floats, end: float) -> float:
-    """Growth of the number of events so far: what `queue_growth` says when nobody leaves."""
-    return queue_growth(times, np.full(len(times), math.inf), end)
 
 
 @pytest.mark.parametrize(
@@ -330,13 +236,10 @@ def test_what_has_no_canonical_form(odd: object) -> None:
         (four_way(250, horizon=300, profile="as_run"), "dim", (73, 5, 1.79, 68.88, -8.59)),
     ],
 )
-def test_whoever_changes_results_raises_their_version(
+def test_changed_results_need_another_version(
     scenario: Scenario, controller: str, expected: tuple[float, ...]
 ) -> None:
-    """Stores keep rows by version: one that gives other rows needs another `RESULTS`.
-
-    The numbers are what these runs gave under `RESULTS` = 3, no more; put in what they give now.
-    """
+    """Stores keep rows by version. When rows change, raise `RESULTS` and update these numbers."""
     recipe = controller_named(controller, scenario.profile)
     row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
     columns = (

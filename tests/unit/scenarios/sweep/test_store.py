@@ -26,28 +26,28 @@ from scenarios.sweep.store import APPLICATION, SCHEMA, Store
 from tests import ROOT
 
 
-def experiment(seed: int = 1) -> Recipe:
+def recipe_of(seed: int = 1) -> Recipe:
     return Recipe(three_way(200, horizon=60), Dim(), seed)
 
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return outcome_of(experiment())
+    return outcome_of(recipe_of())
 
 
 def test_a_row_comes_back_as_it_was(tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
-        store.put(experiment(), outcome)
+        store.put(recipe_of(), outcome)
     with Store(tmp_path / "s.db", create=False) as store:
-        assert store.valid([key_of(experiment())]) == {key_of(experiment()): outcome.row}
-        assert store.valid([key_of(experiment(2))]) == {}
+        assert store.valid([key_of(recipe_of())]) == {key_of(recipe_of()): outcome.row}
+        assert store.valid([key_of(recipe_of(2))]) == {}
         pd.testing.assert_frame_equal(store.frame(), pd.DataFrame([outcome.row]))
     assert [file.name for file in tmp_path.iterdir()] == ["s.db"], "one file"
 
 
 def test_the_file_tells_how_to_run_it_again(tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
-        store.put(experiment(), outcome)
+        store.put(recipe_of(), outcome)
     database = sqlite3.connect(tmp_path / "s.db")
     description, provenance = database.execute("SELECT experiment, provenance FROM runs").fetchone()
     database.close()
@@ -69,15 +69,15 @@ def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("scenarios.sweep.runner.outcome_of", watched)
     with Store(tmp_path / "s.db") as store:
-        first = sweep([experiment(1), experiment(2)], jobs=1, store=store)
-        again = sweep([experiment(1), experiment(2)], jobs=1, store=store)
+        first = sweep([recipe_of(1), recipe_of(2)], jobs=1, store=store)
+        again = sweep([recipe_of(1), recipe_of(2)], jobs=1, store=store)
         pd.testing.assert_frame_equal(first, again)
         assert ran == [1, 2]
-        store.put(experiment(2), failed(experiment(2), MemoryError()))
-        sweep([experiment(1), experiment(2), experiment(3)], jobs=1, store=store)
+        store.put(recipe_of(2), failed(recipe_of(2), MemoryError()))
+        sweep([recipe_of(1), recipe_of(2), recipe_of(3)], jobs=1, store=store)
         assert ran == [1, 2, 2, 3], "what failed, and what is new"
         monkeypatch.setattr(keys, "RESULTS", keys.RESULTS + 1)
-        sweep([experiment(1)], jobs=1, store=store)
+        sweep([recipe_of(1)], jobs=1, store=store)
         assert ran == [1, 2, 2, 3, 1], "what another version computed"
         assert len(store) == 3
 
@@ -86,36 +86,35 @@ def test_order_is_by_what_was_run(tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
         for seed in (3, 1, 2):
             row = {**outcome.row, "seed": seed}
-            store.put(experiment(seed), Outcome(row, outcome.provenance))
+            store.put(recipe_of(seed), Outcome(row, outcome.provenance))
         assert store.frame()["seed"].tolist() == [1, 2, 3]
+
+
+def scripted(path: Path, script: str) -> None:
+    database = sqlite3.connect(path)
+    database.executescript(script)
+    database.close()
 
 
 def newer(path: Path) -> None:
     Store(path).close()
-    database = sqlite3.connect(path)
-    database.execute(f"PRAGMA user_version = {SCHEMA + 1}")
-    database.close()
+    scripted(path, f"PRAGMA user_version = {SCHEMA + 1}")
 
 
 def foreign(path: Path) -> None:
-    database = sqlite3.connect(path)
-    database.execute("CREATE TABLE mine (x)")
-    database.commit()
-    database.close()
+    scripted(path, "CREATE TABLE mine (x)")
 
 
 def other_columns(path: Path) -> None:
     Store(path).close()
-    database = sqlite3.connect(path)
-    database.executescript("DROP TABLE runs; CREATE TABLE runs (key, row)")
-    database.close()
+    scripted(path, "DROP TABLE runs; CREATE TABLE runs (key, row)")
 
 
 def filled(path: Path) -> None:
-    result = outcome_of(experiment())
+    result = outcome_of(recipe_of())
     with Store(path) as store:
         for seed in range(40):
-            store.put(experiment(seed), result)
+            store.put(recipe_of(seed), result)
 
 
 def truncated(path: Path) -> None:
@@ -194,12 +193,12 @@ def test_an_empty_file_becomes_a_store(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["{", "[1,2]", "{}", "null"])
 def test_a_broken_row_is_told(text: str, tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
-        store.put(experiment(), outcome)
+        store.put(recipe_of(), outcome)
         store._database.execute("UPDATE runs SET row = ?", (text,))
         with pytest.raises(FileError, match="damaged"):
             store.frame()
         with pytest.raises(FileError, match="damaged"):
-            sweep([experiment()], jobs=1, store=store)
+            sweep([recipe_of()], jobs=1, store=store)
 
 
 def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
@@ -209,7 +208,7 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
     odd = Odd()
     object.__setattr__(odd, "period", object())
     with Store(tmp_path / "s.db") as store, pytest.raises(InputError, match="cannot be stored"):
-        sweep([replace(experiment(), controller=odd)], jobs=1, store=store)
+        sweep([replace(recipe_of(), controller=odd)], jobs=1, store=store)
 
 
 def test_another_writer_is_waited_for(
@@ -217,15 +216,15 @@ def test_another_writer_is_waited_for(
 ) -> None:
     monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
     with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
-        ours.put(experiment(1), outcome)
-        theirs.put(experiment(2), outcome)
-        theirs.put(experiment(1), outcome)  # what both computed is one row
+        ours.put(recipe_of(1), outcome)
+        theirs.put(recipe_of(2), outcome)
+        theirs.put(recipe_of(1), outcome)  # what both computed is one row
         assert len(ours) == len(theirs) == 2
         theirs._database.execute("BEGIN IMMEDIATE")
         with pytest.raises(FileError, match=r"cannot write store .* locked; what was stored"):
-            ours.put(experiment(3), outcome)
+            ours.put(recipe_of(3), outcome)
         theirs._database.execute("ROLLBACK")
-        ours.put(experiment(3), outcome)
+        ours.put(recipe_of(3), outcome)
         assert len(ours) == 3
 
 
@@ -289,8 +288,8 @@ def test_a_full_disk_is_told_and_what_was_stored_stays(tmp_path: Path, limit: in
         assert len(store) == max(kept, 5)
 
 
-def test_four_way_and_label_are_other_experiments() -> None:
-    base = experiment()
+def test_every_part_of_a_recipe_is_in_its_key() -> None:
+    base = recipe_of()
     others = [
         replace(base, seed=2),
         replace(base, label="x"),

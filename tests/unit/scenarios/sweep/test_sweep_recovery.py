@@ -22,10 +22,9 @@ from scenarios.sweep import sweep
 from scenarios.sweep.file import read_experiments
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
-from scenarios.sweep.rows import MEASURED
 from scenarios.sweep.store import Store
 from tests import ROOT
-from tests.builders import Deadly, killing
+from tests.builders import Deadly, killing, repeatable
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
 
@@ -34,10 +33,6 @@ EMPTY = three_way(0, horizon=1)
 
 def quick(count: int) -> list[Recipe]:
     return [Recipe(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
-
-
-def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.drop(columns=list(MEASURED))
 
 
 def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
@@ -96,7 +91,7 @@ def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
     parent = subprocess.Popen(
-        [sys.executable, script], env={**os.environ, "PYTHONPATH": str(ROOT)},
+        [sys.executable, script], env=ENVIRONMENT,
         stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert parent.stdout is not None
@@ -129,6 +124,16 @@ horizon = {horizon}
 """
 
 
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def command_of(file: Path, store: Path, jobs: int) -> list[str]:
+    return [
+        sys.executable, "-m", "minisim", "sweep", str(file), "--out", str(store),
+        "--jobs", str(jobs),
+    ]  # fmt: skip
+
+
 def stored(path: Path) -> int:
     try:
         with Store(path, create=False) as store:
@@ -147,17 +152,13 @@ def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, hori
     chance = random.Random(4)
     file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
     file.write_text(SWEEP.format(seeds=seeds, horizon=horizon))
-    command = [
-        sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
-        "sweep", str(file), "--out", str(path), "--jobs", str(jobs),
-    ]  # fmt: skip
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = command_of(file, path, jobs)
     total = 8 * seeds
     counts = []
     for kill in range(kills):
         before = stored(path)
         process = subprocess.Popen(
-            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            command, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         if kill % 2:
             deadline = time.monotonic() + 60
@@ -170,7 +171,7 @@ def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, hori
         counts.append(stored(path))
     assert counts == sorted(counts), "nothing is ever lost"
     assert any(0 < count < total for count in counts), "some kill was in the middle"
-    subprocess.run(command, env=environment, check=True, capture_output=True)
+    subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True)
     todo = read_experiments(file)
     with Store(path, create=False) as store:
         assert len(store) == len(todo) == total
@@ -191,13 +192,9 @@ def test_a_sweep_killed_twenty_times_ends_as_an_undisturbed_one(tmp_path: Path) 
 def test_two_sweeps_may_share_a_store(tmp_path: Path) -> None:
     file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
     file.write_text(SWEEP.format(seeds=3, horizon=60))
-    command = [
-        sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
-        "sweep", str(file), "--out", str(path), "--jobs", "1",
-    ]  # fmt: skip
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = command_of(file, path, jobs=1)
     both = [
-        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
         for _ in range(2)
     ]
     said = [process.communicate(timeout=120)[0] for process in both]

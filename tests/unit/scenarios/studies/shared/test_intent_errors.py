@@ -5,9 +5,12 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from dim import Dim, Monitor
+from dim import Dim, Monitor, NoisyPerception
 from dim.senses.intent import RATES
 from dim.senses.noise import UNSIGNALLED
+from minisim import simulate
+from minisim.errors import CollisionError
+from scenarios import four_way
 from scenarios.statistics import poisson_interval
 from scenarios.studies import study_named
 from scenarios.studies.shared.effort import Effort
@@ -20,11 +23,9 @@ def test_a_rate_is_that_of_all_runs_together() -> None:
     rows = pd.DataFrame(
         {"collisions": [3, 2], "crossings": [900.0, 1100.0], "trips": [9, 9], "unfinished": [0, 0]}
     )
-    rate = rate_of(rows, "collisions")
-    assert rate is not None
     low, high = poisson_interval(5)
-    assert rate == pytest.approx((25.0, 5.0 * low, 5.0 * high, 5, 2000))
-    assert rate.rate == 5 * CROSSINGS / 2000
+    assert CROSSINGS / 2000 == 5.0
+    assert rate_of(rows, "collisions") == pytest.approx((25.0, 5.0 * low, 5.0 * high, 2000))
 
 
 def test_runs_without_tally_have_their_trips() -> None:
@@ -32,22 +33,21 @@ def test_runs_without_tally_have_their_trips() -> None:
     collisions, grants = rate_of(rows, "collisions"), rate_of(rows, "false_grants")
     assert collisions == grants
     assert collisions is not None
-    assert (collisions.crossings, collisions.rate) == (1000, 0.0)
+    assert (collisions.crossings, collisions.value) == (1000, 0.0)
     assert rate_of(rows.assign(trips=10), "collisions") is None
 
 
 def test_the_study_goes_over_rates_kinds_and_manners() -> None:
     cases = [c for c in study_named("perception").points if isinstance(c, IntentErrorPoint)]
     assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
-    found = {
+    errors = {
         (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
     }
-    assert len(found) == 2 * len(MANNERS) * (len(RATES) - 1)
+    assert len(errors) == 2 * len(MANNERS) * (len(RATES) - 1)
     exact = [c.recipe(1).controller for c in cases if c.perception.period is None]
     assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
     assert any(c.perception.unsignalled == UNSIGNALLED for c in cases)
-    keys = {key_of(c.recipe(1)) for c in cases}
-    assert len(keys) == len(cases)
+    assert len({key_of(c.recipe(1)) for c in cases}) == len(cases)
 
 
 @pytest.mark.parametrize("name", ["perception", "confidence"])
@@ -68,3 +68,15 @@ def test_a_row_holds_what_was_counted() -> None:
     assert row["deadlock_s"] == 0.0
     plain, _ = outcome_of(IntentErrorPoint("dim").recipe(1, 60.0))
     assert "crossings" not in plain
+
+
+def test_the_collision_that_docs_explain() -> None:
+    """docs/safety.md, "Wrong perception": all but c3 itself take it for c2."""
+    scenario = four_way(250, profile="fair")
+    with pytest.raises(CollisionError) as caught:
+        simulate(scenario, Dim(perception=NoisyPerception(0.15)), 1)
+    (collision,) = caught.value.collisions
+    assert (collision.time, collision.movements) == (662.8, ("c3", "b3"))
+    table = Dim().start(scenario.site(1)).rules.table
+    assert [str(m) for m in table.decide(["b3", "c3", "d1"])] == ["c3", "d1"]
+    assert [str(m) for m in table.decide(["b3", "c2", "d1"])] == ["b3"]

@@ -1,0 +1,113 @@
+"""All baselines on any junction, with any parameters: no collision, and every vehicle is served."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+import minisim
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from minisim.control import Controller, Site
+from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
+from minisim.junction.geometry import Intersection
+from minisim.results.safety import encroachments
+from minisim.vehicle import VehicleType
+from scenarios.scenario import FAIR, Profile
+from scenarios.strategies import demands, emptying, floats, intersections, vehicles
+from tests.builders import share
+
+#: None at all, less than a step, and no whole number of steps among them [s].
+AMBERS = st.sampled_from([0.0, 0.04, 2.0, 3.03])
+GREENS = {"min_green": floats(0.5, 10.0), "max_green": floats(10.0, 50.0), "amber": AMBERS}
+
+#: From detectors just before the line to ones beyond short roads, from short to long greens.
+RIVALS: dict[str, st.SearchStrategy[Controller]] = {
+    "fixed-time": st.builds(
+        FixedTime,
+        greens=st.none() | floats(2.0, 20.0),
+        amber=AMBERS,
+        all_red=st.sampled_from([0.0, 1.0]),
+    ),
+    "adaptive": st.builds(
+        Adaptive,
+        detector_range=floats(5.0, 200.0),
+        min_time_loss=floats(0.0, 5.0),
+        extend_max_green=st.booleans(),
+        **GREENS,
+    ),
+    "actuated": st.builds(
+        Actuated,
+        max_gap=floats(0.0, 10.0),
+        detector_gap=floats(0.1, 20.0),
+        passing_time=floats(0.1, 5.0),
+        **GREENS,
+    ),
+    "longest-queue": st.builds(
+        LongestQueue,
+        interval=floats(0.5, 15.0),
+        detector_range=floats(5.0, 200.0),
+        amber=AMBERS,
+    ),
+    "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
+    "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
+    "reservation": st.sampled_from([Reservation(), Reservation(reach=100.0, period=0.2)]),
+}
+
+#: These keep bodies apart in time, by their predictions; the others never share a conflict area.
+PREDICTING = ("v2ic", "reservation")
+
+
+@pytest.mark.parametrize("name", RIVALS)
+@share(0.5)
+@given(data=st.data())
+def test_no_vehicle_collides_and_each_is_served(name: str, data: st.DataObject) -> None:
+    scenario, controller = data.draw(emptying()), data.draw(RIVALS[name])
+    if name in PREDICTING:  # with any cars, at any limit, also where they queue
+        vehicle = data.draw(vehicles())
+        if entry_room(scenario.intersection, vehicle) <= 0.0:
+            vehicle = FAIR.vehicle
+        limit, n = data.draw(floats(6.0, 20.0)), scenario.intersection.n
+        scenario = replace(
+            scenario,
+            profile=Profile(name="random", vehicle=vehicle, speed_limit=limit),
+            recorded=data.draw(demands(n, 700.0)).draw(n, 60.0, data.draw(st.integers(0, 1000))),
+        )
+    run = minisim.simulate(scenario, controller, record="junction", on_collision="record")
+    assert run.collisions == ()
+    assert run.trips["arrival_s"].notna().all()
+    if name not in PREDICTING:
+        assert (encroachments(run.trajectories, run.site)["pet_s"] > 0.0).all()
+
+
+@share(0.2)
+@given(intersections(max_arms=5), vehicles(), st.data())
+def test_out_of_their_zones_no_two_bodies_touch(
+    intersection: Intersection, vehicle: VehicleType, data: st.DataObject
+) -> None:
+    """Brute force: bodies of two movements in conflict, anywhere while not both are in zones."""
+    if entry_room(intersection, vehicle) <= 0.0:
+        vehicle = FAIR.vehicle
+    site = Site(
+        intersection=intersection,
+        vehicle=vehicle,
+        speed_limit=14.0,
+        demand=(0.0,) * intersection.n,
+    )
+    zones = conflict_zones(intersection, vehicle)
+    conflicts = np.argwhere(site.conflicts)
+    assert np.array_equal(np.isfinite(zones[..., 0]), site.conflicts)
+    for p, q in data.draw(st.permutations(conflicts.tolist()))[:8]:
+        one, other = intersection.paths[p], intersection.paths[q]
+        s = [np.arange(0.0, path.exit - path.entry + vehicle.length, 0.37) for path in (one, other)]
+        outside = ~((s[0] > zones[p, q, 0]) & (s[0] < zones[p, q, 1]))
+        bodies = [
+            shapely.polygons(path.bodies(path.entry + at, vehicle))
+            for path, at in zip((one, other), s, strict=True)
+        ]
+        near = shapely.dwithin(bodies[0][outside][:, None], bodies[1][None, :], CLEARANCE * 0.9)
+        assert not near.any()
