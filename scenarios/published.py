@@ -10,7 +10,7 @@ import numpy as np
 
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Way
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
@@ -43,18 +43,22 @@ def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]
     if turnarounds is None:
         turnarounds = TURNAROUNDS["balanced"] if arms == 4 else ""
     with file.open(encoding="utf-8") as text:
-        return tuple(_way(row, arms, turnarounds) for row in csv.DictReader(text))
+        rows = list(csv.DictReader(text))
+    exits = movements_of(arms).exits.tolist()  # the rows are in their order
+    return tuple(
+        _way(row, ARM_NAMES[exit_arm] in turnarounds)
+        for row, exit_arm in zip(rows, exits, strict=True)
+    )
 
 
-def _way(row: dict[str, str], arms: int, turnarounds: str) -> Way:
-    origin, manoeuvre = ARM_NAMES.index(row["movement"][0]), int(row["movement"][1])
+def _way(row: dict[str, str], turns_back: bool) -> Way:
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
     return Way(
         points, float(row["length_m"]), float(row["wait_m"]), speed=float(row["speed_mps"]),
         major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
-        turns_back=ARM_NAMES[(origin + manoeuvre) % arms] in turnarounds,
+        turns_back=turns_back,
     )  # fmt: skip
 
 
