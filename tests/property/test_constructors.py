@@ -111,7 +111,7 @@ CASES = {
 }  # fmt: skip
 
 #: Every declared class whose parameters all have a default.
-for kind in {kind for kind, _ in declarations().values()}:
+for kind in dict.fromkeys(kind for kind, _ in declarations().values()):
     defaults = {it.name: it.default for it in parameters(kind)}
     if MISSING not in defaults.values():
         CASES.setdefault(kind.__name__, Case(kind, defaults))
