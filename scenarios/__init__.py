@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from scenarios.library import five_way, four_way, from_bearings, regular, three_way
-    from scenarios.scenario import AS_RUN, FAIR, PAPER, PROFILES, Profile, Scenario
+    from scenarios.profiles import AS_RUN, FAIR, PAPER, PROFILES, Profile
+    from scenarios.scenario import Scenario
 
 _LIBRARY = ("five_way", "four_way", "from_bearings", "regular", "three_way")
 
@@ -30,5 +31,5 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'scenarios' has no attribute {name!r}")
-    home = "scenarios.library" if name in _LIBRARY else "scenarios.scenario"
-    return getattr(importlib.import_module(home), name)
+    home = "library" if name in _LIBRARY else "scenario" if name == "Scenario" else "profiles"
+    return getattr(importlib.import_module(f"scenarios.{home}"), name)

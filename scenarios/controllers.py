@@ -34,7 +34,7 @@ from dim import AsRunDim, Dim
 from minisim.control import Controller, Unregulated
 from minisim.errors import InputError, choice, show
 from scenarios.loading import load_class
-from scenarios.scenario import AS_RUN, Profile, profile_named
+from scenarios.profiles import AS_RUN, Profile, profile_named
 from scenarios.spelling import Call, build, call_of, parse_arguments
 
 

@@ -16,8 +16,9 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, numbers, show
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Way
+from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
-from scenarios.scenario import PUBLISHED_PROFILES, Profile, Scenario, profile_named
+from scenarios.scenario import Scenario
 
 Side = Literal["left", "right"]
 

@@ -19,6 +19,7 @@ from minisim.errors import InputError, choice, integer
 from minisim.vehicle import CruiseVehicle
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS, Profile
 from scenarios.published import (
     PUBLISHED_ARMS,
     RENAMED,
@@ -27,7 +28,7 @@ from scenarios.published import (
     published_arrivals,
     published_ways,
 )
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS, Profile, Scenario
+from scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     import pandas as pd

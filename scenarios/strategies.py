@@ -26,7 +26,8 @@ from minisim.junction.geometry import MIN_ANGLE, Intersection
 from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
-from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario
+from scenarios.profiles import FAIR, PAPER, PROFILES, Profile
+from scenarios.scenario import Scenario
 
 try:
     from hypothesis import strategies as st

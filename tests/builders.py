@@ -35,8 +35,8 @@ from minisim.results.run import Run
 from minisim.testing import SmallScenario
 from scenarios import Scenario
 from scenarios.paper import Cell, reference_rows
+from scenarios.profiles import AS_RUN
 from scenarios.recipe import Recipe
-from scenarios.scenario import AS_RUN
 from scenarios.sweep.rows import MEASURED, identity_of
 
 

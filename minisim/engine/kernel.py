@@ -12,9 +12,9 @@ import math
 from minisim.carfollowing import ballistic, semi_implicit
 from minisim.control import Site
 from minisim.engine import cruise
+from minisim.engine.broad_phase import may_touch
 from minisim.engine.laws import braking_begins, closeness, follow, hold, insertable, slow_down
 from minisim.engine.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
-from minisim.engine.touch import may_touch
 from minisim.jit import njit
 
 #: Reasons to return, as bits.

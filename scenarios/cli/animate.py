@@ -47,8 +47,8 @@ def animate(
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
     from scenarios.controllers import controller_named
+    from scenarios.profiles import profile_named
     from scenarios.recipe import Recipe
-    from scenarios.scenario import profile_named
 
     check_apart({"--arrivals": arrivals, "--out": out})
     animation_format(out)

@@ -22,8 +22,9 @@ from scenarios.paper import (
     reference_rows,
     replay,
 )
+from scenarios.profiles import AS_RUN, Profile
 from scenarios.recipe import Recipe
-from scenarios.scenario import AS_RUN, Profile, Scenario
+from scenarios.scenario import Scenario
 
 #: Controllers of the published runs: command-line name -> name in `reference.csv`.
 PUBLISHED: Final = {ours: theirs for theirs, ours in SERIES.items()}

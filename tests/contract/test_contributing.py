@@ -70,7 +70,7 @@ import minisim
 from baselines import FixedTime
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.scenario import Profile
+from scenarios.profiles import Profile
 
 assert minisim.__file__.startswith({tree!r})
 for model in ("iidm", "idm-plus"):
@@ -113,16 +113,20 @@ print(len(figure.axes[0].get_legend_handles_labels()[0]))
 
 
 def test_every_file_that_the_guide_names_exists() -> None:
-    rows = re.findall(r"^\| `([a-z/]+)/` \|[^|]*\|([^|]*)\|", GUIDE, re.MULTILINE)
-    assert len(rows) >= 18
-    for room, files in rows:
-        for name in re.findall(r"`([a-z_/]+(?:\.py|/))`", files):
-            assert (ROOT / room / name).exists(), f"{room}/{name}"
+    rooms = GUIDE.split("- `minisim/`")[1].split("`minisim` imports no")[0]
+    room, known = Path("minisim"), 0
+    for name in re.findall(r"`([a-z_/]+(?:\.py|/))`", rooms):
+        inside = room / name
+        known += 1
+        if name.endswith("/") and not (ROOT / inside).is_dir():
+            room = inside = Path(name)
+        assert (ROOT / inside).exists(), inside
+    assert known >= 90
     rooms = "minisim|dim|baselines|scenarios|figures|tests"
     for path in re.findall(rf"`((?:{rooms})/[a-z_/]+\.py)`", GUIDE):
         made = path in ("baselines/one_at_a_time.py", "scenarios/cli/arms.py")
         assert (ROOT / path).is_file() is not made, path
-    assert len(GUIDE.splitlines()) < 330
+    assert len(GUIDE.splitlines()) < 360
 
 
 def loaded(text: str, folder: Path) -> ModuleType:

@@ -14,7 +14,7 @@ import typer
 from scenarios.cli import app, main
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
-from scenarios.scenario import profile_named
+from scenarios.profiles import profile_named
 from tests import ROOT
 
 PAGE = (ROOT / "docs" / "fidelity.md").read_text(encoding="utf-8")

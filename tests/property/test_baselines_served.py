@@ -17,7 +17,7 @@ from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.results.safety import encroachments
 from minisim.vehicle import VehicleType
-from scenarios.scenario import FAIR, Profile
+from scenarios.profiles import FAIR, Profile
 from scenarios.strategies import demands, emptying, floats, intersections, vehicles
 from tests.builders import share
 

@@ -26,8 +26,9 @@ from minisim.parameters import parameters
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
+from scenarios.profiles import FAIR, Profile, profile_named
 from scenarios.recipe import Recipe
-from scenarios.scenario import FAIR, Profile, Scenario, profile_named
+from scenarios.scenario import Scenario
 from tests.property.test_declared import declarations
 
 BEARINGS = (0.0, 90.0, 180.0, 270.0)

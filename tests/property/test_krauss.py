@@ -24,7 +24,7 @@ from minisim.carfollowing import (
 from minisim.control import Controller
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.scenario import AS_RUN_SIGNALS, FAIR, Profile
+from scenarios.profiles import AS_RUN_SIGNALS, FAIR, Profile
 from scenarios.strategies import floats
 
 STEPS = st.sampled_from([0.01, 0.05, 0.1, 0.5])

@@ -16,7 +16,8 @@ from dim.agent import GATES
 from dim.decision import ORDERS
 from dim.humans.drivers import Drivers
 from scenarios import four_way
-from scenarios.scenario import FAIR, PAPER, Scenario
+from scenarios.profiles import FAIR, PAPER
+from scenarios.scenario import Scenario
 from scenarios.strategies import demands, intersections
 from tests.builders import replayed, share
 

@@ -23,7 +23,8 @@ from scenarios import five_way, four_way
 from scenarios.cli import main
 from scenarios.library import MAKERS
 from scenarios.paper import Cell, controller_of, replay
-from scenarios.scenario import AS_RUN, FAIR, Scenario
+from scenarios.profiles import AS_RUN, FAIR
+from scenarios.scenario import Scenario
 from tests.builders import Fixed, as_run, replayed
 
 

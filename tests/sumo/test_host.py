@@ -46,7 +46,8 @@ from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.cli import main
-from scenarios.scenario import FAIR, Scenario
+from scenarios.profiles import FAIR
+from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
 from tests.builders import Fixed, Scripted, replayed, share

@@ -15,7 +15,7 @@ from minisim.sumo import simulate
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.paper import Cell, controller_of, replay
-from scenarios.scenario import AS_RUN_SIGNALS, FAIR
+from scenarios.profiles import AS_RUN_SIGNALS, FAIR
 from tests.builders import reference_value
 
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=VehicleType(model="krauss"))

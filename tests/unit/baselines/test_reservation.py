@@ -17,7 +17,7 @@ from minisim.errors import InputError
 from minisim.junction.partings import branch
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
-from scenarios.scenario import Profile
+from scenarios.profiles import Profile
 from tests.builders import replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")

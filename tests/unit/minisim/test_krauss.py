@@ -19,7 +19,8 @@ from minisim.control import Open, Plan, Unregulated
 from minisim.errors import InputError
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.scenario import AS_RUN_SIGNALS, FAIR, Profile, Scenario
+from scenarios.profiles import AS_RUN_SIGNALS, FAIR, Profile
+from scenarios.scenario import Scenario
 from tests.builders import Fixed, replayed
 
 #: SUMO's passenger car under Krauß's law.

@@ -36,7 +36,7 @@ from minisim.results.summary import TRIP_COLUMNS
 from minisim.simulation import Simulation
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
-from scenarios.scenario import Profile
+from scenarios.profiles import Profile
 from tests.builders import Fixed, Scripted, digest, replayed
 
 STRAIGHT = (0.0, 0, 2)

@@ -20,7 +20,8 @@ from scenarios.library import (
     scenario_named,
     three_way,
 )
-from scenarios.scenario import FAIR, Scenario
+from scenarios.profiles import FAIR
+from scenarios.scenario import Scenario
 from tests import ROOT
 
 

@@ -28,8 +28,8 @@ from scenarios.paper import (
     replay,
     scenario,
 )
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from tests.builders import reference_value
 
 #: Means of SUMO 1.18 on the same arrivals: waiting and travel [s]. Where no vehicle was teleported

@@ -11,7 +11,8 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.vehicle import VehicleType
-from scenarios.scenario import FAIR, PAPER, PROFILES, Profile, Scenario, profile_named
+from scenarios.profiles import FAIR, PAPER, PROFILES, Profile, profile_named
+from scenarios.scenario import Scenario
 
 FOUR = Intersection((0.0, 90.0, 180.0, 270.0))
 DEMAND = Demand(density=350.0)

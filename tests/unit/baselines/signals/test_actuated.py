@@ -14,7 +14,7 @@ from minisim.control import Observed, View
 from minisim.errors import InputError
 from minisim.testing import small_scenario
 from scenarios.library import four_way
-from scenarios.scenario import AS_RUN_SIGNALS
+from scenarios.profiles import AS_RUN_SIGNALS
 from tests.builders import drive, seen
 
 SITE = four_way(profile="fair").site()

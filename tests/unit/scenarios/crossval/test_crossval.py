@@ -52,8 +52,8 @@ from scenarios.crossval.comparison import (
 )
 from scenarios.crossval.report import markdown, summary, table
 from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals
-from scenarios.scenario import AS_RUN, AS_RUN_SIGNALS
 from scenarios.statistics import ks_distance, mean_interval
 from tests.builders import reference_value
 
