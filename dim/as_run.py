@@ -21,8 +21,10 @@ what was intended and what was a slip, so each difference is a quirk with a name
 8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then. A
    vehicle that loses it in the yellow zone is told 20 m/s for one step before it is held (the
    authors set 20 first, and 10 at the end of their loop for those that still have it);
-9. *lanes first*: of the maximal cliques, the one whose sorted movements come first in the
-   alphabet wins, whatever its size (`order="size"` is the rule that the paper describes).
+9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
+   alphabet wins, whatever its size (`order="size"` is the rule that the paper describes);
+10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
+    error at that vehicle, and nothing is decided in it.
 
 All numbers are those of the authors' driver. Everything happens at the end of a step and takes
 effect in the next.
@@ -32,7 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, takewhile
 from typing import Any, NamedTuple
 
 import networkx as nx
@@ -161,6 +163,12 @@ class AsRunRules:
         self._serve(visited, cars, speeds)
         busy = self._visit(visited, speeds)
         busy |= self._green(cars, speeds)
+        lost = next((v for v in self.serving if v not in cars), None)
+        if lost is not None:
+            self.serving.remove(lost)
+            self.action = [v for v in self.action if v != lost]
+            self.chosen = tuple(v for v in self.chosen if v != lost)
+            return speeds
         if not busy:
             # For each movement only the last entry counts.
             holder = {cars[vehicle].movement: vehicle for vehicle in self.action}
@@ -174,13 +182,11 @@ class AsRunRules:
             if car.id not in self.serving and self.red_start <= car.driven < self.yellow_start:
                 self.serving.append(car.id)
                 speeds[car.id] = RED_SPEED
-        self.serving = [v for v in self.serving if v in cars and cars[v].driven <= CLEAR]
+        self.serving = [v for v in self.serving if v not in cars or cars[v].driven <= CLEAR]
 
     def _visit(self, visited: list[Car], speeds: dict[int, float]) -> bool:
         """Yellow zone and beyond, vehicle by vehicle; return whether the junction is busy."""
         busy = False
-        present = {car.id for car in visited}
-        self.action = [v for v in self.action if v in present]
         for car in visited:
             if self.yellow_start <= car.driven <= self.bound:
                 if car.id not in self.chosen:
@@ -197,8 +203,9 @@ class AsRunRules:
         return busy
 
     def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
-        """Green zone: participants go regardless; return whether there are any."""
-        there = [v for v in self.serving if cars[v].driven >= self.green_start]
+        """Green zone: participants go regardless; whether there is one."""
+        known = takewhile(cars.__contains__, self.serving)
+        there = [v for v in known if cars[v].driven >= self.green_start]
         going = [v for v in there if v in self.action]
         speeds.update(dict.fromkeys(going, GREEN_SPEED))
         return bool(going)
@@ -249,6 +256,7 @@ class AsRunSession:
         rules = self.rules
         before = [*rules.action], rules.chosen
         cars = {vehicle.id: self._car(vehicle) for vehicle in view.vehicles}
+        lost = any(vehicle not in cars for vehicle in rules.serving)
         speeds = rules.step(cars)
         speeds.update((v, rules.exit_speed) for v, car in cars.items() if car.driven >= FOLLOWED)
         told = {v: speed for v, speed in speeds.items() if v in cars}
@@ -256,7 +264,7 @@ class AsRunSession:
             Advise(v, speed) for v, speed in told.items() if self._desired.get(v) != speed
         ]
         self._desired = {v: speed for v, speed in self._desired.items() if v in cars} | told
-        if before != (rules.action, rules.chosen):
+        if lost or before != (rules.action, rules.chosen):
             commands.append(Wake(view.time + self._dt))
         return commands
 

@@ -29,7 +29,11 @@ MODELS = ("poisson", "exponential", "shifted")
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
 #: Words for equal shares of the lanes and of the manoeuvres.
 BALANCED, UNIFORM = "balanced", "uniform"
-#: More than any lane can carry: a higher density is a typo.
+#: May follow in a table: the drivers' factors on the speed limit.
+FACTORS = "speed_factor"
+#: Of a driver; SUMO cuts its speedFactor to the same range.
+LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
+#: More than any lane can carry: a higher density is a typing error.
 MAX_DENSITY = 3600.0
 #: The forms in which callers may give shares.
 Shares = Sequence[float] | str | None
@@ -47,19 +51,26 @@ class Arrivals:
     time: Floats  # demand time [s]
     lane: Ints  # index of the approach lane
     manoeuvre: Ints  # 1 … n−1
+    speed_factor: Floats | None = None  # drivers' factors on the speed limit; None: they are drawn
 
     def __post_init__(self) -> None:
         time = _column("demand_time_s", self.time, np.float64)
         lane = _column("lane", self.lane, np.int64)
         manoeuvre = _column("manoeuvre", self.manoeuvre, np.int64)
-        if not len(time) == len(lane) == len(manoeuvre):
+        columns = {"time": time, "lane": lane, "manoeuvre": manoeuvre}
+        if self.speed_factor is not None:
+            factors = _column("speed_factor", self.speed_factor, np.float64)
+            if len(factors) and not LEAST_FACTOR <= factors.min() <= factors.max() <= MOST_FACTOR:
+                raise InputError(f"a speed_factor must be {LEAST_FACTOR:g} … {MOST_FACTOR:g}")
+            columns["speed_factor"] = factors
+        if any(len(column) != len(time) for column in columns.values()):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if len(time) and (not np.isfinite(time).all() or time.min() < 0):
             raise InputError("demand times must be finite and not negative")
         if len(time) and time.max() > MAX_TIME:
             raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
         order = np.lexsort((lane, time))
-        for name, column in (("time", time), ("lane", lane), ("manoeuvre", manoeuvre)):
+        for name, column in columns.items():
             column = column[order]
             column.setflags(write=False)
             object.__setattr__(self, name, column)
@@ -189,6 +200,8 @@ class Demand:
 def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:
     """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
 
+    A column `speed_factor` may be there too.
+
     Raises:
         FileError: unreadable, a missing column, a broken line (named by its number), or a lane
             or manoeuvre that does not exist with n arms.
@@ -196,6 +209,7 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
     instance("arrivals file", path, (str, os.PathLike))
     if n is not None:
         integer("number of arms", n, low=3, high=len(ARM_NAMES))
+    factors = []
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
@@ -206,12 +220,19 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
                     f"{path}: column {', '.join(wrong)} missing or twice; "
                     f"needed once each: {', '.join(COLUMNS)}"
                 )
-            rows = [_parse_row(path, reader.line_num, row, n) for row in reader]
+            rows = []
+            for row in reader:
+                rows.append(_parse_row(path, reader.line_num, row, n))
+                if FACTORS in header:
+                    factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
     except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"cannot read arrivals from {path}: {reason}") from error
     time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
-    return Arrivals(np.array(time, float), np.array(lane, int), np.array(manoeuvre, int))
+    return Arrivals(
+        np.array(time, float), np.array(lane, int), np.array(manoeuvre, int),
+        np.array(factors, float) if FACTORS in header else None,
+    )  # fmt: skip
 
 
 def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
@@ -254,6 +275,16 @@ def _parse_row(
             f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {show(manoeuvre_text)}"
         ) from None
     return time, lanes.index(lane_text), manoeuvre
+
+
+def _parse_factor(path: str | os.PathLike[str], line: int, text: str | None) -> float:
+    try:
+        return number(FACTORS, float(text or ""), low=LEAST_FACTOR, high=MOST_FACTOR)
+    except ValueError:
+        raise FileError(
+            f"{path}, line {line}: {FACTORS} must be a number {LEAST_FACTOR:g} … {MOST_FACTOR:g}, "
+            f"got {show(text)}"
+        ) from None
 
 
 def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, ...]:

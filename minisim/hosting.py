@@ -41,6 +41,9 @@ from minisim.results.run import Run, ScenarioLike
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
+#: What may happen at a collision where SUMO or its cruise control drives.
+REACTIONS = (*ON_COLLISION, "teleport")
+
 #: What a scenario must have.
 NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",

@@ -34,10 +34,11 @@ from minisim.engine.state import (
     first_tick,
     time_of,
 )
-from minisim.errors import number
-from minisim.hosting import AFTERMATH, Alarm, Hosted, begin
+from minisim.errors import InputError, number
+from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
+from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.
 _as_observed: Callable[[Iterable[float]], Observed] = partial(tuple.__new__, Observed)
@@ -53,6 +54,8 @@ class Simulation:
         record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
         record_window: start and end of the recording [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
+            "teleport", for a `CruiseVehicle` only, also does what SUMO did in the published runs:
+            a vehicle that comes closer than `min_gap` to the one ahead on its exit has arrived.
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -69,10 +72,13 @@ class Simulation:
         on_collision: str = "stop",
     ) -> None:
         self._hosted = hosted = begin(
-            scenario, controller, seed,
-            record=record, record_window=record_window, on_collision=on_collision,
+            scenario, controller, seed, record=record, record_window=record_window,
+            on_collision=on_collision, reactions=REACTIONS,
         )  # fmt: skip
         self.site, plan = hosted.site, hosted.plan
+        teleports = on_collision == "teleport"
+        if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
+            raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
         self._road = build_road(self.site, plan)
         self._law = build_law(
             self.site,
@@ -82,7 +88,7 @@ class Simulation:
             record_window=hosted.record_window,
         )
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
-        self._motion = kernel.build_motion(self.site, self._vehicles)
+        self._motion = kernel.build_motion(self.site, self._vehicles, teleports)
         self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()

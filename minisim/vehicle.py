@@ -164,6 +164,14 @@ class CruiseVehicle(VehicleType):
         default=250.0, above=0, high=10_000,
     )  # fmt: skip
     headway: float = real("the ACC's time headway", "s", default=1.5, low=0.5, high=10)
+    max_speed: float = real(
+        "none is faster before or inside the junction, whatever is desired (maxSpeed)", "m/s",
+        default=55.55, above=0, high=100,
+    )  # fmt: skip
+    sumo: str = word(
+        "the version of SUMO whose radar it has; that of the published runs saw more",
+        ("1.18", "1.28"), default="1.18", label="SUMO version of a CruiseVehicle",
+    )  # fmt: skip
     model: str = word(
         MODELS["cc"].meaning, ("cc",), default="cc", label="car-following model of a CruiseVehicle"
     )

@@ -16,10 +16,18 @@ from baselines import Actuated, Adaptive, FixedTime
 from dim import AsRunDim
 from minisim.control import Controller
 from minisim.errors import InputError, choice, integer
+from minisim.vehicle import CruiseVehicle
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS, Profile
-from scenarios.published import PUBLISHED_ARMS, RENAMED, RENAMED_ARMS, published_arrivals
+from scenarios.published import (
+    PUBLISHED_ARMS,
+    RENAMED,
+    RENAMED_ARMS,
+    TURNAROUNDS,
+    published_arrivals,
+    published_ways,
+)
 from scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -143,19 +151,34 @@ def replay(
     controller: str = "dim",
     *,
     profile: str | Profile | None = None,
+    sumo: str = "1.18",
 ) -> Scenario:
     """The scenario of a published run, with its own arrivals.
 
-    With `controller_of` the same run and collisions recorded, DIM's trips equal those of SUMO on
-    the same arrivals, vehicle by vehicle. Vehicles of one second and lane are inserted in the order
-    of their manoeuvres, since the records do not say which came first. They also lack the drivers'
-    speed factors in the signals' runs, and vehicles that were still on the road at the end.
+    With the controller of `controller_of` and `on_collision="teleport"`, the trips of DIM equal
+    those of SUMO 1.18 on the same arrivals, vehicle by vehicle. The records lack the vehicles that
+    were still on the road at the end of a published run.
+
+    `sumo` is the version of SUMO to compare with. The published runs were made with 1.18. The
+    installed host is 1.28; its radar sees less, and it builds no turnarounds.
 
     Raises:
-        InputError: no such cell, or an unknown profile.
+        InputError: no such cell, or an unknown profile or version.
     """
-    drawn = scenario(split, density, arms, controller, profile=profile)
-    return replace(drawn, recorded=published_arrivals(split, density, arms, controller))
+    made = replace(
+        scenario(split, density, arms, controller, profile=profile),
+        recorded=published_arrivals(split, density, arms, controller),
+    )
+    vehicle, junction = made.profile.vehicle, made.intersection
+    if not isinstance(vehicle, CruiseVehicle) or junction.ways is None:
+        return made
+    signals = controller == "fts"  # its network has none
+    turnarounds = "" if sumo != "1.18" or signals or arms != 4 else TURNAROUNDS[split]
+    return replace(
+        made,
+        intersection=replace(junction, ways=published_ways(arms, turnarounds)),
+        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo)),
+    )
 
 
 def controller_of(

@@ -41,10 +41,10 @@ PAPER = Profile(
 FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
-#: (length 4, minGap 2, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel` is misspelt,
-#: so SUMO's default of 1.5 applies), headway 1.5 s, inserted at rest, speed limits ignored, step
-#: 0.01 s. `deceleration` is the strongest braking that the cruise control itself asks for.
-#: Controllers and hold lines use it; the authors' DIM has no hold lines.
+#: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel`
+#: is a slip of the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed
+#: limits ignored, step 0.01 s, in SUMO 1.18. `deceleration` is for controllers and hold lines,
+#: which the authors' DIM has none of: the strongest braking that the cruise control asks for.
 AS_RUN = Profile(
     name="as_run",
     vehicle=CruiseVehicle(
@@ -54,19 +54,18 @@ AS_RUN = Profile(
         deceleration=1.5,
         max_deceleration=1000.0,
         cruise_acceleration=4.0,
+        max_speed=20.0,
     ),
     speed_limit=14.0,
     depart_speed=0.0,
     dt=0.01,
 )
 
-#: How the published numbers arose for both signals at balanced inflow, and for the adaptive signal
-#: also at 4:1:4:1. The vehicle follows SUMO's Krauss model without its random part, tau 1
-#: (`carFollowModel` is not given), accel 50, decel 1000, length 4, minGap 2. Speed factors are
-#: N(1, 0.1), SUMO's default (0.80 … 1.24 in the published trips). Vehicles are inserted at rest on
-#: roads of 14 m/s. The runs had a step of 0.01 s; a step of 0.1 s gives the same waiting time
-#: within 1 % and the same travel time within 0.15 s (fixed-time signal, 150 … 350 veh/h, common
-#: seeds).
+#: How the published numbers of the two signals arose where the inflow was balanced, and those of
+#: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
+#: is not given), accel 50, decel 1000, length 4, minGap 2; drivers' speed factors N(1, 0.1), which
+#: SUMO gives whoever has none (0.80 … 1.24 in the published trips); inserted at rest on roads of
+#: 14 m/s, with steps of 0.01 s.
 AS_RUN_SIGNALS = Profile(
     name="as_run_signals",
     vehicle=VehicleType(
@@ -80,6 +79,7 @@ AS_RUN_SIGNALS = Profile(
     ),
     speed_limit=14.0,
     depart_speed=0.0,
+    dt=0.01,
 )
 
 #: The profiles of the published runs; they use the junctions in the authors' networks.

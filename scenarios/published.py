@@ -10,7 +10,7 @@ import numpy as np
 
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Way
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
@@ -22,23 +22,44 @@ RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 PUBLISHED_ARMS = (3, 4, 5)
 
 
+#: Arms at whose far end the road leads back, in the authors' networks of 4 arms, by split.
+TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
+
+
 @lru_cache
-def published_ways(arms: int) -> tuple[Way, ...]:
+def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
+
+    Args:
+        arms: how many.
+        turnarounds: arms at whose far end the road leads back; None is as in the networks of the
+            authors.
 
     Raises:
         InputError: another number of arms.
     """
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
     file = resources.files("scenarios") / "data" / "ways" / f"{arms}way.csv"
+    if turnarounds is None:
+        turnarounds = TURNAROUNDS["balanced"] if arms == 4 else ""
     with file.open(encoding="utf-8") as text:
-        return tuple(_way(row) for row in csv.DictReader(text))
+        rows = list(csv.DictReader(text))
+    exits = movements_of(arms).exits.tolist()  # the rows are in their order
+    return tuple(
+        _way(row, ARM_NAMES[exit_arm] in turnarounds)
+        for row, exit_arm in zip(rows, exits, strict=True)
+    )
 
 
-def _way(row: dict[str, str]) -> Way:
+def _way(row: dict[str, str], turns_back: bool) -> Way:
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
-    return Way(points, float(row["length_m"]), float(row["wait_m"]))
+    return Way(
+        points, float(row["length_m"]), float(row["wait_m"]), speed=float(row["speed_mps"]),
+        major=row["major"] == "1",
+        yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
+        turns_back=turns_back,
+    )  # fmt: skip
 
 
 def published_arrivals(split: str, density: int, arms: int, controller: str = "dim") -> Arrivals:
@@ -56,5 +77,4 @@ def published_arrivals(split: str, density: int, arms: int, controller: str = "d
     if split != RENAMED:
         return arrivals
     lane = np.array([ARM_NAMES.index(letter) for letter in RENAMED_ARMS]).argsort()[arrivals.lane]
-    order = np.lexsort((arrivals.manoeuvre, lane, arrivals.time))
-    return Arrivals(arrivals.time[order], lane[order], arrivals.manoeuvre[order])
+    return Arrivals(arrivals.time, lane, arrivals.manoeuvre, arrivals.speed_factor)

@@ -27,9 +27,9 @@ WAITING_SPEED = 0.1
 Motion = cruise.Cruise
 
 
-def build_motion(site: Site, vehicles: Records) -> Motion | None:
-    """The data that the law of these vehicles needs besides `Law`, or None."""
-    return cruise.build_cruise(site, len(vehicles))
+def build_motion(site: Site, vehicles: Records, teleports: bool = False) -> Motion | None:
+    """The data that the law of these vehicles needs beside `Law`, or None."""
+    return cruise.build_cruise(site, len(vehicles), teleports)
 
 
 @njit
@@ -81,7 +81,7 @@ def step(
 ) -> int:
     """Take one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, tick):
+    if insert(vehicles, lanes, road, law, motion, tick):
         reasons |= MARK
     if motion is None:
         overlap = accelerate(vehicles, lanes, road, law)
@@ -90,15 +90,17 @@ def step(
     if overlap:
         reasons |= GAP
     reasons |= move(vehicles, lanes, road, law, tick + 1)
-    if motion is not None:
-        cruise.look(vehicles, lanes, road, motion, tick + 1)
+    if motion is not None and cruise.look(vehicles, lanes, road, law, motion, tick + 1):
+        reasons |= CLEAR
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons
 
 
 @njit
-def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> bool:
+def insert(
+    vehicles: Records, lanes: Records, road: Road, law: Law, motion: Motion | None, tick: int
+) -> bool:
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 
     Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
@@ -110,6 +112,8 @@ def insert(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -
     for lane in range(len(lanes)):
         i = lanes[lane]["next"]
         if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
+            continue
+        if motion is not None and cruise.blocked(vehicles, road, law, motion, lane):
             continue
         s, p = law.length + law.margin, vehicles[i]["path"]
         section = 0

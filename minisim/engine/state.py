@@ -258,7 +258,8 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     vehicles["manoeuvre"] = arrivals.manoeuvre[order]
     vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
-    vehicles["factor"] = _speed_factors(site, len(order))[order]
+    factors = arrivals.speed_factor
+    vehicles["factor"] = (_speed_factors(site, len(order)) if factors is None else factors)[order]
     vehicles["ahead"] = -1
     vehicles["advice"] = np.inf
     vehicles["brake"] = np.inf

@@ -160,7 +160,12 @@ class Intersection:
         return tuple(self._build_path(m) for m in self.movements)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
-        """Speed [m/s] at which the arc requires the lateral acceleration `lateral` [m/s²]."""
+        """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²].
+
+        A given way may have a limit of its own instead.
+        """
+        if self.ways is not None and (speed := self.ways[self.index(movement)].speed):
+            return speed
         return math.sqrt(lateral * self.path(movement).radius)
 
     def _half_angle(self, movement: Movement) -> float:

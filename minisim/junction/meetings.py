@@ -1,105 +1,232 @@
 """Where two ways through a junction meet, as SUMO sees it.
 
-SUMO's vehicles follow not only the vehicle ahead, but also vehicles that are about to join their
-way inside the junction or have just left it. This module gives, for each pair of movements, the
-distance from the place where their ways meet to the end of each way.
-Source: `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.28).
+SUMO's vehicles follow not only the vehicle ahead, but also those inside the junction that are about
+to join their way, have just left it, or cross it. This is the table of those places: for every two
+ways, how far before the end of its own way each of them is when it meets the other.
+Source: `MSRightOfWayJunction::postloadInit`, `MSInternalJunction::postloadInit`,
+`MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.18; 1.28 is the same).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from enum import IntEnum
+from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from minisim.junction.geometry import Intersection
-from minisim.junction.paths import Floats, distances_along
+from minisim.junction.paths import Floats, Path, distances_along
 from minisim.junction.turns import Turn, turns
+
+Bools = npt.NDArray[np.bool_]
 
 #: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
 DIVERGED = 2.5
 
-#: Ways that bend by less than this count as straight [°].
+#: Ways that cross at a smaller angle count as crossing at one of this sine.
+LEAST_SINE = 0.2
+
+#: Ways that bend by less than this are straight [°].
 BENT = math.degrees(1e-4)
 
 
 class Meeting(IntEnum):
-    """How two ways meet."""
+    """How two parts of ways meet."""
 
     NOWHERE = 0
-    JOIN = 1  # they end in the same exit lane
-    PART = 2  # they begin on the same approach lane
+    JOIN = 1  # they end in one exit lane
+    PART = 2  # they begin on one approach lane
+    CROSS = 3
+    WAIT = 4  # the other ends at a waiting position, and has priority
 
 
 def meetings(intersection: Intersection) -> Floats:
-    """How and where each pair of movements meets, shape (m, m, 2).
+    """How and where every two ways meet, part by part, shape (m, 2, m, 2, 4).
 
-    `[p, q]` holds the kind (`Meeting`) and the distance along way p from where it meets way q to
-    the junction exit [m].
+    Part 0 of a way is what lies before its waiting position, if it has one; part 1 is the rest.
+    `[p, i, q, k]` is about part i of way p and part k of way q: the kind (`Meeting`), the distance
+    from where the parts meet to the end of part i, the same for a vehicle that has to stop at the
+    waiting position instead, and the length of way that the crossing takes [m].
     """
-    curves, paths = _curves(intersection), intersection.paths
-    table = np.zeros((len(paths), len(paths), 2))
-    for p, q in itertools.permutations(range(len(paths)), 2):
-        (way, end), (other, other_end) = curves[p], curves[q]
-        if paths[p].movement.origin == paths[q].movement.origin:
-            table[p, q] = Meeting.PART, max(way.length - _parted(way, other) * way.scale, 0.0)
-        elif paths[p].exit_arm == paths[q].exit_arm:
-            backwards = [_Curve(curve.points[::-1], curve.length) for curve in (end, other_end)]
-            table[p, q] = Meeting.JOIN, _parted(*backwards) * end.scale
+    ways = [_Curve.of(path, intersection).parts for path in intersection.paths]
+    rights = right_of_way(intersection)
+    table = np.zeros((len(ways), 2, len(ways), 2, 4))
+    for p, q in permutations(range(len(ways)), 2):
+        for (i, part), (k, other) in product(ways[p].items(), ways[q].items()):
+            crossing = _crossing(part, other, intersection.lane_width)
+            kind = _kind(intersection, ways, rights, (p, i), (q, k), crossing is not None)
+            behind, width = crossing or (0.0, 0.0)
+            if kind == Meeting.PART:
+                behind, width = _until_parted(part, other), 0.0
+            elif kind == Meeting.JOIN:
+                behind, width = _from_joined(part, other), 0.0
+            elif kind == Meeting.WAIT and crossing is None:
+                behind, width = _from_joined(part, other), intersection.lane_width
+            stops = kind == Meeting.CROSS and i == 1 and 0 in ways[p]
+            table[p, i, q, k] = kind, behind, part.length if stops else behind, width
     return table
 
 
+class RightOfWay(NamedTuple):
+    """Who meets whom, shape (m, m), and who must give way to whom; False where nobody must.
+
+    Attributes:
+        foes: whether the ways cross or join.
+        yields: whether the first must give way to the second.
+        major: whether the way comes from a road with priority, shape (m,).
+    """
+
+    foes: Bools
+    yields: Bools
+    major: Bools
+
+
+def right_of_way(intersection: Intersection) -> RightOfWay:
+    """As the given ways have it; on arcs nobody must give way, and all that cross or join meet."""
+    names = [str(movement) for movement in intersection.movements]
+    if intersection.ways is not None:
+        ways = intersection.ways
+        foes = np.array([[name in way.foes for name in names] for way in ways])
+        yields = np.array([[name in way.yields for name in names] for way in ways])
+        return RightOfWay(foes, yields, np.array([way.major for way in ways]))
+    paths = intersection.paths
+    lines = [shapely.LineString(path.points) for path in paths]
+    foes = np.array(
+        [
+            [
+                path.movement.origin != rival.movement.origin
+                and (path.exit_arm == rival.exit_arm or bool(line.intersects(other)))
+                for rival, other in zip(paths, lines, strict=True)
+            ]
+            for path, line in zip(paths, lines, strict=True)
+        ]
+    )
+    return RightOfWay(foes, np.zeros_like(foes), np.zeros(len(paths), bool))
+
+
+def _kind(
+    intersection: Intersection,
+    ways: list[dict[int, _Curve]],
+    rights: RightOfWay,
+    one: tuple[int, int],
+    two: tuple[int, int],
+    crosses: bool,
+) -> Meeting:
+    (p, i), (q, k) = one, two
+    path, rival = intersection.paths[p], intersection.paths[q]
+    if path.movement.origin == rival.movement.origin:
+        first_parts = i == min(ways[p]) and k == min(ways[q])
+        return Meeting.PART if first_parts else Meeting.NOWHERE
+    if not rights.foes[p, q] or (0 in ways[p] and 0 in ways[q]):
+        return Meeting.NOWHERE
+    joins = path.exit_arm == rival.exit_arm
+    if k == 0:
+        return Meeting.WAIT if rights.yields[p, q] and (joins or crosses) else Meeting.NOWHERE
+    if joins and i == 1:
+        return Meeting.JOIN
+    return Meeting.CROSS if crosses else Meeting.NOWHERE
+
+
 class _Curve(NamedTuple):
-    """A way or part of one: its polyline and the length that a vehicle drives on it [m].
+    """A way or its second part: polyline, driven length and waiting position [m].
 
     The polyline's own length may differ slightly: SUMO rounds lengths and scales positions.
     """
 
     points: Floats
     length: float
+    wait: float = 0.0
+
+    @classmethod
+    def of(cls, path: Path, intersection: Intersection) -> _Curve:
+        """The given curve where there is one, else the arc."""
+        if intersection.ways is None:
+            return cls(path.points, path.crossing)
+        way = intersection.ways[intersection.index(path.movement)]
+        return cls(np.asarray(way.points, dtype=float), path.crossing, way.wait)
+
+    @property
+    def distances(self) -> Floats:
+        """Of the points along the polyline [m]."""
+        return distances_along(self.points)
+
+    @property
+    def line(self) -> shapely.LineString:
+        """The polyline for shapely."""
+        return shapely.LineString(self.points)
 
     @property
     def scale(self) -> float:
-        """Driven length divided by the polyline's."""
-        return self.length / float(distances_along(self.points)[-1])
+        """Driven length over the polyline's."""
+        return self.length / float(self.distances[-1])
+
+    @property
+    def backwards(self) -> _Curve:
+        """The same from its end."""
+        return self._replace(points=self.points[::-1])
+
+    @property
+    def parts(self) -> dict[int, _Curve]:
+        """The part before the waiting position, a point of the polyline, and the one behind it."""
+        if self.wait == 0.0:
+            return {1: self}
+        k = int(np.argmin(np.abs(self.distances - self.wait)))
+        before, behind = self.points[: k + 1], self.points[k:]
+        return {0: _Curve(before, self.wait), 1: _Curve(behind, self.length - self.wait)}
+
+    def direction(self, at: float) -> float:
+        """Of the polyline after `at` of its own metres [rad]."""
+        k = min(int(np.searchsorted(self.distances, at, side="right")), len(self.points) - 1)
+        dx, dy = self.points[k] - self.points[k - 1]
+        return math.atan2(dy, dx)
 
 
-def _curves(intersection: Intersection) -> list[tuple[_Curve, _Curve]]:
-    """Each way, and the part of it past the waiting position, which is a point of the polyline.
+def _crossing(one: _Curve, two: _Curve, lane_width: float) -> tuple[float, float] | None:
+    """Distance from where a crossing begins to the end of the first curve, and its width [m].
 
-    Only that part can meet a way that joins.
+    The other lane takes more of the way the smaller the angle is; None if they do not cross.
     """
-    if intersection.ways is None:
-        return [(_Curve(path.points, path.crossing),) * 2 for path in intersection.paths]
-    curves = []
-    for path, way in zip(intersection.paths, intersection.ways, strict=True):
-        points = np.asarray(way.points, dtype=float)
-        k = int(np.argmin(np.abs(distances_along(points) - way.wait)))
-        length = path.crossing
-        curves.append((_Curve(points, length), _Curve(points[k:], length - way.wait)))
-    return curves
+    hits = shapely.get_coordinates(shapely.intersection(one.line, two.line))
+    if not len(hits):
+        return None
+    points = shapely.points(hits)
+    at = float(np.max(shapely.line_locate_point(one.line, points)))
+    other = float(np.max(shapely.line_locate_point(two.line, points)))
+    sine = abs(math.sin(one.direction(at) - two.direction(other)))
+    width = min(lane_width * (2.0 / max(sine, LEAST_SINE) - 1.0), one.length)
+    return one.length - max(at - width / 2.0, 0.0) * one.scale, width
+
+
+def _until_parted(one: _Curve, two: _Curve) -> float:
+    return max(one.length - _parted(one, two) * one.scale, 0.0)
+
+
+def _from_joined(one: _Curve, two: _Curve) -> float:
+    if math.dist(one.points[-1], two.points[-1]) >= DIVERGED:
+        return 0.0
+    return _parted(one.backwards, two.backwards) * one.scale
 
 
 def _parted(one: _Curve, two: _Curve) -> float:
-    """Distance along two curves from their common start to where they part [m]."""
-    ends = [float(distances_along(curve.points)[-1]) for curve in (one, two)]
-    return min(max(_until_apart(one, two), _until_apart(two, one)), *ends)
+    """Distance along two curves with one beginning to where both are `DIVERGED` [m]."""
+    near = max(_until_apart(one, two), _until_apart(two, one))
+    return min(near, float(one.distances[-1]), float(two.distances[-1]))
 
 
 def _until_apart(curve: _Curve, other: _Curve) -> float:
-    """Distance along a curve beyond which it stays `DIVERGED` from the other [m]."""
-    line = shapely.LineString(other.points)
-    gaps = np.asarray(shapely.distance(shapely.points(curve.points), line))
-    at = distances_along(curve.points)
+    """Distance along the curve to where it stays `DIVERGED` from the other [m]."""
+    gaps = np.asarray(shapely.distance(shapely.points(curve.points), other.line))
+    at = curve.distances
+    rounding = curve.length - float(at[-1])
     k = int(np.flatnonzero(gaps <= DIVERGED)[-1])
     if k == len(at) - 1:
         return curve.length
     share = (DIVERGED - gaps[k]) / (gaps[k + 1] - gaps[k])
-    return float(at[k] + share * (at[k + 1] - at[k])) + (curve.length - float(at[-1]))
+    return float(at[k] + share * (at[k + 1] - at[k])) + rounding
 
 
 def sagittas(intersection: Intersection, length: float) -> Floats:
@@ -113,6 +240,6 @@ def sagittas(intersection: Intersection, length: float) -> Floats:
     for p, turn in enumerate(turns(intersection, BENT)):
         if turn is Turn.FAR:
             path = intersection.paths[p]
-            radius = path.crossing / abs(path.turn)
+            radius = float(_Curve.of(path, intersection).distances[-1]) / abs(path.turn)
             result[p] = radius - math.sqrt(max(radius * radius - chord * chord / 4.0, 0.0))
     return result

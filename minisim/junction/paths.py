@@ -1,6 +1,6 @@
 """Paths through a junction, and bodies on them.
 
-`s` is the distance of a vehicle's front bumper from the start of its road, along its path [m].
+`s` is how far a vehicle's front bumper has come on its path [m], from the start of its road.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from minisim.vehicle import VehicleType
 
 Floats = npt.NDArray[np.float64]
 
-#: Segments of an arc's polyline; the chord error at radius 5.6 m is 4 mm.
+#: Segments of the polyline of an arc; the chord error at radius 5.6 m is 4 mm.
 ARC_SEGMENTS = 32
 
 
@@ -30,6 +30,11 @@ class Way(NamedTuple):
     length: float  #: how far a vehicle drives on it [m]; simulators round it
     #: Distance from the entry to the waiting position that SUMO gives some far turns [m], or 0.
     wait: float = 0.0
+    speed: float = 0.0  #: limit on it [m/s]; 0 where it follows from the radius, as on an arc
+    major: bool = False  #: whether the road that it comes from has priority
+    yields: tuple[str, ...] = ()  #: movements to which it must give way, such as "b2"
+    foes: tuple[str, ...] = ()  #: movements that it crosses or joins, as SUMO has them
+    turns_back: bool = False  #: whether the road that it leaves by leads back at its far end
 
     def resampled(self, count: int) -> Floats:
         """`count` equally spaced points along it, shape (count, 2)."""
@@ -40,7 +45,7 @@ class Way(NamedTuple):
 
 
 def distances_along(points: Floats) -> Floats:
-    """Distance of each point along a polyline from its start [m], shape (points,)."""
+    """How far along a polyline each of its points is [m], shape (points,)."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -66,12 +71,12 @@ class Path:
 
     @property
     def turn(self) -> float:
-        """Angle by which it turns in the junction [rad], positive to the left, in (−π, π]."""
+        """By how much it turns in the junction [rad], positive to the left, in (−π, π]."""
         (ax, ay), (bx, by) = self.heading_in.tolist(), self.heading_out.tolist()
         return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
     def position(self, s: npt.ArrayLike) -> Floats:
-        """x, y [m] at `s`, shape (..., 2); goes straight on beyond both ends. See also `locate`."""
+        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See `locate` too."""
         s = np.asarray(s, dtype=float)
         step = self.crossing / ARC_SEGMENTS
         t = np.clip((s - self.entry) / step, 0.0, ARC_SEGMENTS)
@@ -85,10 +90,11 @@ class Path:
     def pose(self, s: npt.ArrayLike, length: float) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
-        The body is the chord between its bumpers, both of whose middles lie on the path.
+        Both bumpers' middles lie on the path, so the body is the chord between them.
         """
         front = self.position(s)
-        along = front - self.position(np.asarray(s, dtype=float) - length)
+        rear = self.position(np.asarray(s, dtype=float) - length)
+        along = front - rear
         heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
         return front - heading * (length / 2.0), heading
 

@@ -23,7 +23,7 @@ from minisim.engine.kernel import build_motion
 from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
 from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
-from minisim.hosting import AFTERMATH, ON_COLLISION, Hosted, begin
+from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
 from minisim.results.run import Run, ScenarioLike
 from minisim.sumo.files import CONFIGURATION, FCD, read_trips, write_configuration, write_routes
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
@@ -34,10 +34,7 @@ from minisim.vehicle import VehicleType
 #: SUMO's car-following models that a run may use.
 MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
 
-#: How a run may react to a collision.
-REACTIONS = (*ON_COLLISION, "teleport")
-
-#: File for what the child writes to stderr.
+#: What the child writes on stderr.
 STDERR = "stderr.txt"
 
 INSTALL = "pip install 'minisim[sumo]'"

@@ -161,13 +161,13 @@ class Worker:
         if self._tick < self._job.horizon:
             for name in sumo.simulation.getDepartedIDList():
                 self._depart(self._cars[name])
+        passed = False
         for name in sumo.simulation.getArrivedIDList():
-            self._arrive(self._cars[name])
+            passed |= self._arrive(self._cars[name])
         for car in self._glances.pop(self._tick, ()):
             if car.present:
                 self._glance(car)
                 self._turn_to(car)
-        passed = False
         for name, values in sumo.vehicle.getAllSubscriptionResults().items():
             travelled = values[distance]
             if travelled >= 0.0:  # not while SUMO teleports it
@@ -184,12 +184,15 @@ class Worker:
         self._steering.depart(car)
         self._turn_to(car)
 
-    def _arrive(self, car: Car) -> None:
+    def _arrive(self, car: Car) -> bool:
+        """It has; returns whether SUMO took it off the road before it had left the junction."""
         self._arrived += 1
         self._travel(car, self._end[car.path])
         car.present = False
-        if not car.cleared:
-            self._lanes[car.lane].remove(car)
+        if car.cleared:
+            return False
+        self._lanes[car.lane].remove(car)
+        return True
 
     def _turn_to(self, car: Car) -> None:
         """Watch a vehicle from now on, or arrange the next glance at it."""

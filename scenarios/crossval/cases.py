@@ -40,6 +40,9 @@ TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 #: the order of vehicles that arrived in the same second matters more.
 TRAVEL_350: Final = 3.0
 
+#: The version of SUMO that is the other host, among those that minisim can drive like.
+HOST_VERSION: Final = "1.28"
+
 
 @declared
 class Case:
@@ -136,7 +139,11 @@ def replayed_cases(
     arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]
     ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
     cases = [
-        Case(replace(replay(*cell, profile=profile), horizon=horizon), ran[cell.controller], cell)
+        Case(
+            replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
+            ran[cell.controller],
+            cell,
+        )
         for cell in (*GRID, *BASELINE_GRID)
         if cell.controller in ran
         and cell.arms in (arms or MAKERS)

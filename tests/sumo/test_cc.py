@@ -27,7 +27,14 @@ from scenarios.profiles import AS_RUN, FAIR
 from scenarios.scenario import Scenario
 from tests.builders import Fixed, as_run, replayed
 
-AS_RUN_FOUR = four_way(profile="as_run")
+
+def hosted(scenario: Scenario) -> Scenario:
+    """With the vehicle of the SUMO that is installed, not of the published runs."""
+    vehicle = replace(AS_RUN.vehicle, sumo="1.28")
+    return replace(scenario, profile=replace(AS_RUN, vehicle=vehicle))
+
+
+AS_RUN_FOUR = hosted(four_way(profile="as_run"))
 
 
 def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Run]:
@@ -103,7 +110,7 @@ SHARES = [
     ids=str,
 )
 def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: float) -> None:
-    ours, theirs = both(until(replay(*cell), horizon), controller_of(*cell))
+    ours, theirs = both(until(replay(*cell, sumo="1.28"), horizon), controller_of(*cell))
     a, b = ours.columns, theirs.columns
     ended = a.arrived & b.arrived
     assert ended.sum() > 10
@@ -126,7 +133,7 @@ def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: C
 
 
 def test_the_same_replay_gives_the_same_trips_twice() -> None:
-    scenario = until(replay("balanced", 150, 4), 100.0)
+    scenario = until(replay("balanced", 150, 4, sumo="1.28"), 100.0)
     first, second = (
         simulate(scenario, AsRunDim(), on_collision="record", record=kind)
         for kind in (None, "junction")
@@ -172,7 +179,7 @@ def test_teleporting_is_sumos_default(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_teleport_takes_a_vehicle_that_runs_into_another_off_the_road() -> None:
     """4:3:2:1 at 350: in SUMO 1.28 b2 of 2606 s runs into a3 of 2611 s, at 2649.93 s."""
-    scenario = until(replay("4:3:2:1", 350, 4), 2660.0)
+    scenario = until(replay("4:3:2:1", 350, 4, sumo="1.28"), 2660.0)
     run = simulate(scenario, AsRunDim(), on_collision="teleport")
     (collision,) = run.collisions
     assert collision.time == pytest.approx(2649.93)
@@ -231,7 +238,7 @@ def test_sumo_looks_for_collisions_between_foes_only(
     pair: tuple[tuple[int, int], ...], controller: Controller, sumo_sees: int
 ) -> None:
     """Why minisim counts more touches in the published run of 5 arms at 350 veh/h."""
-    five = five_way(profile="as_run")
+    five = hosted(five_way(profile="as_run"))
     scenario = replayed(five, *((0.0, *movement) for movement in pair), horizon=70.0)
     ours, theirs = both(scenario, controller, record="all")
     assert len(ours.collisions) == 1

@@ -362,3 +362,16 @@ def test_a_column_twice_and_wrong_types_are_refused(tmp_path: Path) -> None:
         write_arrivals(None, tmp_path / "x.csv")
     with pytest.raises(InputError, match="number of arms"):
         read_arrivals(path, "x")
+
+
+def test_a_table_may_tell_the_drivers_speed_factors(tmp_path: Path) -> None:
+    table = tmp_path / "factors.csv"
+    table.write_text("demand_time_s,lane,manoeuvre,speed_factor\n2,b,1,0.9\n1,a,2,1.1\n")
+    factors = read_arrivals(table).speed_factor
+    assert factors is not None
+    assert factors.tolist() == [1.1, 0.9]  # in order of demand
+    table.write_text("demand_time_s,lane,manoeuvre,speed_factor\n2,b,1,3\n")
+    with pytest.raises(FileError, match=r"line 2: speed_factor must be a number 0.2 … 2, got '3'"):
+        read_arrivals(table)
+    with pytest.raises(InputError, match=r"speed_factor must be 0.2 … 2"):
+        Arrivals(np.zeros(1), np.zeros(1, int), np.ones(1, int), np.array([0.1]))

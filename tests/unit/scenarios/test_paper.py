@@ -32,19 +32,39 @@ from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
 from tests.builders import reference_value
 
-#: Means of SUMO 1.28 (CC model, same arrivals in the same order, step 0.01 s): wait and travel [s].
-#: Up to 300 veh/h and on 3 arms from a driver written for this comparison, others from our host.
+#: Means of SUMO 1.18 on the same arrivals: waiting and travel [s]. Where no vehicle was teleported
+#: they are the published ones, to the last digit.
 SUMO = {
-    Cell("balanced", 150, 4): (0.7589, 65.9877),
-    Cell("balanced", 200, 4): (1.2420, 67.6987),
-    Cell("balanced", 250, 4): (1.4782, 68.4513),
-    Cell("balanced", 300, 4): (1.9918, 70.3453),
-    Cell("balanced", 150, 3): (0.3006, 64.7428),
-    Cell("balanced", 350, 3): (1.1222, 68.1589),
-    Cell("balanced", 350, 4): (4.0452, 80.9100),
-    Cell("4:3:2:1", 350, 4): (4.2089, 79.1332),
-    Cell("4:1:4:1", 350, 4): (4.8362, 80.6999),
+    Cell("balanced", 150, 3): (0.3113, 64.7888),
+    Cell("balanced", 200, 3): (0.4536, 65.1907),
+    Cell("balanced", 250, 3): (0.5359, 65.5841),
+    Cell("balanced", 300, 3): (0.9524, 67.2984),
+    Cell("balanced", 350, 3): (1.0447, 67.8727),
+    Cell("balanced", 150, 4): (0.7084, 65.9427),
+    Cell("balanced", 200, 4): (1.3676, 68.0629),
+    Cell("balanced", 250, 4): (1.5513, 68.8290),
+    Cell("balanced", 300, 4): (2.2580, 71.3836),
+    Cell("balanced", 350, 4): (3.9578, 80.3505),
+    Cell("balanced", 150, 5): (0.9820, 66.5304),
+    Cell("balanced", 200, 5): (1.8261, 69.2819),
+    Cell("balanced", 250, 5): (3.9285, 76.3352),
+    Cell("balanced", 300, 5): (10.2468, 98.2507),
+    Cell("balanced", 350, 5): (25.5077, 153.6784),
+    Cell("4:1:4:1", 150, 4): (0.5097, 65.6543),
+    Cell("4:1:4:1", 200, 4): (1.0816, 67.6040),
+    Cell("4:1:4:1", 250, 4): (1.5082, 69.1067),
+    Cell("4:1:4:1", 300, 4): (2.1333, 71.3460),
+    Cell("4:1:4:1", 350, 4): (4.3662, 80.7408),
+    Cell("4:3:2:1", 150, 4): (0.6656, 65.9373),
+    Cell("4:3:2:1", 200, 4): (1.0305, 67.2343),
+    Cell("4:3:2:1", 250, 4): (1.4195, 68.5731),
+    Cell("4:3:2:1", 300, 4): (2.0152, 71.0457),
+    Cell("4:3:2:1", 350, 4): (4.5474, 79.5909),
 }
+
+#: The one run that parts from SUMO's: an approach lane of the 3-arm network is 1 cm longer than its
+#: siblings, from 1120 s on that decides who goes first.
+PARTS = Cell("balanced", 350, 3)
 
 
 # --- the grid --------------------------------------------------------------------------------
@@ -207,9 +227,11 @@ def test_phases_come_in_the_given_order() -> None:
 
 def means(cell: Cell, seed: int = 0) -> tuple[float, float]:
     """Wait and travel time [s] of a replay."""
+    cruises = replay(*cell).profile.name == AS_RUN.name
     summary = minisim.simulate(
-        replay(*cell), controller_of(*cell), seed, on_collision="record"
-    ).summary()
+        replay(*cell), controller_of(*cell), seed,
+        on_collision="teleport" if cruises else "record",
+    ).summary()  # fmt: skip
     assert cell.controller == "dim" or summary["collisions"] == 0
     return summary["waiting_time_s"], summary["travel_time_s"]
 
@@ -222,25 +244,19 @@ def published(cell: Cell, rel: float, travel: float) -> tuple[object, object]:
     )
 
 
+QUICK = [Cell("balanced", 150, 3), Cell("balanced", 150, 4), Cell("4:1:4:1", 350, 4)]
+
+
 @pytest.mark.parametrize(
-    "cell", [Cell("balanced", 150, 3), Cell("balanced", 150, 4), Cell("4:1:4:1", 150, 4)], ids=str
+    "cell",
+    [cell if cell in QUICK else pytest.param(cell, marks=pytest.mark.slow) for cell in SUMO],
+    ids=str,
 )
-def test_replays_of_dim_meet_the_published_means_and_sumo(cell: Cell) -> None:
-    """Wait within 10 %, travel within 0.5 s (as_run.md)."""
+def test_replays_of_dim_are_those_of_sumo_1_18_and_meet_the_published_means(cell: Cell) -> None:
+    """Wait within 10 %, travel within 0.5 s (as_run.md); far closer in fact."""
     ours = means(cell)
-    assert ours == published(cell, rel=0.10, travel=0.5)
-    if cell in SUMO:
-        wait, travel = SUMO[cell]
-        assert ours == (
-            pytest.approx(wait, abs=1e-4),
-            pytest.approx(travel, abs=5e-4),  # a step in a trip of ten
-        )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cell", list(SUMO), ids=str)
-def test_replays_of_dim_equal_sumo(cell: Cell) -> None:
-    assert means(cell) == pytest.approx(SUMO[cell], abs=2e-3)
+    assert ours == published(cell, rel=0.02, travel=0.06)
+    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 1e-4)
 
 
 @pytest.mark.parametrize("density", [150, 200, 250, 300, 350])

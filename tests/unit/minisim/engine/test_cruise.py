@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import minisim
+from baselines import V2ICAsRun
+from minisim.arrivals import Arrivals
 from minisim.carfollowing import (
     cruise_control,
     distance_control,
@@ -28,10 +31,16 @@ from minisim.junction.geometry import Intersection
 from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import AS_RUN, Scenario, four_way
 from scenarios.library import MAKERS
+from scenarios.paper import controller_of, replay
 from scenarios.published import published_ways
 from tests.builders import Fixed, Scripted, replayed
 
 DT = AS_RUN.dt
+
+
+def arrivals(*rows: tuple[float, int, int]) -> Arrivals:
+    time, lane, manoeuvre = zip(*rows, strict=True)
+    return Arrivals(np.array(time, float), np.array(lane), np.array(manoeuvre))
 
 
 def scenario(*rows: tuple[float, int, int]) -> Scenario:
@@ -191,13 +200,17 @@ def test_a_crossing_vehicle_does_not_slow_an_approaching_one() -> None:
     assert second == pytest.approx(alone, abs=0.0)
 
 
-def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
+def chosen(
+    *cars: tuple[int, int, float, float, float, int], sumo: str = "1.28", arms: int = 4
+) -> list[float]:
     """Accelerations [m/s²] of cars alone on the published 4-arm junction, one step on.
 
     Each is (lane, manoeuvre, s, v, a, tick of entering the junction); all want 10 m/s inside and
     14 m/s before it.
     """
-    what = scenario(*((0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars))
+    profile = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, sumo=sumo))
+    demanded = arrivals(*((0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars))
+    what = replace(MAKERS[arms](profile="as_run", recorded=demanded), profile=profile)
     site = what.site(0)
     plan = Unregulated().start(site).plan
     road = build_road(site, plan)
@@ -206,13 +219,15 @@ def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
     )
     vehicles = build_vehicles(site, what.arrivals(0))
     lanes = build_lanes(site, vehicles, plan.lanes_open)
-    cruise = build_cruise(site, len(vehicles))
+    cruise = build_cruise(site, len(vehicles), teleports=False)
     assert cruise is not None
     rows = []
     for lane, _, s, v, a, entered in cars:
-        row = int(lanes[lane]["first"])
+        row = int(lanes[lane]["next"])
         vehicles["status"][row] = DRIVING
         cruise.memory["entered"][row] = entered
+        if s >= law.entry + cruise.waits[vehicles["path"][row], 0]:
+            cruise.memory["merged"][row] = entered
         for name, value in (("s", s), ("v", v), ("a", a)):
             vehicles[name][row] = value
         lanes["next"][lane] = row + 1
@@ -222,6 +237,7 @@ def chosen(*cars: tuple[int, int, float, float, float, int]) -> list[float]:
         exit_arm = int(road.ends[vehicles["path"][row], 2])
         if s >= road.ends[vehicles["path"][row], 0]:
             cruise.last[exit_arm] = row
+            cruise.memory["left"][row] = 1
         rows.append(row)
     accelerate(vehicles, lanes, road, law, cruise)
     return [float(vehicles["a"][row]) for row in rows]
@@ -252,6 +268,98 @@ def test_a_vehicle_beside_in_the_exit_lane_holds_no_other_back(
     d2 = (3, 2, 505.68493538437724, 7.841895997802385, 0.23176776149717707, 154551)
     c3 = (2, 3, ahead, 10.56398635583315, 3.99, 154482)
     assert chosen(d2, c3)[0] == pytest.approx(acceleration, abs=1e-6)
+
+
+# --- what the radar of SUMO 1.18 sees, and that of 1.28 does not ----------------------------------
+
+
+def asked(v: float, gap: float, v_leader: float, a: float = 0.0) -> float:
+    """Acceleration of the next step behind such a leader [m/s²]."""
+    return engine_lag(a, distance_control(v, gap, v_leader, 1.5, 0.1, 2.0), 0.5, DT)
+
+
+def test_its_radar_sees_a_vehicle_that_only_crosses() -> None:
+    """SUMO 1.18, published arrivals of 4 arms at 150 veh/h, 56.67 s: b3 enters, a2 brakes."""
+    a2 = (0, 2, 458.4373174449642, 14.0, 0.0, 0)
+    b3 = (1, 3, 492.81891454751445, 4.140555090130774, 3.798889819738527, 5667)
+    assert chosen(a2, b3, sumo="1.18")[0] == pytest.approx(-0.12575921087361053, abs=1e-6)
+    assert chosen(a2, b3, sumo="1.28")[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_its_radar_sees_one_from_its_own_lane_that_turns_off_elsewhere() -> None:
+    a1, a3 = (0, 1, 460.0, 14.0, 0.0, 0), (0, 3, 497.5, 5.0, 0.0, 10)
+    # The ways part 4.97 m before the end of that of a1, which is 9.03 m long.
+    gap = (492.8 + 9.03 - 4.967 - 460.0) - 2.0 - (4.064 - (497.5 - 492.8 - 4.0))
+    assert chosen(a3, a1, sumo="1.18")[1] == pytest.approx(asked(14.0, gap, 5.0), abs=1e-3)
+    assert chosen(a3, a1, sumo="1.28")[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_one_before_a_waiting_position_that_has_priority_is_bumper_to_bumper() -> None:
+    """b2 must give way to a3; c2 must not."""
+    a3 = (0, 3, 496.0, 5.0, 0.0, 10)
+    b2, c2 = (1, 2, 460.0, 14.0, 0.0, 0), (2, 2, 460.0, 14.0, 0.0, 0)
+    assert chosen(b2, a3, sumo="1.18")[0] == pytest.approx(asked(14.0, 0.0, 5.0))
+    assert chosen(b2, a3, sumo="1.28")[0] == pytest.approx(0.0, abs=1e-9)
+    assert chosen(c2, a3, sumo="1.18")[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_overlap_with_one_inside_counts_as_bumper_to_bumper() -> None:
+    """d1 and b3 leave by arm a: 1.28 takes the room up to the junction instead."""
+    b3, d1 = (1, 3, 492.6, 10.0, 0.0, 0), (3, 1, 493.0, 5.0, 0.0, 10)
+    assert chosen(b3, d1, sumo="1.18")[0] == pytest.approx(asked(10.0, 0.0, 5.0))
+    assert chosen(b3, d1, sumo="1.28")[0] == pytest.approx(asked(10.0, 0.2, 5.0))
+
+
+def test_inside_the_one_that_must_yield_counts_from_its_waiting_position() -> None:
+    """a3 entered first, but c2, to which it must give way, came before it passed its position."""
+
+    def against(a3_at: float) -> list[float]:
+        return chosen((0, 3, a3_at, 5.0, 0.0, 10), (2, 2, 494.0, 5.0, 0.0, 20), sumo="1.18")
+
+    alone = chosen((0, 3, 496.0, 5.0, 0.0, 10), sumo="1.18")
+    assert against(496.0)[0] < alone[0] - 0.01  # still before it: c2 leads
+    assert against(498.0)[0] == pytest.approx(alone[0], abs=1e-9)
+
+
+# --- the ends of the roads ------------------------------------------------------------------------
+
+
+def departs(leaving: int, back: float) -> float:
+    """Delay of a vehicle demanded on an arm that another leaves by, `back` s before its arrival."""
+    first = (0.0, (leaving + 2) % 4, 2)
+    end = trace(first, until=100.0).columns.arrival[0]
+    when = round(end - back, 2)
+    run = trace(first, (when, leaving, 2), until=when + 3.0)
+    return float(run.columns.depart[run.columns.lane == leaving][0] - when)
+
+
+@pytest.mark.parametrize(
+    ("arm", "back", "delay"),
+    # A vehicle at 14 m/s wants 14 m, and the turnaround of 4.67 m counts.
+    [(1, 0.5, 0.5), (2, 0.5, 0.5), (1, 0.9, 0.0), (0, 0.5, 0.0), (3, 0.5, 0.0)],
+)
+def test_where_the_road_leads_back_one_that_arrives_delays_an_insertion(
+    arm: int, back: float, delay: float
+) -> None:
+    assert departs(arm, back) == pytest.approx(delay)
+
+
+def test_teleport_takes_the_one_off_the_road_that_runs_into_another_on_its_exit() -> None:
+    """SUMO 1.18, published arrivals of 4:3:2:1 at 350 veh/h: b2 of 148 s, at 195.98 s."""
+    what = replace(replay("4:3:2:1", 350, 4), horizon=200.0)
+    run = minisim.simulate(what, controller_of("4:3:2:1", 350, 4), on_collision="teleport")
+    assert run.columns.arrival[72] == pytest.approx(195.98)
+    with pytest.raises(InputError, match="'teleport' goes with a CruiseVehicle"):
+        minisim.simulate(four_way(profile="fair"), Unregulated(), on_collision="teleport")
+
+
+def test_its_top_speed_holds_up_to_the_junctions_exit_only() -> None:
+    """V2I-C tells a1 20 m/s on the approach: 54.30 s; as if it could be faster, 54.28 s."""
+    for top, travel in ((20.0, 54.30), (30.0, 54.28)):
+        vehicle = replace(AS_RUN.vehicle, max_speed=top)
+        what = replace(scenario((4.0, 0, 1)), profile=replace(AS_RUN, vehicle=vehicle))
+        run = minisim.simulate(what, V2ICAsRun())
+        assert run.columns.travel_time[0] == pytest.approx(travel)
 
 
 # --- given ways ----------------------------------------------------------------------------------
