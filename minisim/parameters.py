@@ -242,7 +242,7 @@ def declared(
                 between(self)
 
         if between is not None or not hasattr(kind, "__post_init__"):
-            kind.__post_init__ = check_all  # type: ignore[attr-defined]
+            kind.__post_init__ = check_all  # type: ignore[attr-defined]  # of any class
         about = kind.__doc__ or ""
         made = dataclass(frozen=True, kw_only=kw_only)(kind)
         made.__doc__ = _documented(about, made)

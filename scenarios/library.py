@@ -65,6 +65,7 @@ def _shown(make: _Maker) -> _Maker:
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=defaults[key])
         for key in Options.__annotations__
     ]
+    # mypy does not know that functions take this attribute, which `inspect.signature` reads.
     make.__signature__ = inspect.Signature([*kept, *options])  # type: ignore[attr-defined]
     return make
 

@@ -64,7 +64,7 @@ AS_RUN = Profile(
 #: How the published numbers of the two signals arose where the inflow was balanced, and those of
 #: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
 #: is not given), accel 50, decel 1000, length 4, minGap 2; drivers' speed factors N(1, 0.1), which
-#: SUMO gives whoever has none (0.80 … 1.24 in the published trips); inserted at rest on roads of
+#: SUMO gives by default (0.80 … 1.24 in the published trips); inserted at rest on roads of
 #: 14 m/s, with steps of 0.01 s.
 AS_RUN_SIGNALS = Profile(
     name="as_run_signals",

@@ -58,7 +58,7 @@ class PhaseSession:
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Say how the phase of `lane`, green for `elapsed` seconds so far, goes on."""
-        raise NotImplementedError
+        raise NotImplementedError  # each signal has a rule of its own
 
     def pass_on(self, lane: int) -> Verdict:
         """End the phase of `lane`; the next lane in the order is green next."""

@@ -72,7 +72,7 @@ def meetings(intersection: Intersection) -> Floats:
 
 
 class RightOfWay(NamedTuple):
-    """Who meets whom, shape (m, m), and who must give way to whom; False where nobody must.
+    """Which ways meet, shape (m, m), and which must give way; False where none must.
 
     Attributes:
         foes: whether the ways cross or join.
@@ -86,7 +86,7 @@ class RightOfWay(NamedTuple):
 
 
 def right_of_way(intersection: Intersection) -> RightOfWay:
-    """As the given ways have it; on arcs nobody must give way, and all that cross or join meet."""
+    """From the given ways; on arcs none must give way, and all that cross or join meet."""
     names = [str(movement) for movement in intersection.movements]
     if intersection.ways is not None:
         ways = intersection.ways

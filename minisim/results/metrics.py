@@ -123,7 +123,7 @@ class Metric:
     def _measured(self, subject: Run | Trips) -> Any:
         try:
             return self.of(subject)
-        except Exception as error:
+        except Exception as error:  # a caller's function may raise anything
             error.add_note(f"in metric {self.name!r}")
             raise
 

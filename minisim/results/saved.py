@@ -165,7 +165,7 @@ def written(value: object) -> Any:
     if type(value) is list:
         return [written(item) for item in value]
     if type(value) in (tuple, frozenset):
-        return {type(value).__name__: [written(item) for item in value]}  # type: ignore[attr-defined]
+        return {type(value).__name__: [written(item) for item in value]}  # type: ignore[attr-defined]  # a collection
     if isinstance(value, Mapping):
         return {"mapping": [[written(key), written(item)] for key, item in value.items()]}
     kind = type(value)
