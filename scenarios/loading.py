@@ -1,8 +1,8 @@
-"""A caller's own classes, named `module:Class`, from the working directory or installed.
+"""A caller's own classes and metrics: `module:Name`, from the working directory or installed.
 
 Python may not search the working directory, and a worker process never does. So the directory is
-on the search path while one of its modules is imported, and objects of the module's classes are
-pickled together with their folder.
+on the search path while one of its modules is imported, and objects of the module's classes and
+its metrics are pickled together with their folder.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ import io
 import pickle
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from minisim.errors import InputError, choice
+from minisim.results.metrics import Asked, Metric, listed, metric_of, named_metrics
 
 #: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}
@@ -34,16 +35,59 @@ def load_class(module: str, name: str) -> type:
     """
     file = _file_of(module)
     loaded = _imported(module) if file is None else _from_file(*file)
-    kind = getattr(loaded, name, None)
-    if isinstance(kind, type):
-        return kind
-    classes = [
-        key for key, value in vars(loaded).items()
-        if isinstance(value, type) and not key.startswith("_")
-    ]  # fmt: skip
-    if classes:
-        choice(f"class of {module}", name, classes)
-    raise InputError(f"{module} has no class {name!r}, and no other either")
+    kind: type = _member(loaded, module, name, "class", lambda value: isinstance(value, type))
+    return kind
+
+
+def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
+    """`named_metrics`, of which some may be written `module:name`; raises the same errors.
+
+    The module has a `Metric` or a function of that name (`metric_of`).
+    """
+    return named_metrics(
+        _metric(*it.rsplit(":", 1)) if isinstance(it, str) and ":" in it else it
+        for it in listed(metrics)
+    )
+
+
+def _metric(module: str, name: str) -> Metric:
+    file = _file_of(module)
+    return _own_metric(_imported(module), module, name) if file is None else _of_file(*file, name)
+
+
+def _of_file(folder: str | Path, module: str, name: str) -> Metric:
+    """A metric from a folder, in this process or in another one on the same machine."""
+    metric = _own_metric(_from_file(Path(folder), module), module, name)
+    object.__setattr__(metric, "origin", (str(folder), module, name))  # for `_reduced`
+    return metric
+
+
+def _own_metric(loaded: ModuleType, module: str, name: str) -> Metric:
+    made = _member(
+        loaded, module, name, "metric", lambda value: isinstance(value, Metric | FunctionType)
+    )
+    return made if isinstance(made, Metric) else metric_of(made)
+
+
+def _reduced(metric: Metric) -> Any:
+    origin = getattr(metric, "origin", None)
+    return object.__reduce_ex__(metric, 4) if origin is None else (_of_file, origin)
+
+
+copyreg.pickle(Metric, _reduced)
+
+
+def _member(
+    loaded: ModuleType, module: str, name: str, what: str, fits: Callable[[Any], bool]
+) -> Any:
+    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest one."""
+    value = getattr(loaded, name, None)
+    if fits(value):
+        return value
+    others = [key for key, it in vars(loaded).items() if fits(it) and not key.startswith("_")]
+    if others:
+        choice(f"{what} of {module}", name, others)
+    raise InputError(f"{module} has no {what} {name!r}, and no other either")
 
 
 def _file_of(module: str) -> tuple[Path, str] | None:

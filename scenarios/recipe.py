@@ -15,9 +15,10 @@ from dim import Dim, Mixed
 from minisim.control import Controller
 from minisim.errors import InputError, show
 from minisim.parameters import checked, declared, part, real, text, whole, word
-from minisim.results.metrics import Metric, named_metrics, recording
+from minisim.results.metrics import Metric, recording
 from minisim.results.run import Run
 from scenarios.controllers import check_controller
+from scenarios.loading import metrics_named
 from scenarios.scenario import Scenario
 
 #: What a collision does to a run; "teleport" is for SUMO only.
@@ -51,8 +52,8 @@ class Recipe:
     )  # fmt: skip
     metrics: tuple[str | Metric, ...] = checked(
         "columns besides the usual ones (`minisim.results.metrics`)",
-        lambda _, value: named_metrics(value),
-        "names and Metrics", default=(),
+        lambda _, value: metrics_named(value),
+        "names, module:name and Metrics", default=(),
     )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -6,6 +6,9 @@ trips that ended before the horizon. The complete form is the mean over all dema
 unfinished trip counts with its waiting, loss and travel up to the horizon, and a vehicle that
 never got onto the road counts with its departure delay.
 
+Nothing before the end of the warm-up is measured: trips that were demanded, trajectories and
+counts. Only collisions always count, so that no run hides one.
+
 To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
     def stops(run):
@@ -16,15 +19,18 @@ To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
 from __future__ import annotations
 
+import inspect
 import math
+import traceback
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from minisim.errors import InputError, choice, items, show
-from minisim.parameters import checked, declared, switch, text, word
+from minisim.parameters import checked, declared, parameters, switch, text, word
 from minisim.results.trips import Floats, Trips
 
 if TYPE_CHECKING:
@@ -32,10 +38,21 @@ if TYPE_CHECKING:
 
 #: Keys of summaries and columns of sweeps, which no metric may have as its name.
 RESERVED: Final = frozenset({
-    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "error", "growing",
-    "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre", "movements", "profile",
-    "scenario", "seed", "side", "split", "turns", "vehicle", "version", "warmup_s",
+    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
+    "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
+    "movements", "pairs", "profile", "runs", "scenario", "seed", "side", "split", "too_short",
+    "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
+
+#: What trips can be grouped by -> the groups' key in a summary.
+GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
+
+#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
+SPREAD: Final = ("p50", "p95", "max")
+
+#: How columns begin and end that are made of metrics.
+BEGINNINGS: Final = ("complete_", *(f"{key}_" for key in GROUPS.values()))
+ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
 
 
 def _name(title: str, value: Any) -> Any:
@@ -43,6 +60,11 @@ def _name(title: str, value: Any) -> Any:
         raise InputError(
             f"{title} must be letters, digits and underscores, and no column that runs have, got "
             f"{show(value)}"
+        )
+    if value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
+        raise InputError(
+            f"{title} must not begin with {', '.join(BEGINNINGS)} or end with "
+            f"{', '.join(ENDINGS)}, as columns made of metrics do, got {value!r}"
         )
     return value
 
@@ -57,8 +79,9 @@ def _function(title: str, value: Any) -> Any:
 class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
-    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`. A number that needs
-    only trips is also measured for each lane, movement and kind.
+    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`; neither has the
+    warm-up in it (`Run.counted`). A number that needs only trips is also measured for each lane,
+    movement and kind.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
@@ -124,8 +147,11 @@ class Metric:
         try:
             return self.of(subject)
         except Exception as error:  # a caller's function may raise anything
-            error.add_note(f"in metric {self.name!r}")
-            raise
+            frames = traceback.extract_tb(error.__traceback__)[1:2]
+            place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
+            raise InputError(
+                f"metric {self.name!r} raised {type(error).__name__}: {error}{place}"
+            ) from error
 
 
 def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
@@ -267,18 +293,33 @@ SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajec
 #: Both forms of every mean, as columns of a sweep: over the trips that ended, then over all.
 AVERAGED: Final = (*MEANS, *(f"complete_{name}" for name in MEANS))
 
-#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
-SPREAD: Final = ("p50", "p95", "max")
+#: What stands for a metric: its name, a `Metric`, or a function (`metric_of`).
+Asked = str | Metric | Callable[[Any], Any]
 
 
-def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
+def metric_of(function: Callable[[Any], Any]) -> Metric:
+    """The metric of a function with a name, whose attributes may be fields, such as `unit`."""
+    known = {it.name for it in parameters(Metric)} & vars(function).keys()
+    return Metric(function.__name__, function, **{key: vars(function)[key] for key in known})
+
+
+def listed(metrics: str | Iterable[Asked]) -> list[Asked]:
+    """A sequence of metrics, or a text such as "trips, pets", as a list; else `InputError`."""
+    if isinstance(metrics, str):
+        return [name.strip() for name in metrics.split(",")]
+    return items("metrics", metrics, "names and Metrics")
+
+
+def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
     """The metrics asked for, once each.
 
-    Raises `InputError` for anything but a sequence, and for unknown or clashing names.
+    Raises `InputError` for anything but a sequence or a text, and for unknown or clashing names.
     """
     asked: dict[str, Metric] = {}
-    for metric in items("metrics", metrics, "names and Metrics"):
-        if not isinstance(metric, Metric):
+    for metric in listed(metrics):
+        if inspect.isfunction(metric):
+            metric = metric_of(metric)
+        elif not isinstance(metric, Metric):
             metric = METRICS[choice("metric", metric, METRICS)]
         if METRICS.get(metric.name, metric) is not metric:
             raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
@@ -287,12 +328,12 @@ def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
     return tuple(asked.values())
 
 
-def named_metrics(metrics: Iterable[str | Metric]) -> tuple[str | Metric, ...]:
+def named_metrics(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
     """`asked_metrics` with our own as names, which is how recipes for runs keep them."""
     return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
 
 
-def recording(metrics: Iterable[str | Metric]) -> str | None:
+def recording(metrics: Iterable[Asked]) -> str | None:
     """What a run has to record for these metrics: "junction", or None for nothing."""
     needs = {metric.needs for metric in asked_metrics(metrics)}
     return "junction" if "trajectories" in needs else None

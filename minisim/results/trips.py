@@ -18,12 +18,13 @@ Ints = npt.NDArray[np.int64]
 
 
 class Trips(NamedTuple):
-    """All trips of a run as columns in demand order, shape (k,) each; times in seconds.
+    """Trips of a run as columns in demand order, shape (k,) each; times in seconds.
 
     For a trip that has not ended, `waiting_time`, `travel_time`, `time_loss` and `depart_delay`
-    hold what has accumulated up to `end`. Means are over the trips demanded from `start` on.
+    hold what has accumulated up to `end`. `start` is the end of a warm-up that has been left out.
     """
 
+    vehicle: Ints
     demand_time: Floats
     depart: Floats
     arrival: Floats
@@ -66,6 +67,7 @@ def collect_trips(
     travel = np.where(arrived, arrival, end) - depart
     return Trips(
         end=end,
+        vehicle=rows["id"].astype(np.int64),
         demand_time=demand_time,
         depart=depart,
         arrival=arrival,

@@ -116,7 +116,7 @@ def sweep(
     ):
         rows = _run(experiments, executor, workers, store, out)
     averaged = cells(rows)
-    show(sweep_table(averaged), sweep_notes(rows, averaged, experiments))
+    show(sweep_table(averaged, experiments), sweep_notes(rows, averaged, experiments))
     typer.echo(f"  {len(rows)} runs in {out}")
     if export is not None:
         write_table(rows, export)

@@ -10,8 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import AVERAGED, Metric
-from minisim.results.summary import GROUPS
+from minisim.results.metrics import AVERAGED, BEGINNINGS, Metric
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
 from scenarios.sweep.rows import grows
 
@@ -37,9 +36,6 @@ SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are not metrics.
 OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
-
-#: Prefixes of the columns for groups of trips.
-GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
@@ -72,7 +68,9 @@ def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
     more = [
         column
         for column in rows.columns
-        if column not in known and not column.startswith(GROUPED) and _is_numeric(rows[column])
+        if column not in known
+        and not column.startswith(BEGINNINGS[1:])  # of groups of trips
+        and _is_numeric(rows[column])
     ]
     return (*AVERAGED, *more)
 
