@@ -238,7 +238,7 @@ def test_each_number_is_printed_once(capsys: Captured) -> None:
         assert out.replace("with unfinished", "").count(word) == 1, word
     assert "crossings – (counted only where perception errs)" in out
     noisy = "dim:perception=noisy(unsignalled=(0.29,0.25))"
-    out = ok(capsys, "run", "four-way", *SHORT, "--metrics", "crossings", "-c", noisy)
+    out = ok(capsys, "run", "four-way", "--horizon", "60", "--metrics", "crossings", "-c", noisy)
     assert out.count("crossings") == 1
 
 
@@ -280,7 +280,7 @@ def test_metrics_of_ones_own(
     assert printed["twice"] == 2 * printed["trips"]
     assert "delay [s]" in ok(capsys, *run, "own_metrics:delay")
     said = fails(capsys, *run, "own_metrics:broken")
-    assert "metric 'broken' raised KeyError: 'dely' (own_metrics.py, line 13)" in said
+    assert "metric 'broken' raised KeyError: 'dely' (own_metrics.py, line 14)" in said
     assert "unknown metric of own_metrics 'dealy'" in fails(capsys, *run, "own_metrics:dealy")
     (tmp_path / "e.toml").write_text(
         'horizon = 60\nseeds = 2\nmetrics = ["own_metrics:delay", "own_metrics:twice"]\n'
