@@ -33,54 +33,43 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    file = _file_of(module)
-    loaded = _imported(module) if file is None else _from_file(*file)
-    kind: type = _member(loaded, module, name, "class", lambda value: isinstance(value, type))
+    kind: type = _member(*_place(module), name, "class", lambda value: isinstance(value, type))
     return kind
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
-    """`named_metrics`, of which some may be written `module:name`; raises the same errors.
+    """`named_metrics`, some of which may be `module:name`, a `Metric` or function of a caller's.
 
-    The module has a `Metric` or a function of that name (`metric_of`).
+    Raises `InputError` as `named_metrics` and `load_class` do.
     """
     return named_metrics(
-        _metric(*it.rsplit(":", 1)) if isinstance(it, str) and ":" in it else it
+        _metric(*_place(it.rpartition(":")[0]), it.rpartition(":")[2])
+        if isinstance(it, str) and ":" in it
+        else it
         for it in listed(metrics)
     )
 
 
-def _metric(module: str, name: str) -> Metric:
-    file = _file_of(module)
-    return _own_metric(_imported(module), module, name) if file is None else _of_file(*file, name)
-
-
-def _of_file(folder: str | Path, module: str, name: str) -> Metric:
-    """A metric from a folder, in this process or in another one on the same machine."""
-    metric = _own_metric(_from_file(Path(folder), module), module, name)
-    object.__setattr__(metric, "origin", (str(folder), module, name))  # for `_reduced`
+def _metric(folder: str, module: str, name: str) -> Metric:
+    """A metric by its place, in this process or in another one on the same machine."""
+    fits = Metric, FunctionType
+    made = _member(folder, module, name, "metric", lambda value: isinstance(value, fits))
+    metric: Metric = made if isinstance(made, Metric) else metric_of(made)
+    object.__setattr__(metric, "place", (folder, module, name))
     return metric
 
 
-def _own_metric(loaded: ModuleType, module: str, name: str) -> Metric:
-    made = _member(
-        loaded, module, name, "metric", lambda value: isinstance(value, Metric | FunctionType)
-    )
-    return made if isinstance(made, Metric) else metric_of(made)
-
-
 def _reduced(metric: Metric) -> Any:
-    origin = getattr(metric, "origin", None)
-    return object.__reduce_ex__(metric, 4) if origin is None else (_of_file, origin)
+    place = getattr(metric, "place", None)
+    return object.__reduce_ex__(metric, 4) if place is None else (_metric, place)
 
 
 copyreg.pickle(Metric, _reduced)
 
 
-def _member(
-    loaded: ModuleType, module: str, name: str, what: str, fits: Callable[[Any], bool]
-) -> Any:
+def _member(folder: str, module: str, name: str, what: str, fits: Callable[[Any], bool]) -> Any:
     """What a module calls `name`, if it fits; otherwise `InputError` with the nearest one."""
+    loaded = _from_file(Path(folder), module) if folder else _imported(module)
     value = getattr(loaded, name, None)
     if fits(value):
         return value
@@ -90,14 +79,14 @@ def _member(
     raise InputError(f"{module} has no {what} {name!r}, and no other either")
 
 
-def _file_of(module: str) -> tuple[Path, str] | None:
-    """The folder and the module's name within it; None for an installed module."""
+def _place(module: str) -> tuple[str, str]:
+    """The folder of a module or of the path of its file, "" if installed, and its name."""
     if module.endswith(".py"):
         path = Path(module)
         if not path.is_file():
             raise InputError(f"cannot read {module}: no such file")
-        return path.absolute().parent, path.stem
-    return (Path.cwd(), module) if _source(Path.cwd(), module).is_file() else None
+        return str(path.absolute().parent), path.stem
+    return str(Path.cwd()) if _source(Path.cwd(), module).is_file() else "", module
 
 
 def _imported(module: str) -> ModuleType:

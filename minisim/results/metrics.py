@@ -29,9 +29,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from minisim.errors import InputError, choice, items, show
+from minisim.errors import InputError, MinisimError, choice, items, show
 from minisim.parameters import checked, declared, parameters, switch, text, word
-from minisim.results.trips import Floats, Trips
+from minisim.results.trips import Floats, Trips, queue_growth
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
@@ -118,8 +118,6 @@ class Metric:
     def values(self, subject: Run | Trips, count: int) -> Floats:
         """One value per trip, shape (count,), NaN where there is none; otherwise `InputError`."""
         given = self._measured(subject)
-        if METRICS.get(self.name) is self:
-            return given  # type: ignore[no-any-return]  # ours are tested; each summary asks
         values = np.asarray(given)
         if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
             raise InputError(
@@ -149,30 +147,10 @@ class Metric:
         except Exception as error:  # a caller's function may raise anything
             frames = traceback.extract_tb(error.__traceback__)[1:2]
             place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
-            raise InputError(
-                f"metric {self.name!r} raised {type(error).__name__}: {error}{place}"
-            ) from error
-
-
-def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
-    """How many more vehicles were present in the last quarter of a run than in the second.
-
-    A vehicle is present from demand to arrival, so queues before the road count too. The numbers
-    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
-    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
-    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
-    the quarters divide the time after it.
-    """
-    length = (end - start) / 4.0
-    if length <= 0.0:  # the run was stopped during its warm-up
-        return 0.0
-
-    def present(quarter: int) -> float:
-        first = start + length * quarter
-        time = np.minimum(leave, first + length) - np.maximum(demand_time, first)
-        return float(np.maximum(time, 0.0).sum()) / length
-
-    return present(3) - present(1)
+            told = f" raised {type(error).__name__}: {error}{place}"
+            if isinstance(error, MinisimError):
+                told = f": {error}"
+            raise InputError(f"metric {self.name!r}{told}") from error
 
 
 def _growth(trips: Trips) -> float:
@@ -289,9 +267,6 @@ MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
 
 #: Names of the metrics of `minisim.results.safety`.
 SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajectories")
-
-#: Both forms of every mean, as columns of a sweep: over the trips that ended, then over all.
-AVERAGED: Final = (*MEANS, *(f"complete_{name}" for name in MEANS))
 
 #: What stands for a metric: its name, a `Metric`, or a function (`metric_of`).
 Asked = str | Metric | Callable[[Any], Any]

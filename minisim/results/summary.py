@@ -79,7 +79,6 @@ def summarise(
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
-    _check_recorded(run, asked)
     table = (*USUAL, *(metric for metric in asked if not metric.usual))
     measured = _Measured(run, table, asked)
     top = measured.of(np.arange(len(run.columns.lane)))
@@ -160,12 +159,3 @@ def _groups(run: Run, key: str) -> dict[str, Ints]:
         kinds, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
         names = kinds.tolist()
     return {name: (group == k).nonzero()[0] for k, name in enumerate(names)}
-
-
-def _check_recorded(run: Run, asked: Iterable[Metric]) -> None:
-    for metric in asked:
-        if metric.needs == "trajectories" and run.record is None:
-            raise InputError(
-                f"metric {metric.name!r} needs trajectories: simulate with record='junction' or "
-                "record='all'"
-            )

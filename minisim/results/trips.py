@@ -81,3 +81,24 @@ def collect_trips(
         departed=departed,
         arrived=arrived,
     )
+
+
+def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
+    """How many more vehicles were present in the last quarter of a run than in the second.
+
+    A vehicle is present from demand to arrival, so queues before the road count too. The numbers
+    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
+    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
+    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
+    the quarters divide the time after it.
+    """
+    length = (end - start) / 4.0
+    if length <= 0.0:  # the run was stopped during its warm-up
+        return 0.0
+
+    def present(quarter: int) -> float:
+        first = start + length * quarter
+        time = np.minimum(leave, first + length) - np.maximum(demand_time, first)
+        return float(np.maximum(time, 0.0).sum()) / length
+
+    return present(3) - present(1)

@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import AVERAGED, BEGINNINGS, Metric
+from minisim.results.metrics import BEGINNINGS, Metric
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
 from scenarios.sweep.rows import grows
 
@@ -62,17 +62,16 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
+def averaged(rows: pd.DataFrame) -> list[str]:
     """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
-    known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
-    more = [
+    known = {*CELL, *SUMS, *OTHERS, "host"}
+    return [
         column
         for column in rows.columns
         if column not in known
         and not column.startswith(BEGINNINGS[1:])  # of groups of trips
         and _is_numeric(rows[column])
     ]
-    return (*AVERAGED, *more)
 
 
 def _is_numeric(column: pd.Series[Any]) -> bool:

@@ -170,7 +170,7 @@ def test_a_count_of_the_controller_hides_no_metric(run: Run) -> None:
 def test_safety_needs_trajectories() -> None:
     run = minisim.simulate(small_scenario(demand_time=20.0), Dim())
     assert not set(SAFETY) & set(run.summary())
-    with pytest.raises(InputError, match="'min_pet_s' needs trajectories: simulate with record="):
+    with pytest.raises(InputError, match="metric 'min_pet_s': no trajectories: simulate with rec"):
         run.summary(["min_pet_s"])
     assert recording(["trips"]) is None
     assert recording(["trips", "min_pet_s"]) == "junction"
