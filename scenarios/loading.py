@@ -20,7 +20,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import Asked, Metric, listed, metric_of, named_metrics
+from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}
@@ -38,16 +38,19 @@ def load_class(module: str, name: str) -> type:
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
-    """`named_metrics`, some of which may be `module:name`, a `Metric` or function of a caller's.
+    """The metrics asked for, ours by name; `module:name` is a caller's `Metric` or function.
 
-    Raises `InputError` as `named_metrics` and `load_class` do.
+    Raises `InputError` as `asked_metrics` and `load_class` do.
     """
-    return named_metrics(
-        _metric(*_place(it.rpartition(":")[0]), it.rpartition(":")[2])
-        if isinstance(it, str) and ":" in it
-        else it
-        for it in listed(metrics)
-    )
+    asked = asked_metrics(_loaded(it) for it in listed(metrics))
+    return tuple(it.name if it.name in METRICS else it for it in asked)
+
+
+def _loaded(metric: Asked) -> Asked:
+    if not isinstance(metric, str) or ":" not in metric:
+        return metric
+    module, _, name = metric.rpartition(":")
+    return _metric(*_place(module), name)
 
 
 def _metric(folder: str, module: str, name: str) -> Metric:

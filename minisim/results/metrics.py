@@ -56,16 +56,10 @@ ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
 
 
 def _name(title: str, value: Any) -> Any:
-    if not isinstance(value, str) or not value.isidentifier() or value in RESERVED:
-        raise InputError(
-            f"{title} must be letters, digits and underscores, and no column that runs have, got "
-            f"{show(value)}"
-        )
-    if value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
-        raise InputError(
-            f"{title} must not begin with {', '.join(BEGINNINGS)} or end with "
-            f"{', '.join(ENDINGS)}, as columns made of metrics do, got {value!r}"
-        )
+    if not isinstance(value, str) or not value.isidentifier():
+        raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
+    if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
+        raise InputError(f"{title} must be none that columns of runs have, got {value!r}")
     return value
 
 
@@ -147,10 +141,10 @@ class Metric:
         except Exception as error:  # a caller's function may raise anything
             frames = traceback.extract_tb(error.__traceback__)[1:2]
             place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
-            told = f" raised {type(error).__name__}: {error}{place}"
-            if isinstance(error, MinisimError):
-                told = f": {error}"
-            raise InputError(f"metric {self.name!r}{told}") from error
+            kind = "" if isinstance(error, MinisimError) else f" raised {type(error).__name__}"
+            raise InputError(
+                f"metric {self.name!r}{kind}: {error}{place if kind else ''}"
+            ) from error
 
 
 def _growth(trips: Trips) -> float:
@@ -301,17 +295,6 @@ def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
         if asked.setdefault(metric.name, metric) != metric:
             raise InputError(f"two metrics are called {metric.name!r}")
     return tuple(asked.values())
-
-
-def named_metrics(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
-    """`asked_metrics` with our own as names, which is how recipes for runs keep them."""
-    return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
-
-
-def recording(metrics: Iterable[Asked]) -> str | None:
-    """What a run has to record for these metrics: "junction", or None for nothing."""
-    needs = {metric.needs for metric in asked_metrics(metrics)}
-    return "junction" if "trajectories" in needs else None
 
 
 def heading(column: str) -> str:

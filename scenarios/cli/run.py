@@ -42,7 +42,7 @@ def run(
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
     metrics: Annotated[
-        str | None, option("Measure these; minisim metrics lists them.", "A,B")
+        str | None, option("Of minisim metrics, or mymodule:name.", "A,B")
     ] = None,
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,

@@ -19,17 +19,9 @@ if TYPE_CHECKING:
 
 #: Columns that name a cell.
 CELL: Final = (
-    "scenario",
-    "arms",
-    "side",
-    "profile",
-    "split",
-    "turns",
-    "density",
-    "horizon_s",
-    "warmup_s",
+    "scenario", "arms", "side", "profile", "split", "turns", "density", "horizon_s", "warmup_s",
     "controller",
-)
+)  # fmt: skip
 
 #: Summed over the runs of a cell.
 SUMS: Final = ("trips", "unfinished", "collisions")
