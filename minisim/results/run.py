@@ -170,7 +170,7 @@ class Run:
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
-        """One row per vehicle and step (`TRAJECTORY_COLUMNS`); `InputError` if not recorded."""
+        """One row per vehicle and step, the warm-up's too; `InputError` if not recorded."""
         import pandas as pd
 
         if self.record is None:
