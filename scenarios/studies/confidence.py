@@ -1,4 +1,4 @@
-"""Misread intents, if vehicles believe only readings above some confidence."""
+"""Misread intents when vehicles believe only readings above some confidence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 
 STUDY = Study(
     "confidence",
-    "What does it cost to believe only readings that are sure?",
+    "What does it cost to believe only confident readings?",
     # By lanes, since unknown intents block a junction where the largest clique goes first.
     tuple(
         IntentErrorPoint("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
