@@ -11,7 +11,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +35,10 @@ FACTORS = "speed_factor"
 LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
 #: More than any lane can carry: a higher density is a typing error.
 MAX_DENSITY = 3600.0
+#: More in one second have a chance below 10⁻¹⁶ at any density.
+MOST_IN_A_SECOND = 20
+#: Seconds, and headways of each lane, drawn at once.
+BLOCK, HEADWAYS = 3600, 64
 #: The forms in which callers may give shares.
 Shares = Sequence[float] | str | None
 #: The longest duration and the latest demand time [s].
@@ -77,6 +81,15 @@ class Arrivals:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @cached_property
+    def rank(self) -> Ints:
+        """Each vehicle's place among those of its lane, from 0.
+
+        What a vehicle is by chance, such as a human's, is drawn by lane and rank, so it depends on
+        no other lane and not on the horizon.
+        """
+        return ranks(self.lane)
 
     def check(self, n: int) -> None:
         """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
@@ -164,37 +177,67 @@ class Demand:
     def draw(self, n: int, duration: float, seed: int) -> Arrivals:
         """Draw the arrivals on n lanes over `duration` seconds.
 
+        Each random number belongs to one lane and to one second or vehicle. So a longer duration
+        only adds arrivals, and a lane's arrivals do not depend on the rates of the others.
+
         Manoeuvres are drawn independently. (The authors drew them without replacement within a
         second, which ends the run when more vehicles come than there are manoeuvres; at 350
         veh/h/lane that affects 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
+        rates = np.array(self.rates(n)) / 3600.0
         rng = stream(seed, "arrivals")
-        times = [self._lane_times(rate / 3600.0, duration, rng) for rate in self.rates(n)]
-        lane = np.repeat(np.arange(n), [len(t) for t in times])
-        time = np.concatenate(times)
-        order = np.lexsort((lane, time))
-        manoeuvre = stream(seed, "manoeuvres").choice(np.arange(1, n), size=len(time), p=turns)
-        return Arrivals(time[order], lane[order], manoeuvre)
-
-    def _lane_times(self, rate: float, duration: float, rng: np.random.Generator) -> Floats:
-        """Arrival times on one lane with `rate` veh/s."""
-        if rate == 0.0:
-            return np.empty(0)
         if self.model == "poisson":
-            counts = rng.poisson(rate, size=math.ceil(duration))
-            seconds = np.repeat(np.arange(len(counts), dtype=float), counts)
-            return seconds[seconds < duration]
-        shift = self.min_headway if self.model == "shifted" else 0.0
-        times: list[Floats] = []
-        last = 0.0
-        while last < duration:
-            headways = shift + rng.exponential(1.0 / rate - shift, size=256)
-            times.append(last + np.cumsum(headways))
-            last = float(times[-1][-1])
-        drawn = np.concatenate(times)
-        return drawn[drawn < duration]
+            time, lane = _counted(rates, duration, rng)
+        else:
+            shift = self.min_headway if self.model == "shifted" else 0.0
+            time, lane = _spaced(rates, shift, duration, rng)
+        rank = ranks(lane)
+        draws = stream(seed, "manoeuvres").random((rank.max(initial=-1) + 1, n))
+        bounds = np.cumsum(turns)
+        manoeuvre = (bounds / bounds[-1]).searchsorted(draws[rank, lane], side="right") + 1
+        return Arrivals(time, lane, manoeuvre)
+
+
+def _counted(rates: Floats, duration: float, rng: np.random.Generator) -> tuple[Floats, Ints]:
+    """Times and lanes of Poisson counts of every second, by inversion; `rates` [veh/s], (n,)."""
+    k = np.arange(MOST_IN_A_SECOND)
+    chances = np.exp(-rates)[:, None] * rates[:, None] ** k / np.cumprod(np.maximum(k, 1))
+    at_most = chances.cumsum(axis=1)  # chance of at most k vehicles in a second, (n, k)
+    times: list[Floats] = []
+    lanes: list[Ints] = []
+    for start in range(0, math.ceil(duration), BLOCK):
+        draws = rng.random((min(BLOCK, math.ceil(duration) - start), len(rates)))
+        second, lane = np.nonzero(draws >= at_most[:, 0])
+        counts = (draws[second, lane, None] >= at_most[lane]).sum(axis=1)
+        times.append(np.repeat(start + second, counts).astype(float))
+        lanes.append(np.repeat(lane, counts))
+    return np.concatenate(times), np.concatenate(lanes)
+
+
+def _spaced(
+    rates: Floats, shift: float, duration: float, rng: np.random.Generator
+) -> tuple[Floats, Ints]:
+    """Times and lanes with exponential headways beyond `shift` [s]; `rates` [veh/s], (n,)."""
+    with np.errstate(divide="ignore"):
+        mean = 1.0 / rates - shift  # infinite on a lane where nobody comes
+    blocks = [np.zeros((1, len(rates)))]
+    while blocks[-1][-1].min() < duration:
+        headways = shift + mean * rng.standard_exponential((HEADWAYS, len(rates)))
+        blocks.append(blocks[-1][-1] + headways.cumsum(axis=0))
+    times = np.concatenate(blocks[1:])
+    row, lane = np.nonzero(times < duration)
+    return times[row, lane], lane
+
+
+def ranks(lane: Ints) -> Ints:
+    """Each vehicle's place among those of its lane, from 0, given the lanes in order of demand."""
+    order = np.argsort(lane, kind="stable")
+    ahead = np.searchsorted(lane[order], lane[order])
+    rank = np.empty(len(lane), int)
+    rank[order] = np.arange(len(lane)) - ahead
+    return rank
 
 
 def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:

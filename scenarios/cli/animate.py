@@ -38,9 +38,10 @@ def animate(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
+    horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
 ) -> None:  # fmt: skip
-    """Write an animation: which vehicles wait, have the right of way, and cross."""
+    """Write an animation of a run: which vehicles wait, have the right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
@@ -51,17 +52,18 @@ def animate(
     check_apart({"--arrivals": arrivals, "--out": out})
     animation_format(out)
     check_file(out)
-    number("--start [s]", start, low=0, high=9e6)
-    number("--seconds", seconds, above=0, high=3600)
+    number("--start [s]", start, low=0, below=horizon)
+    number("--seconds", seconds, above=0, high=min(3600.0, horizon - start))
     frame_times(start, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
         scenario, bearings, arrivals, density=density, split=split, turns=turns,
-        profile=profile, side=side, horizon=start + seconds,
+        profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans, on_collision="record"
     )
-    result = recipe.run(simulate, record="all", record_window=(start, start + seconds))
+    end = start + seconds
+    result = recipe.run(simulate, until=end, record="all", record_window=(start, end))
     with bar("drawing") as progress:
         write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=progress)
     typer.echo(f"wrote {out}")

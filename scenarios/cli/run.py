@@ -37,7 +37,7 @@ def run(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
-    horizon: Annotated[float, option("Simulated time; 3600 unless told.", "S")] = 3600.0,
+    horizon: options.Horizon = 3600.0,
     warmup: Annotated[float, option("Earlier trips do not count.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,

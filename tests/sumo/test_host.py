@@ -96,6 +96,17 @@ def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None
     check_controller(controller, arms=(4,), horizon=60.0, host="sumo")
 
 
+def test_what_happens_does_not_depend_on_the_horizon() -> None:
+    profile = replace(FAIR, vehicle=replace(FAIR.vehicle, speed_deviation=0.1))
+    road = four_way(300, profile=profile, arm_length=200.0)
+    short, long = (
+        simulate(replace(road, horizon=t), Mixed(share=0.5), 3).trips for t in (80.0, 110.0)
+    )
+    over = short["arrival_s"] < 80.0
+    assert over.sum() > 5
+    assert short[over].equals(long[: len(short)][over])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_controllers_keep_their_contract_on_other_junctions(controller: Controller) -> None:

@@ -43,6 +43,7 @@ ProfileName = Annotated[
 Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
 Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Of the random arrivals; 0 unless told.", "N", "--seed", "-s")]
+Horizon = Annotated[float, option("Simulated time; 3600 unless told.", "S")]
 Order = Annotated[
     str,
     typer.Option(

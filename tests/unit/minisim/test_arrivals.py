@@ -83,6 +83,41 @@ def test_every_model_has_the_mean_that_was_asked_for(model: str) -> None:
     assert arrivals.rates(4, DAY) == pytest.approx(counts / 24.0)
 
 
+@pytest.mark.parametrize("model", ["poisson", "exponential"])
+def test_counts_have_the_variance_of_poisson_and_lanes_are_independent(model: str) -> None:
+    """Counts of 10 s on 4 lanes over 10 days: variance = mean, no correlation."""
+    arrivals = Demand(density=DENSITY, model=model).draw(4, 10 * DAY, seed=2)
+    size = round(DAY)
+    counts = np.zeros((4, size))
+    np.add.at(counts, (arrivals.lane, (arrivals.time / 10.0).astype(int)), 1.0)
+    # Of the index of dispersion D of n Poisson counts, (n − 1) D is chi-square with n − 1 degrees.
+    dispersion = counts.var(axis=1, ddof=1) / counts.mean(axis=1)
+    assert (np.abs(dispersion - 1.0) < 4.0 * np.sqrt(2.0 / size)).all()
+    between = np.corrcoef(counts) - np.eye(4)
+    within = [np.corrcoef(lane[:-1], lane[1:])[0, 1] for lane in counts]
+    assert max(np.abs(between).max(), np.abs(within).max()) < 4.0 / np.sqrt(size)
+
+
+@pytest.mark.parametrize("model", ["poisson", "exponential"])
+def test_manoeuvres_do_not_depend_on_those_before_nor_on_other_lanes(model: str) -> None:
+    arrivals = Demand(density=DENSITY, model=model).draw(4, 10 * DAY, seed=6)
+    lanes = [arrivals.manoeuvre[arrivals.lane == lane] for lane in range(4)]
+    short = min(map(len, lanes))
+    for one, other in ((lanes[0][:-1], lanes[0][1:]), (lanes[1][:short], lanes[2][:short])):
+        table = np.zeros((3, 3))
+        np.add.at(table, (one - 1, other - 1), 1)
+        assert stats.chi2_contingency(table).pvalue > ALPHA
+
+
+def test_inversion_gives_the_poisson_probabilities() -> None:
+    """At the highest rate, where several come in a second: classes of up to 6."""
+    arrivals = Demand(density=3600.0).draw(3, DAY, seed=8)
+    counts = np.minimum(per_second(arrivals, 1, DAY), 6)
+    expected = stats.poisson.pmf(np.arange(6), 1.0)
+    expected = np.append(expected, 1.0 - expected.sum()) * DAY
+    assert stats.chisquare(np.bincount(counts, minlength=7), expected).pvalue > ALPHA
+
+
 def test_inflow_counts_vehicles_before_the_horizon() -> None:
     """Three vehicles in the first minute are 180 an hour, however many come later."""
     arrivals = Arrivals(

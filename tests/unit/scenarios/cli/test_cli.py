@@ -18,8 +18,10 @@ from PIL import Image
 
 import minisim.simulation
 from dim import HarmonyMatrix
+from minisim.arrivals import write_arrivals
 from minisim.errors import InputError
 from minisim.results.metrics import METRICS, SAFETY
+from minisim.results.run import Run
 from minisim.results.summary import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
@@ -301,6 +303,35 @@ def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
         assert film.n_frames == 10
         assert film.info["duration"] == 200
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("more", [(), ("--arrivals", "{arrivals}"), ("--humans", "0.4")])
+def test_a_film_shows_the_run_of_the_same_options(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    """To the last digit of a trip; the film just ends earlier."""
+    recorded = tmp_path / "arrivals.csv"
+    write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
+    films: list[Run] = []
+    monkeypatch.setattr(
+        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
+    )
+    what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
+    what = (*what, *(() if "--arrivals" in what else ("-d", "300")))
+    for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
+        options = (*what, "-c", controller)
+        ok(capsys, "animate", *options, "-o", str(tmp_path / "x.gif"), "--start", "140")
+        ok(capsys, "run", *options, "--trips", str(tmp_path / "trips.csv"), "--no-safety")
+        film, whole = films.pop().trips, pd.read_csv(tmp_path / "trips.csv")
+        over = film["arrival_s"] <= 200.0
+        assert over.sum() > 20
+        pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
+
+
+def test_a_film_lies_within_the_run(capsys: Captured, tmp_path: Path) -> None:
+    film = ("animate", "four-way", "-o", str(tmp_path / "film.gif"), "--start", "280")
+    assert "--seconds must be" in fails(capsys, *film, "--horizon", "300")
+    assert "--start [s] must be" in fails(capsys, *film, "--horizon", "200")
 
 
 def test_animate_checks_before_it_simulates(
