@@ -6,18 +6,15 @@ vehicles.
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, instance, integer, number, numbers, show
+from minisim.errors import InputError, number, numbers, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
@@ -26,12 +23,9 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 MODELS = ("poisson", "exponential", "shifted")
-COLUMNS = ("demand_time_s", "lane", "manoeuvre")
 #: Words for equal shares of the lanes and of the manoeuvres.
 BALANCED, UNIFORM = "balanced", "uniform"
-#: May follow in a table: the drivers' factors on the speed limit.
-FACTORS = "speed_factor"
-#: Of a driver; SUMO cuts its speedFactor to the same range.
+#: A driver's factor on the speed limit; SUMO cuts its speedFactor to the same range.
 LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
 #: More than any lane can carry: a higher density is a typing error.
 MAX_DENSITY = 3600.0
@@ -90,6 +84,12 @@ class Arrivals:
         no other lane and not on the horizon.
         """
         return ranks(self.lane)
+
+    def between(self, start: float, end: float) -> Arrivals:
+        """The arrivals from `start` [s] to before `end`, with times counted from `start`."""
+        here = slice(*self.time.searchsorted((start, end)))
+        factors = None if self.speed_factor is None else self.speed_factor[here]
+        return Arrivals(self.time[here] - start, self.lane[here], self.manoeuvre[here], factors)
 
     def check(self, n: int) -> None:
         """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
@@ -238,96 +238,6 @@ def ranks(lane: Ints) -> Ints:
     rank = np.empty(len(lane), int)
     rank[order] = np.arange(len(lane)) - ahead
     return rank
-
-
-def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:
-    """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
-
-    A column `speed_factor` may be there too.
-
-    Raises:
-        FileError: unreadable, a missing column, a broken line (named by its number), or a lane
-            or manoeuvre that does not exist with n arms.
-    """
-    instance("arrivals file", path, (str, os.PathLike))
-    if n is not None:
-        integer("number of arms", n, low=3, high=len(ARM_NAMES))
-    factors = []
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header = list(reader.fieldnames or ())
-            wrong = [c for c in COLUMNS if header.count(c) != 1]
-            if wrong:
-                raise FileError(
-                    f"{path}: column {', '.join(wrong)} missing or twice; "
-                    f"needed once each: {', '.join(COLUMNS)}"
-                )
-            rows = []
-            for row in reader:
-                rows.append(_parse_row(path, reader.line_num, row, n))
-                if FACTORS in header:
-                    factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read arrivals from {path}: {reason}") from error
-    time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
-    return Arrivals(
-        np.array(time, float), np.array(lane, int), np.array(manoeuvre, int),
-        np.array(factors, float) if FACTORS in header else None,
-    )  # fmt: skip
-
-
-def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
-    """Write an arrival table in the form that `read_arrivals` reads; raises `FileError`."""
-    instance("arrivals file", path, (str, os.PathLike))
-    instance("arrivals", arrivals, Arrivals)
-    arrivals.check(len(ARM_NAMES))
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
-            writer.writerows(zip(arrivals.time.tolist(), lanes, arrivals.manoeuvre, strict=True))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot write arrivals to {path}: {reason}") from error
-
-
-def _parse_row(
-    path: str | os.PathLike[str], line: int, row: dict[str, str], n: int | None
-) -> tuple[float, int, int]:
-    where = f"{path}, line {line}"
-    texts = [row.get(column) for column in COLUMNS]
-    if None in row or None in texts:
-        raise FileError(f"{where}: expected {len(COLUMNS)} values, {', '.join(COLUMNS)}")
-    time_text, lane_text, manoeuvre_text = (str(t).strip() for t in texts)
-    lanes = ARM_NAMES[: n or len(ARM_NAMES)]
-    try:
-        time = number("demand_time_s", float(time_text), low=0, high=MAX_TIME)
-    except ValueError:
-        raise FileError(
-            f"{where}: demand_time_s must be a number 0 … {MAX_TIME:g}, got {show(time_text)}"
-        ) from None
-    if len(lane_text) != 1 or lane_text not in lanes:
-        raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {show(lane_text)}")
-    try:
-        manoeuvre = integer("manoeuvre", int(manoeuvre_text), low=1, high=len(lanes) - 1)
-    except ValueError:
-        raise FileError(
-            f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {show(manoeuvre_text)}"
-        ) from None
-    return time, lanes.index(lane_text), manoeuvre
-
-
-def _parse_factor(path: str | os.PathLike[str], line: int, text: str | None) -> float:
-    try:
-        return number(FACTORS, float(text or ""), low=LEAST_FACTOR, high=MOST_FACTOR)
-    except ValueError:
-        raise FileError(
-            f"{path}, line {line}: {FACTORS} must be a number {LEAST_FACTOR:g} … {MOST_FACTOR:g}, "
-            f"got {show(text)}"
-        ) from None
 
 
 def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, ...]:

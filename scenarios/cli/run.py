@@ -47,6 +47,7 @@ def run(
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
+    start: options.Start = None,
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
@@ -85,7 +86,7 @@ def run(
             need = "needs" if len(refused) == 1 else "need"
             raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
-        scenario, bearings, arrivals, density=density, split=split, turns=turns,
+        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(

@@ -12,8 +12,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
+from minisim.arrivals import Arrivals, Demand
 from minisim.errors import FileError
+from minisim.recorded import read_arrivals, write_arrivals
 from minisim.streams import stream
 from scenarios.strategies import demands, floats
 
