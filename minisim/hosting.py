@@ -123,8 +123,10 @@ class Hosted:
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
-        session = self.session
-        kinds = map(session.kind, range(len(self.arrivals))) if isinstance(session, Kinds) else ()
+        session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
+        kinds = (
+            map(session.kind, lanes.tolist(), ranks.tolist()) if isinstance(session, Kinds) else ()
+        )
         return Run(
             scenario=self.scenario,
             controller=self.controller,
