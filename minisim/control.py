@@ -271,7 +271,7 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may be one of a summary's own."""
 
 
 @runtime_checkable

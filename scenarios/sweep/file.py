@@ -35,9 +35,9 @@ from typing import Any
 from minisim.errors import FileError, InputError, MinisimError, choice, instance, integer, show
 from minisim.hosting import ON_COLLISION
 from minisim.recorded import read_arrivals
-from minisim.results.metrics import named_metrics
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
+from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
@@ -157,7 +157,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
-    metrics = named_metrics(single.pop("metrics"))
+    metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
         scenario = _scenario({**dict(zip(axes, values, strict=True)), **single}, folder)

@@ -122,7 +122,11 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
     [
         (4, four()[:-1], "12 × 12, got 11 × 12"),
         (4, [row[:-1] for row in four()], "12 × 12, got 12 × 11"),
-        (4, [*four()[:-1], [0, 1]], r"^a harmony matrix must be square, but its rows differ in length$"),
+        (
+            4,
+            [*four()[:-1], [0, 1]],
+            r"^a harmony matrix must be square, but its rows differ in length$",
+        ),
         (4, 1, "12 × 12, got 1"),
         (3, four(), "3 arms is 6 × 6, got 12 × 12"),
         (5, four(), "20 × 20"),
@@ -131,7 +135,11 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
         (4, broken(0, 4, -1.0, mirrored=True), "a1 with b2 is -1"),
         (4, broken(0, 4, 0.5, mirrored=True), "a1 with b2 is 0.5"),
         (4, broken(0, 4, np.nan, mirrored=True), "a1 with b2 is nan"),
-        (4, broken(0, 4, 0.0), "a1 with b2 is 0 but 1 the other way round: the matrix must be symmetric"),
+        (
+            4,
+            broken(0, 4, 0.0),
+            "a1 with b2 is 0 but 1 the other way round: the matrix must be symmetric",
+        ),
         (4, broken(3, 5, 1.0, mirrored=True), "b1 with b3 is 1, but they share a lane"),
         (4, broken(7, 7, 1.0), "c2 with c2 is 1, but they share a lane"),
         (2, [[0, 0], [0, 0]], "number of arms must be an integer 3 … 12, got 2"),

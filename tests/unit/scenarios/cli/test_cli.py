@@ -220,11 +220,10 @@ def test_without_safety_nothing_is_recorded(
 
 def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
-    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--no-safety", "--json"))
+    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--json"))
     assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
     assert len(printed["movements"]) == 12
-    assert printed["max_drac_mps2"] > 0.0, "its trajectories are recorded for it"
-    assert "min_ttc_s" not in printed
+    assert printed["max_drac_mps2"] > 0.0
     out = ok(capsys, "run", "four-way", *SHORT, *asked)
     rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
     means = printed["movements"]["a1"]
@@ -232,6 +231,66 @@ def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     assert rows["a1"][2:] == [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
     for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"):
         assert word in out
+
+
+def test_each_number_is_printed_once(capsys: Captured) -> None:
+    once = ("collisions", "min_ttc_s", "trips", "unfinished", "max_braking_mps2", "crossings")
+    out = ok(capsys, "run", "four-way", *SHORT, "--metrics", ",".join(once))
+    for word in ("collisions", "minimum TTC", "trips", "unfinished", "hardest braking"):
+        assert out.replace("with unfinished", "").count(word) == 1, word
+    assert "crossings – (counted only where perception errs)" in out
+    noisy = "dim:perception=noisy(unsignalled=(0.29,0.25))"
+    out = ok(capsys, "run", "four-way", "--horizon", "60", "--metrics", "crossings", "-c", noisy)
+    assert out.count("crossings") == 1
+
+
+def test_the_warmup_is_named_and_left_out(capsys: Captured, tmp_path: Path) -> None:
+    file = tmp_path / "trips.csv"
+    arguments = ("run", "four-way", *SHORT, "--warmup", "60", "--trips", str(file))
+    assert "seed 0, 240 s (warm-up 60 s)" in ok(capsys, *arguments)
+    trips = pd.read_csv(file)
+    assert trips["demand_time_s"].min() >= 60.0
+    assert trips["vehicle"][0] > 0
+    assert len(trips) == json.loads(ok(capsys, *arguments, "--json"))["trips"]
+
+
+OWN = """
+from minisim.results.metrics import Metric
+
+
+def delay(trips):
+    return trips.depart_delay
+
+
+delay.unit, delay.per, delay.needs = "s", "trip", "trips"
+twice = Metric("twice", lambda run: 2 * len(run.trips))
+
+
+def broken(run):
+    return run.trips["dely"].mean()
+"""
+
+
+def test_metrics_of_ones_own(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own_metrics.py").write_text(OWN, encoding="utf-8")
+    run = ("run", "four-way", *SHORT, "--no-safety", "--metrics")
+    printed = json.loads(ok(capsys, *run, "own_metrics:delay, own_metrics.py:twice", "--json"))
+    assert printed["delay"] == printed["depart_delay_s"]
+    assert printed["twice"] == 2 * printed["trips"]
+    assert "delay [s]" in ok(capsys, *run, "own_metrics:delay")
+    said = fails(capsys, *run, "own_metrics:broken")
+    assert "metric 'broken' raised KeyError: 'dely' (own_metrics.py, line 14)" in said
+    assert "unknown metric of own_metrics 'dealy'" in fails(capsys, *run, "own_metrics:dealy")
+    (tmp_path / "e.toml").write_text(
+        'horizon = 60\nseeds = 2\nmetrics = ["own_metrics:delay", "own_metrics:twice"]\n'
+    )
+    out = ok(capsys, "sweep", "e.toml", "--out", "s.db", "--jobs", "2")
+    for word in ("delay [s]", "p95", "twice"):
+        assert word in out
+    del sys.modules["own_metrics"]
 
 
 def test_metrics_lists_the_table(capsys: Captured) -> None:
@@ -428,6 +487,11 @@ BAD = [
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
     (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
+    (
+        ("run", "four-way", "--metrics", "pets,min_ttc_s", "--no-safety"),
+        "--metrics asks for pets, min_ttc_s, which --no-safety leaves out",
+    ),
+    (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),

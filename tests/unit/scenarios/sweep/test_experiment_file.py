@@ -100,6 +100,9 @@ def test_warmup_and_metrics_hold_for_the_block(tmp_path: Path) -> None:
     (one,) = read(tmp_path, 'seeds = [1]\nwarmup = 600\nmetrics = ["travel_time_s", "min_pet_s"]')
     assert one.scenario == four_way(warmup=600.0)
     assert one.metrics == ("travel_time_s", "min_pet_s")
+    for text in ('"pets"', '"pets, trips"', '["pets", "trips"]'):
+        (one,) = read(tmp_path, f"seeds = [1]\nmetrics = {text}")
+        assert one.metrics == ("pets", "trips")[: 1 + ("trips" in text)]
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -177,7 +180,8 @@ WRONG = [
     ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
     ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
-    ('metrics = "trips"', r"metrics must be a sequence"),
+    ('metrics = "trip"', r"unknown metric 'trip'.*did you mean 'trips'"),
+    ("metrics = 3", r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
