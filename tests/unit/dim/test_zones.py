@@ -76,6 +76,4 @@ def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
     place = site()  # approach lanes of 492.8 m, vehicles of 4 m
     Zones(red=480.7).check(place)
     with pytest.raises(InputError, match=r"leave only 488.8 m .* increase arm_length"):
-        InputError, match=r"489 m long, .* leave only 488.8 m .* increase arm_length"
-    ):
         Zones(red=481).check(place)
