@@ -10,6 +10,7 @@ from __future__ import annotations
 import copyreg
 import importlib
 import io
+import os
 import pickle
 import sys
 import traceback
@@ -37,23 +38,44 @@ def load_class(module: str, name: str) -> type:
     kind = getattr(loaded, name, None)
     if isinstance(kind, type):
         return kind
-    classes = [
-        key for key, value in vars(loaded).items()
-        if isinstance(value, type) and not key.startswith("_")
+    if classes := _controllers(loaded):
+        choice(f"controller of {module}", name, classes)
+    raise InputError(f"{module} has no class {name!r}, and no controller of another name either")
+
+
+def controllers_in(module: str) -> list[str]:
+    """The names of the controllers that a module defines; raises `InputError` as `load_class`."""
+    file = _file_of(module)
+    return _controllers(_imported(module) if file is None else _from_file(*file))
+
+
+def has_source(module: str) -> bool:
+    """Whether this is the path of a file, or a module in the working directory."""
+    return os.path.isfile(module) or os.path.isfile(_source(Path.cwd(), module))
+
+
+def is_maker(kind: type) -> bool:
+    """Whether a class can make controllers, as far as it tells."""
+    return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
+
+
+def _controllers(module: ModuleType) -> list[str]:
+    """Those that the module or its parts define, not what it imports from elsewhere."""
+    return [
+        key for key, value in vars(module).items()
+        if isinstance(value, type) and is_maker(value) and not key.startswith("_")
+        and f"{value.__module__}.".startswith(f"{module.__name__}.")
     ]  # fmt: skip
-    if classes:
-        choice(f"class of {module}", name, classes)
-    raise InputError(f"{module} has no class {name!r}, and no other either")
 
 
 def _file_of(module: str) -> tuple[Path, str] | None:
     """The folder and the module's name within it; None for an installed module."""
     if module.endswith(".py"):
         path = Path(module)
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise InputError(f"cannot read {module}: no such file")
         return path.absolute().parent, path.stem
-    return (Path.cwd(), module) if _source(Path.cwd(), module).is_file() else None
+    return (Path.cwd(), module) if os.path.isfile(_source(Path.cwd(), module)) else None
 
 
 def _imported(module: str) -> ModuleType:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from minisim.errors import InputError
+from minisim.names import spelled
 from minisim.parameters import (
     checked,
     declared,
@@ -16,7 +17,6 @@ from minisim.parameters import (
     part,
     real,
     reals,
-    spelled,
     switch,
     text,
     whole,
@@ -44,7 +44,7 @@ class Bicycle:
 
     gear: str = word("which gear", ("low", "high"), default="low", label="gear name")
     bell: bool = switch("whether it has one", default=True)
-    owner: str = text("who rides it", default="")
+    owner: str = text("who rides it", empty=True, default="")
     load: float | None = real("what it carries", "kg", low=0, optional=True, default=None)
     stops: tuple[float, ...] = reals("where it stops", "m", low=0, default=())
     front: Wheel = part("the front wheel", Wheel, kinds={"small": Wheel}, default=Wheel(0.3))
@@ -68,12 +68,12 @@ def test_a_declared_class_is_a_frozen_dataclass() -> None:
     ("given", "message"),
     [
         ({"gear": "hig"}, "unknown gear name 'hig'; allowed: low, high; did you mean 'high'?"),
-        ({"bell": 1}, "bell must be a bool, got 1"),
-        ({"owner": 3}, "owner must be a str, got 3"),
+        ({"bell": 1}, "bell must be true or false, got 1"),
+        ({"owner": 3}, "owner must be a text, got 3"),
         ({"load": -1}, "load [kg] must be at least 0, got -1"),
         ({"stops": [1, -2]}, "stops [m][1] must be at least 0, got -2.0"),
         ({"stops": 3}, "stops [m] must be a sequence of numbers, got 3"),
-        ({"front": Wheel}, "front must be a Wheel, got <class "),
+        ({"front": Wheel}, "front must be small or a Wheel, got <class "),
         ({"pedals": 3}, "pedals must be even, got 3"),
         ({"gear": "high", "load": 5}, "a loaded bicycle needs the low gear"),
     ],

@@ -31,8 +31,10 @@ def test_it_lists_the_parameters_of_each(capsys: Captured, name: str) -> None:
 
 def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     text = ok(capsys, "controllers", "dim")
-    assert "perception=noisy: " in text
-    assert ok(capsys, "controllers", "dim:gate=harmonious").split()[1:] == text.split()[1:]
+    assert "perception=noisy(…): " in text
+    given = ok(capsys, "controllers", "dim:gate=harmonious,monitor=on(patience=3)")
+    assert "\n  gate=harmonious  (clear | harmonious)" in given
+    assert "\n  patience=3 [s]" in given
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
 
