@@ -260,7 +260,7 @@ def unused_plugins() -> dict[str, str]:
         f"{package_of(plugins()[point.name]) if point.name in plugins() else 'minisim'} has a "
         f"controller of that name"
         for point in entry_points(group="minisim.controllers")
-        if plugins().get(point.name) != point
+        if point.name in CONTROLLERS or plugins()[point.name] != point
     }
 
 

@@ -40,7 +40,7 @@ def load_class(module: str, name: str) -> type:
         return kind
     if classes := _controllers(loaded):
         choice(f"controller of {module}", name, classes)
-    raise InputError(f"{module} has no class {name!r}, and no controller of another name either")
+    raise InputError(f"{module} has no class {name!r}, and no controller either")
 
 
 def controllers_in(module: str) -> list[str]:

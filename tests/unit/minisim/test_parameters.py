@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from minisim.errors import InputError
-from minisim.names import spelled
 from minisim.parameters import (
     checked,
     declared,
@@ -17,6 +16,7 @@ from minisim.parameters import (
     part,
     real,
     reals,
+    refuse_idle,
     switch,
     text,
     whole,
@@ -145,30 +145,35 @@ def test_a_subclass_keeps_the_rules_between_fields() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "name"),
+    ("given", "message"),
     [
-        ({}, "bike"),
-        ({"load": 5.0, "bell": False}, "bike:bell=false,load=5"),
-        ({"bell": True, "pedals": 2}, "bike"),
-        ({"load": 0.1 + 0.2}, "bike:load=0.30000000000000004"),
-        ({"owner": "ann"}, "bike:owner=ann"),
-        ({"owner": "ann b"}, "bike:owner='ann b'"),
-        ({"owner": "None"}, "bike:owner='None'"),
-        ({"owner": "class"}, "bike:owner='class'"),
-        ({"stops": [1]}, "bike:stops=(1,)"),
-        ({"stops": (1, 2.5)}, "bike:stops=(1,2.5)"),
-        ({"front": Wheel(0.3)}, "bike"),
-        ({"front": Wheel(0.5, 20)}, "bike:front=small(radius=0.5,spokes=20)"),
+        ({"radus": 1}, "unknown Wheel parameter 'radus'; allowed: radius, spokes; did you mean"),
+        ({}, "Wheel needs radius"),
     ],
 )
-def test_a_spelling_has_what_differs(given: dict[str, Any], name: str) -> None:
-    assert spelled("bike", Bicycle(**given)) == name
+def test_arguments_that_a_class_does_not_take_are_one_sentence(
+    given: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        Wheel(**given)
+    with pytest.raises(InputError, match="too many positional"):
+        Wheel(1, 3, 3)  # type: ignore[call-arg]
 
 
-def test_a_value_without_a_text_is_a_digest() -> None:
-    class Other(Wheel):
-        """No word for it."""
+def test_values_may_be_written_as_on_command_lines() -> None:
+    written: dict[str, Any] = {
+        "front": "small(radius=0.5,spokes=20)", "bell": "OFF", "load": "none",
+    }  # fmt: skip
+    assert Bicycle(**written) == Bicycle(front=Wheel(0.5, 20), bell=False)
+    table: Any = {"radius": 0.5}
+    assert Bicycle(front=table).front == Wheel(0.5)
+    with pytest.raises(
+        InputError, match=r"front=small needs radius; write front=small\(radius=…\)"
+    ):
+        Bicycle(front="small")  # type: ignore[arg-type]
 
-    first, second = (spelled("bike", Bicycle(front=Other(radius))) for radius in (0.1, 0.2))
-    assert first.startswith("bike:front=Other#")
-    assert first != second == spelled("bike", Bicycle(front=Other(0.2)))
+
+def test_a_parameter_without_effect_is_refused() -> None:
+    refuse_idle(Bicycle(bell=False), "a mirror", "load", "gear")
+    with pytest.raises(InputError, match="load has an effect only with a mirror; leave it out"):
+        refuse_idle(Bicycle(load=3), "a mirror", "load", "gear")
