@@ -33,7 +33,8 @@ from baselines.v2ic import CRAWL
 from minisim.control import Advise, Command, Plan, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
