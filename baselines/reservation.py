@@ -48,7 +48,8 @@ from minisim.control import (
 from minisim.errors import InputError
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 from minisim.vehicle import CruiseVehicle
 
 #: Smaller differences from the prediction do not count [m], [m/s].

@@ -24,6 +24,7 @@ from minisim.control import (
     Site,
     View,
     Wake,
+    as_controller,
 )
 from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, first_tick, time_of
@@ -36,6 +37,7 @@ from minisim.errors import (
     number,
     show,
 )
+from minisim.names import name_of
 from minisim.results.run import Run, ScenarioLike
 
 RECORDS = ("junction", "all")
@@ -113,7 +115,7 @@ class Hosted:
                 _check_command(command, tick, self.site, len(self.arrivals))
         except InputError as error:
             raise ControllerError(
-                f"controller {self.controller.name!r} at {view.time:.1f} s: {error}"
+                f"controller {name_of(self.controller)!r} at {view.time:.1f} s: {error}"
             ) from error
         return commands
 
@@ -122,15 +124,17 @@ class Hosted:
     ) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
         what = "; ".join(map(str, collisions))
-        where = f"scenario {self.scenario.name}, controller {self.controller.name}"
+        where = f"scenario {self.scenario.name}, controller {name_of(self.controller)}"
         return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(collisions), replay)
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
-        session = self.session
+        session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
         counts = dict(session.counts) if isinstance(session, Counting) else {}
         counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
-        kinds = map(session.kind, range(len(self.arrivals))) if isinstance(session, Kinds) else ()
+        kinds = (
+            map(session.kind, lanes.tolist(), ranks.tolist()) if isinstance(session, Kinds) else ()
+        )
         return Run(
             scenario=self.scenario,
             controller=self.controller,
@@ -167,16 +171,18 @@ def begin(
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-    if not isinstance(controller, Controller) or isinstance(controller, type):
-        raise InputError(f"controller must be a Controller such as Dim(), got {show(controller)}")
+    as_controller(show(controller), controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n)
-    session = controller.start(site)
+    try:
+        session = controller.start(site)
+    except InputError as error:
+        raise InputError(f"{name_of(controller)}: {error}") from error
     plan = getattr(session, "plan", None)
     if not isinstance(plan, Plan) or not isinstance(session, Session):
         raise ControllerError(
-            f"controller {controller.name!r}: start() must return a Session with a Plan, "
+            f"controller {name_of(controller)!r}: start() must return a Session with a Plan, "
             f"got {show(session)}"
         )
     return Hosted(

@@ -113,7 +113,7 @@ def from_bearings(
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
-        choice("keyword of a scenario", key, tuple(Options.__annotations__))
+        choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     given["profile"] = profile_named(given.get("profile", "paper"))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}

@@ -11,7 +11,8 @@ import math
 from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5

@@ -9,7 +9,8 @@ from __future__ import annotations
 from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens, on_detector
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0

@@ -46,9 +46,8 @@ class Trips(NamedTuple):
         return self._replace(**columns)
 
     def counted(self, start: float) -> slice:
-        """Indices of the trips demanded from `start` [s] up to the end."""
-        first = int(self.demand_time.searchsorted(start))
-        return slice(first, int(self.demand_time.searchsorted(self.end, "right")))
+        """Indices of the trips demanded from `start` [s] to before the end."""
+        return slice(*self.demand_time.searchsorted((start, self.end)).tolist())
 
 
 #: The columns among the fields of `Trips`.

@@ -37,7 +37,7 @@ def run(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
-    horizon: Annotated[float, option("Simulated time; 3600 unless told.", "S")] = 3600.0,
+    horizon: options.Horizon = 3600.0,
     warmup: Annotated[float, option("Measure nothing before it.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
@@ -47,6 +47,7 @@ def run(
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
+    start: options.Start = None,
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
@@ -87,7 +88,7 @@ def run(
             need = "needs" if len(refused) == 1 else "need"
             raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
-        scenario, bearings, arrivals, density=density, split=split, turns=turns,
+        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(

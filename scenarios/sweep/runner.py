@@ -159,7 +159,8 @@ def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
     its row says why.
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
-        scenario = replace(recipe.scenario, horizon=recipe.scenario.profile.dt, warmup=0.0)
+        dt = recipe.scenario.profile.dt
+        scenario = replace(recipe.scenario, horizon=dt, warmup=0.0, recorded=None)
         try:
             tried = handed(pool, outcome_of, replace(recipe, scenario=scenario))
         except BrokenExecutor:

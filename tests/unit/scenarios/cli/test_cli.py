@@ -19,7 +19,9 @@ from PIL import Image
 import minisim.simulation
 from dim import HarmonyMatrix
 from minisim.errors import InputError
+from minisim.recorded import write_arrivals
 from minisim.results.metrics import METRICS, SAFETY
+from minisim.results.run import Run
 from minisim.results.summary import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
@@ -352,14 +354,59 @@ def test_answers_are_drawn(capsys: Captured, tmp_path: Path, command: str) -> No
         assert file.read_bytes().startswith(magic)
 
 
+def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None:
+    morning = tmp_path / "morning.csv"
+    morning.write_text("demand_time_s,lane,manoeuvre\n25205,a,2\n25207,b,1\n28900,c,3\n")
+    run = ("run", "four-way", "--arrivals", str(morning), "--no-safety", "--json")
+    late = fails(capsys, *run)
+    assert "nobody comes within the horizon of 3600 s: the first recorded arrival is at" in late
+    assert "25205 s (07:00:05)" in late
+    for start, trips in (("07:00", 2), ("25205", 2), ("8:00", 1), ("7:00:06", 1)):
+        assert json.loads(ok(capsys, *run, "--start", start))["trips"] == trips
+    assert "start must be a time of day" in fails(capsys, *run, "--start", "7h")
+    assert "nobody comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
+    film = ("-o", str(tmp_path / "film.gif"))
+    for command in (("run", "four-way"), ("animate", "four-way", *film)):
+        assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
+
+
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
-    ok(capsys, "animate", "four-way", "-o", str(file), "--start", "60", "--seconds", "2",
+    ok(capsys, "animate", "four-way", "-o", str(file), "--from", "60", "--seconds", "2",
        "--fps", "5", "--density", "400")  # fmt: skip
     with Image.open(file) as film:
         assert film.n_frames == 10
         assert film.info["duration"] == 200
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("more", [(), ("--arrivals", "{arrivals}"), ("--humans", "0.4")])
+def test_a_film_shows_the_run_of_the_same_options(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    """To the last digit of a trip; the film just ends earlier."""
+    recorded = tmp_path / "arrivals.csv"
+    write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
+    films: list[Run] = []
+    monkeypatch.setattr(
+        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
+    )
+    what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
+    what = (*what, *(() if "--arrivals" in what else ("-d", "300")))
+    for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
+        options = (*what, "-c", controller)
+        ok(capsys, "animate", *options, "-o", str(tmp_path / "x.gif"), "--from", "140")
+        ok(capsys, "run", *options, "--trips", str(tmp_path / "trips.csv"), "--no-safety")
+        film, whole = films.pop().trips, pd.read_csv(tmp_path / "trips.csv")
+        over = film["arrival_s"] <= 200.0
+        assert over.sum() > 20
+        pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
+
+
+def test_a_film_lies_within_the_run(capsys: Captured, tmp_path: Path) -> None:
+    film = ("animate", "four-way", "-o", str(tmp_path / "film.gif"), "--from", "280")
+    assert "--seconds must be" in fails(capsys, *film, "--horizon", "300")
+    assert "--from [s] must be" in fails(capsys, *film, "--horizon", "200")
 
 
 def test_animate_checks_before_it_simulates(
@@ -371,7 +418,7 @@ def test_animate_checks_before_it_simulates(
     for file, more, said in (
         ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
-        ("f.gif", ("--start", "1e300"), "start"), ("f.gif", ("--seconds", "1e300"), "seconds"),
+        ("f.gif", ("--from", "1e300"), "--from"), ("f.gif", ("--seconds", "1e300"), "seconds"),
     ):  # fmt: skip
         assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
     recorded = tmp_path / "f.gif"
