@@ -7,17 +7,19 @@ vehicles.
 from __future__ import annotations
 
 import csv
+import io
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, instance, integer, number, numbers, show
+from minisim.errors import FileError, InputError, choice, instance, integer, number, numbers, show
+from minisim.files import read_file, write_text
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
@@ -93,7 +95,7 @@ class Arrivals:
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers or as text such as "4:3:2:1"; None if they are equal.
+    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)"; None if equal.
 
     Args:
         name: what messages call them.
@@ -108,8 +110,10 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if isinstance(value, str):
         if value == equal:
             return None
+        text = value.strip()
+        listed = text[1:-1] if text[:1] + text[-1:] in ("()", "[]") else text
         try:
-            value = tuple(map(float, value.split(":")))
+            value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
             raise InputError(
                 f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
@@ -118,6 +122,11 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
         raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
     return shares
+
+
+def shares_text(shares: Shares, equal: str) -> str:
+    """Shares as `read_shares` returns them, as text such as "4:3:2:1" or the word `equal`."""
+    return equal if shares is None else ":".join(f"{float(share):g}" for share in shares)
 
 
 @declared(kw_only=True)
@@ -203,31 +212,22 @@ def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrival
     A column `speed_factor` may be there too.
 
     Raises:
-        FileError: unreadable, a missing column, a broken line (named by its number), or a lane
-            or manoeuvre that does not exist with n arms.
+        FileError: unreadable, a missing or unknown column, a broken line (named by its number), or
+            a lane or manoeuvre that does not exist with n arms.
     """
-    instance("arrivals file", path, (str, os.PathLike))
     if n is not None:
         integer("number of arms", n, low=3, high=len(ARM_NAMES))
-    factors = []
+    data, rows, factors = read_file("arrivals", path), [], []
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header = list(reader.fieldnames or ())
-            wrong = [c for c in COLUMNS if header.count(c) != 1]
-            if wrong:
-                raise FileError(
-                    f"{path}: column {', '.join(wrong)} missing or twice; "
-                    f"needed once each: {', '.join(COLUMNS)}"
-                )
-            rows = []
-            for row in reader:
-                rows.append(_parse_row(path, reader.line_num, row, n))
-                if FACTORS in header:
-                    factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read arrivals from {path}: {reason}") from error
+        reader = csv.DictReader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        header = list(reader.fieldnames or ())
+        _check_header(path, header)
+        for row in reader:
+            rows.append(_parse_row(path, reader.line_num, row, n))
+            if FACTORS in header:
+                factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
+    except (csv.Error, ValueError) as error:
+        raise FileError(f"cannot read arrivals from {path}: {error}") from error
     time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
     return Arrivals(
         np.array(time, float), np.array(lane, int), np.array(manoeuvre, int),
@@ -240,15 +240,31 @@ def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
     instance("arrivals file", path, (str, os.PathLike))
     instance("arrivals", arrivals, Arrivals)
     arrivals.check(len(ARM_NAMES))
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
-            writer.writerows(zip(arrivals.time.tolist(), lanes, arrivals.manoeuvre, strict=True))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot write arrivals to {path}: {reason}") from error
+    lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
+    columns = dict(zip(COLUMNS, (arrivals.time.tolist(), lanes, arrivals.manoeuvre), strict=True))
+    if arrivals.speed_factor is not None:
+        columns[FACTORS] = arrivals.speed_factor.tolist()
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    write_text(path, text.getvalue())
+
+
+def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
+    if len(header) == 1 and (mark := re.search("[;\t|]", header[0])):
+        raise FileError(f"{path}: its columns are separated by {mark[0]!r}; commas are needed")
+    wrong = [column for column in COLUMNS if header.count(column) != 1]
+    if wrong:
+        raise FileError(
+            f"{path}: column {', '.join(wrong)} missing or twice; "
+            f"needed once each: {', '.join(COLUMNS)}"
+        )
+    for column in header:
+        try:
+            choice("column", column, (*COLUMNS, FACTORS))
+        except InputError as error:
+            raise FileError(f"{path}: {error}") from None
 
 
 def _parse_row(

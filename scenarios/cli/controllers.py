@@ -25,7 +25,7 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
-    from scenarios.controllers import CONTROLLERS, maker_of, package_of, plugins
+    from scenarios.controllers import CONTROLLERS, controller_named, maker_of, package_of, plugins
 
     if name is None:
         meanings = {known: _meaning(entry.make) for known, entry in CONTROLLERS.items()}
@@ -39,6 +39,8 @@ def controllers(
             typer.echo(wrapped(f"{known:{width}}{meaning}", width))
         return
     ours = name.partition(":")[0]
+    if ours in CONTROLLERS:
+        controller_named(name)  # refuses wrong parameters
     make = maker_of(ours if ours in CONTROLLERS else name)
     meaning, parameters = _meaning(make), list(_parameters(make))
     if as_json:

@@ -103,7 +103,8 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     in its session, so the whole file counts, but not what it imports.
 
     Raises:
-        InputError: neither a version nor a file, as in an interactive session.
+        InputError: neither a version nor a file, as in an interactive session; or a class without a
+            version that a function has made, perhaps with values that are in no field.
     """
     modules = sorted({
         parent.__module__
@@ -115,6 +116,12 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     version = getattr(kind, "version", None)
     if isinstance(version, str | int):
         return {"version": canonical(version)}
+    if isinstance(kind, type) and "<locals>" in kind.__qualname__:
+        raise InputError(
+            f"{kind.__qualname__} cannot be stored: a function makes this class, and may give it "
+            "values that are in none of its fields; move it to the top of its module, or give it a "
+            "`version` that says what it was made with"
+        )
     try:
         texts = "".join(inspect.getsource(sys.modules[name]) for name in modules)
     except (OSError, TypeError, KeyError) as error:

@@ -24,12 +24,6 @@ def test_a_period_rings_at_once_and_then_regularly() -> None:
     assert rung == [0, 5, 10]
 
 
-def test_a_period_shorter_than_a_step_rings_in_every_step() -> None:
-    alarm = Alarm(0.01, 0.1)
-    alarm.reset(0)
-    assert alarm.tick == 1
-
-
 def test_without_a_period_it_rings_once_when_asked() -> None:
     alarm = Alarm(None, 0.1)
     assert alarm.tick > NEVER
