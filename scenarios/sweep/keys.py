@@ -8,7 +8,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from numbers import Integral, Real
 from types import FunctionType
@@ -41,6 +41,18 @@ def description_of(recipe: Recipe) -> str:
 def key_of(recipe: Recipe) -> str:
     """The key of a recipe in a store; raises `InputError` as `canonical`."""
     return digest_of(description_of(recipe))
+
+
+def content_of(recipe: Recipe) -> str | None:
+    """A digest of what runs, whatever it is called; None if it cannot be described.
+
+    Equal for runs that differ in nothing but their seed and, if so, their recorded arrivals.
+    """
+    scenario = replace(recipe.scenario, recorded=None)
+    try:
+        return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]
+    except InputError:
+        return None
 
 
 def digest_of(description: str) -> str:
