@@ -42,7 +42,7 @@ COMMANDS = {
     "decide": ("four-way", ("a1", "b2")),
     "controllers": ("dim", ()),
     "figures": ("maps", ("--list",)),
-    "crossval": ("6-way", ("--replay",)),
+    "metrics": ("--json", ()),
     "animate": ("three-way", ("--start", "0", "--seconds", "0.5")),
 }
 
