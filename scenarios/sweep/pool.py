@@ -214,7 +214,8 @@ def _results(
                     yield refused
             yield k, result
     finally:
-        for future in running.values():
+        # Our own processes end with their runs; their pool fails over a run that is cancelled.
+        for future in () if isinstance(executor, _Processes) else running.values():
             future.cancel()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
@@ -604,32 +605,64 @@ def test_an_error_of_a_controller_is_one_line(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_files_of_the_working_directory_hide_no_library(tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [
+    ["--version"], pytest.param(["sweep", "e.toml", "--jobs", "2"], marks=pytest.mark.slow),
+])  # fmt: skip
+def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_path: Path) -> None:
     """Neither for the command nor for its workers; `collections.py` would, for all of Python."""
     for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
     (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
     done = subprocess.run(
-        [sys.executable, "-m", "minisim", "sweep", "e.toml", "--jobs", "2"], cwd=tmp_path,
+        [sys.executable, "-m", "minisim", *command], cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.skipif(not hasattr(os, "killpg"), reason="process groups are POSIX's")
-@pytest.mark.parametrize("seconds", [
-    0.15, 0.6, *(pytest.param(0.2 * k, marks=pytest.mark.slow) for k in range(4, 30)),
-])  # fmt: skip
+#: Runs `minisim reproduce`, and presses Ctrl-C when a module is looked for.
+PRESSING = """
+import os, runpy, signal, sys
+
+wanted = sys.argv.pop()
+
+class Presses:
+    def find_spec(self, name, *_):
+        if name == wanted:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Presses())
+runpy.run_module("minisim", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize("module", ["scenarios.cli", "typer", "figures.reproduction_report"])
+def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSING, "reproduce", module], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode in (130, -signal.SIGINT)
+    assert done.stderr in ("", "minisim: interrupted\n")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups are POSIX's")
+@pytest.mark.parametrize("seconds", [0.5 * k for k in range(1, 13)])
 def test_ctrl_c_shows_no_traceback_at_any_moment(seconds: float, tmp_path: Path) -> None:
-    """From 0.1 s on: Python itself answers before it has begun to read minisim."""
-    command = [sys.executable, "-m", "minisim", "reproduce", "--quick", "--jobs", "2"]
+    """Not even of a worker that has just been started."""
+    command = [sys.executable, "-m", "minisim", "reproduce", "--only", "text", "--jobs", "2"]
     with subprocess.Popen(
         command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
     ) as process:  # fmt: skip
         time.sleep(seconds)
-        os.killpg(process.pid, signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        told = None
+        while told is None:  # a library may swallow the first one
+            os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                _, told = process.communicate(timeout=20)
     assert process.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in told
     assert "KeyboardInterrupt" not in told
