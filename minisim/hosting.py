@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +100,8 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
+    #: What the session had counted when the warm-up ended.
+    before: dict[str, float] = field(default_factory=dict)
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
@@ -115,6 +117,8 @@ class Hosted:
                     f"decide() must return commands, such as [Go(3)] or [], got {show(answer)}"
                 )
             commands = list(answer)
+            if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
+                self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
         except Exception as error:
@@ -131,10 +135,15 @@ class Hosted:
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
-        session, vehicles = self.session, range(len(self.arrivals))
+        session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
         try:
-            kinds = tuple(map(session.kind, vehicles)) if isinstance(session, Kinds) else ()
             counts = dict(session.counts) if isinstance(session, Counting) else {}
+            counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
+            kinds = (
+                tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
+                if isinstance(session, Kinds)
+                else ()
+            )
         except Exception as error:
             raise _blamed(self.controller, error, session) from error
         return Run(

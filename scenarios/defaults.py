@@ -22,7 +22,7 @@ AXES: dict[str, Any] = {
 #: Key with one value for a block -> its default.
 SINGLE: dict[str, Any] = {
     "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
-    "metrics": (),
+    "metrics": (), "start": None,
 }  # fmt: skip
 
 #: An example of a custom junction.

@@ -6,6 +6,8 @@
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
     # humans = [0, 0.2]                 # with controllers of DIM only
+    # arrivals = "count.csv"            # a table to replay, instead of density, split and turns,
+    # start = "07:00"                   # which begins at a time of day
 
     [[experiment]]                      # the lines above hold here too
     scenario = "four-way"
@@ -30,7 +32,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from minisim.arrivals import MAX_TIME, read_arrivals
+from minisim.arrivals import MAX_TIME
 from minisim.errors import (
     FileError,
     InputError,
@@ -42,11 +44,13 @@ from minisim.errors import (
     show,
 )
 from minisim.files import read_file
-from minisim.hosting import ON_COLLISION, start
-from minisim.results.metrics import named_metrics
+from minisim.hosting import ON_COLLISION
+from minisim.hosting import start as started
+from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.library import DRAWN, scenario_named
+from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
@@ -112,7 +116,7 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
     for recipe in first.values():
         scenario = recipe.scenario
         try:
-            start(recipe.driven, scenario.site(recipe.seed))
+            started(recipe.driven, scenario.site(recipe.seed))
         except MinisimError as error:
             raise InputError(
                 f"{recipe.name} cannot serve {scenario.name} at {scenario.density:g} veh/h/lane, "
@@ -142,7 +146,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
-    metrics = named_metrics(single.pop("metrics"))
+    metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
         scenario = _scenario({**dict(zip(axes, values, strict=True)), **single}, folder)
@@ -156,7 +160,9 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
-    recorded = chosen.pop("arrivals")
+    recorded, start = chosen.pop("arrivals"), chosen.pop("start")
+    if recorded is None and start is not None:
+        raise InputError("start goes with arrivals: it is a time in the table")
     if chosen["model"] != "shifted":
         del chosen["min_headway"]
     with _at("scenario"):
@@ -168,7 +174,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        made = replace(made, recorded=read_arrivals(folder / recorded, made.intersection.n))
+        table = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
+        made = replace(made, recorded=table)
     return replace(made, name=label or made.name)
 
 

@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 
 from dim import HarmonyMatrix
-from minisim.arrivals import read_arrivals
 from minisim.errors import FileError, InputError
 from minisim.files import (
     check_apart,
@@ -25,6 +24,7 @@ from minisim.files import (
     replacing,
     write_table,
 )
+from minisim.recorded import read_arrivals
 from minisim.results.run import Run
 from scenarios.sweep import read_experiments
 

@@ -95,7 +95,7 @@ class Broken:
         self.fail("decide")
         return []
 
-    def kind(self, vehicle: int) -> str:
+    def kind(self, lane: int, rank: int) -> str:
         self.fail("kind")
         return "x"
 
