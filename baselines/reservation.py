@@ -208,6 +208,7 @@ class ReservationSession:
         if reach is None:
             braking = stopping_distance(site.speed_limit, site.vehicle.deceleration)
             reach = braking + controller.period * site.speed_limit
+        reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
         self._period = controller.period
         self._dt = site.dt

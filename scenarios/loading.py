@@ -13,14 +13,13 @@ import io
 import os
 import pickle
 import sys
-import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from minisim.errors import InputError, choice
+from minisim.errors import InputError, choice, told
 from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
@@ -147,7 +146,7 @@ def _imported(module: str) -> ModuleType:
                 f"no module {module!r}: there is no {module.replace('.', '/')}.py in the working "
                 "directory, and none of that name is installed"
             ) from None
-        raise InputError(f"cannot import {module}: {_told(error)}") from error
+        raise InputError(f"cannot import {module}: {told(error)}") from error
 
 
 def _from_file(folder: Path, name: str) -> ModuleType:
@@ -165,7 +164,7 @@ def _from_file(folder: Path, name: str) -> ModuleType:
         try:
             module = importlib.reload(known) if known else importlib.import_module(name)
         except (Exception, SystemExit) as error:
-            raise InputError(f"cannot import {name}: {_told(error, folder)}") from error
+            raise InputError(f"cannot import {name}: {told(error, folder)}") from error
     _check_own(module, file)
     _texts[file] = text
     for kind in vars(module).values():
@@ -201,18 +200,6 @@ def _found_in(folder: Path) -> Iterator[None]:
     finally:
         sys.path[:] = before
         sys.dont_write_bytecode = written
-
-
-def _told(error: BaseException, folder: Path = Path("/")) -> str:
-    """What went wrong, preceded by the last line in the folder's files that led to it."""
-    if isinstance(error, SyntaxError):
-        return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
-    lines = [
-        f"{Path(frame.filename).name}, line {frame.lineno}: "
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(folder)
-    ]
-    return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
 
 
 class _Reduce:
