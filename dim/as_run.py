@@ -41,7 +41,7 @@ import networkx as nx
 
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
-from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
+from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, instance
 from minisim.junction.movements import Movement
 from minisim.parameters import checked, declared, part, real, spelled, word
@@ -90,6 +90,8 @@ def _names(title: str, value: Any) -> str:
 @declared
 class AsRunDim:
     """DIM as the authors ran it for the published numbers, on 3, 4 and 5 arms; it may collide."""
+
+    covers = NOTHING
 
     order: str = word(
         "what comes first: the highest-priority lanes, as in every published run, or the largest "

@@ -25,6 +25,7 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
+    from minisim.control import cover_of
     from scenarios.controllers import CONTROLLERS, maker_of, package_of, plugins
 
     if name is None:
@@ -40,11 +41,12 @@ def controllers(
         return
     ours = name.partition(":")[0]
     make = maker_of(ours if ours in CONTROLLERS else name)
-    meaning, parameters = _meaning(make), list(_parameters(make))
+    meaning, parameters, covers = _meaning(make), list(_parameters(make)), str(cover_of(make))
     if as_json:
-        show_json({"name": name, "meaning": meaning, "parameters": parameters})
+        show_json({"name": name, "meaning": meaning, "covers": covers, "parameters": parameters})
         return
     typer.echo(wrapped(f"{name}: {meaning}", 0))
+    typer.echo(wrapped(f"None collides, and each is served: {covers}.", 0))
     _show_parameters(parameters)
     for parameter in parameters:
         for word, kind in parameter["kinds"].items():
