@@ -22,6 +22,9 @@ from minisim.jit import njit
 
 Floats = npt.NDArray[np.float64]
 
+#: A number of steps: there was no room for all of them.
+UNFINISHED = -1
+
 
 def law_of(site: Site) -> Law:
     """The law of a site's vehicles."""
@@ -91,18 +94,15 @@ def predict(
         lane: the vehicles ahead in its lane, nearest first.
         exit_lane: those that enter its exit lane before it, in this order.
     """
-    gone = max((len(leader.s) for leader in (*lane, *exit_lane)), default=0)
-    # Without leaders a vehicle takes ln 2·v/a at most to reach half of its lowest limit v: the free
-    # road's exponent is at least 1, so it accelerates by a·(1 − v/v0) or more.
-    free = course.limit / law.a + 2.0 * (course.end - position) / min(course.turn, course.limit)
-    steps = gone + math.ceil(free / law.dt) + 1
-    s, v = np.empty(steps), np.empty(steps)
-    count, hard = _drive(
-        law, course, position, speed,
+    stacked = (
         _stacked(lane, [leader.until for leader in lane]),
         _stacked(exit_lane, [leader.shift for leader in exit_lane]),
-        s, v,
-    )  # fmt: skip
+    )
+    steps, count = 512, UNFINISHED
+    while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
+        steps *= 2
+        s, v = np.empty(steps), np.empty(steps)
+        count, hard = _drive(law, course, position, speed, *stacked, s, v)
     return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
 
 
@@ -127,7 +127,7 @@ def _drive(
 ) -> tuple[int, bool]:
     """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
 
-    Returns the number of steps, 0 if it hits a leader, and whether it brakes hard.
+    Returns the number of steps, 0 if it hits a leader or `UNFINISHED`, and whether it brakes hard.
     """
     s, v, hard = position, speed, False
     for k in range(len(s_out)):
@@ -167,4 +167,4 @@ def _drive(
             s, v = semi_implicit(s, v, acc, law.dt)
         else:
             s, v = ballistic(s, v, acc, law.dt)
-    return 0, hard
+    return UNFINISHED, hard
