@@ -132,6 +132,7 @@ class Hosted:
             site=self.site,
             plan=self.plan,
             record=self.record,
+            record_window=self.record_window,
             counts=dict(session.counts) if isinstance(session, Counting) else {},
             kinds=tuple(kinds),
             **measured,
