@@ -84,11 +84,11 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("dim", Dim, (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
-            Variant("order=lanes", Look("DIM, lanes first", "green", "^", "--")),
-            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "s", "--")),
-            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "D", ":")),
+            Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "P", "--")),
+            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),
             Variant("order=lanes,priorities=waiting"),
-            Variant("monitor=on", Look("DIM with safety monitor", "purple", "v", "-.")),
+            Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
         Entry("fixed-time", FixedTime, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),

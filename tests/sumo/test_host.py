@@ -22,7 +22,7 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim, Mixed, NoisyPerception
 from minisim.control import (
     Advise,
@@ -49,7 +49,7 @@ from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
-from tests.builders import Fixed, Scripted, hardest_braking, replayed, share
+from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
 
 FAIR_FOUR = four_way(100, profile="fair")
 
@@ -707,3 +707,11 @@ def test_a_crossed_vehicle_still_follows_into_its_exit(
         for run in (ours, theirs)
     ]
     assert max(slowest) < 1.0
+
+
+@pytest.mark.parametrize("signal", [Actuated(), Adaptive()])
+def test_no_green_ends_in_sumo_while_its_queue_stands(signal: Controller) -> None:
+    watched = Greens(signal)
+    simulate(queues(VehicleType(length=6.0)), watched)
+    assert watched.left
+    assert not any(watched.left)
