@@ -6,7 +6,7 @@ import math
 
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.laws import insertable
+from minisim.engine.laws import insertable, room_behind
 from minisim.engine.state import DRIVING, STOP_MARGIN, Law, Records, Road
 from minisim.jit import njit
 
@@ -45,7 +45,8 @@ def insert(
             safe = insertable(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
             if safe < 0.0:
                 continue
-            v = min(v, safe)
+            room = room_behind(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
+            v = min(v, safe, math.sqrt(max(room, 0.0)))
         if law.depart_speed >= 0.0:
             if law.depart_speed > v:
                 continue

@@ -15,7 +15,16 @@ from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.cruise.step import accelerate as accelerate_cruising
 from minisim.engine.insertion import insert
-from minisim.engine.laws import braking_begins, closeness, follow, hold, slow_down
+from minisim.engine.laws import (
+    braking_begins,
+    closeness,
+    follow,
+    hold,
+    keep_room,
+    room_behind,
+    short_of,
+    slow_down,
+)
 from minisim.engine.state import ARRIVED, DRIVING, Floats, Law, Records, Road
 from minisim.jit import njit
 
@@ -114,16 +123,28 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             # The vehicle ahead in the lane, until its rear has left the shared path. If it has
             # turned off, one further ahead may still be on the path.
             z = 0.0
+            room = math.inf  # to stop in
             j = i - 1
             while j >= first:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
                     z = closeness(v, rear - s, ahead["v"], law)
+                    room = room_behind(rear - s, ahead["v"], law)
                     overlap |= rear <= s
                     break
                 if s >= ends[p, 0]:
                     break
+                j -= 1
+
+            # Who cannot stop before the junction has to see past a leader that may turn off.
+            near = s < ends[p, 0] and v * v > 2.0 * law.b_max * (law.entry - s)
+            j = min(j, front) - 1
+            while near and j >= first:
+                ahead = vehicles[j]
+                rear = ahead["s"] - law.length
+                if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
+                    room = min(room, room_behind(rear - s, ahead["v"], law))
                 j -= 1
 
             # From the junction on, also the last vehicle before it bound for the same exit lane.
@@ -132,13 +153,16 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             j = -1
             if s >= law.entry:
                 j = me["ahead"]
-            elif released and i == front:
+            elif released and (i == front or near):
                 j = lanes[int(ends[p, 2])]["last"]
             if j >= 0 and vehicles[j]["status"] == DRIVING:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - ends[p, 0])
-                z = max(z, closeness(v, gap, ahead["v"], law))
+                if s >= law.entry or i == front:
+                    z = max(z, closeness(v, gap, ahead["v"], law))
+                if rear >= 0.0:
+                    room = min(room, room_behind(gap, ahead["v"], law))
                 overlap |= gap <= 0.0 and s >= ends[p, 0]
 
             section, factor = me["section"], me["factor"]
@@ -150,6 +174,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 k += 1
             if not released and s < law.entry:
                 acc = min(acc, hold(v, s, law))
+            if short_of(room, v, v + acc * law.dt, law):
+                acc = min(acc, keep_room(v, room, law))
             brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # stays standing
             me["a"] = max(min(acc, brake), -law.b_max)
     return overlap
