@@ -18,8 +18,8 @@ from minisim.carfollowing import (
     krauss,
     safe_speed,
     speed_towards,
-    stop_within,
     stepwise_towards,
+    stop_within,
 )
 from minisim.engine.state import STOP_MARGIN, Law
 from minisim.jit import njit, njit_inline
