@@ -155,6 +155,7 @@ class Hosted:
             site=self.site,
             plan=self.plan,
             record=self.record,
+            record_window=self.record_window,
             counts=counts,
             kinds=kinds,
             **measured,
