@@ -151,7 +151,7 @@ OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="tri
 
 def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
     todo = [
-        Recipe(four_way(200, horizon=120), controller_named(name), seed)
+        Recipe(four_way(300, horizon=180), controller_named(name), seed)
         for name in ("dim", "fixed-time")
         for seed in (1, 2)
     ]
