@@ -22,7 +22,8 @@ import math
 from collections.abc import Iterable
 
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Added to speeds used as divisors, as in the authors' code [m/s].
 CRAWL = 1e-5

@@ -26,6 +26,7 @@ from minisim.control import (
     Site,
     View,
     Wake,
+    as_controller,
 )
 from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, first_tick, time_of
@@ -40,6 +41,7 @@ from minisim.errors import (
     show,
     told,
 )
+from minisim.names import name_of
 from minisim.results.run import Run, ScenarioLike
 
 RECORDS = ("junction", "all")
@@ -130,7 +132,7 @@ class Hosted:
     ) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
         what = "; ".join(map(str, collisions))
-        where = f"scenario {self.scenario.name}, controller {self.controller.name}"
+        where = f"scenario {self.scenario.name}, controller {name_of(self.controller)}"
         return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(collisions), replay)
 
     def result(self, **measured: Any) -> Run:
@@ -153,6 +155,7 @@ class Hosted:
             site=self.site,
             plan=self.plan,
             record=self.record,
+            record_window=self.record_window,
             counts=counts,
             kinds=kinds,
             **measured,
@@ -182,8 +185,7 @@ def begin(
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-    if not isinstance(controller, Controller) or isinstance(controller, type):
-        raise InputError(f"controller must be a Controller such as Dim(), got {show(controller)}")
+    as_controller(show(controller), controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n)
@@ -204,6 +206,8 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
     try:
         session = controller.start(site)
         plan = getattr(session, "plan", None)
+    except InputError as error:
+        raise InputError(f"{name_of(controller)}: {error}") from error
     except MinisimError:
         raise
     except Exception as error:
@@ -236,7 +240,7 @@ def _blamed(
     module = sys.modules.get(type(code).__module__)
     folder = Path(getattr(module, "__file__", None) or "/").parent
     why = error if isinstance(error, InputError) else told(error, folder)
-    return ControllerError(f"controller {controller.name!r}{when}: {why}")
+    return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")
 
 
 def checked_window(window: object) -> tuple[float, float]:

@@ -119,7 +119,7 @@ def from_bearings(
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
-        choice("keyword of a scenario", key, tuple(Options.__annotations__))
+        choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     if density is not None:
         given["density"] = density
     clash = [key for key in DRAWN if key in given]

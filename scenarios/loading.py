@@ -10,6 +10,7 @@ from __future__ import annotations
 import copyreg
 import importlib
 import io
+import os
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -32,8 +33,36 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    kind: type = _member(*_place(module), name, "class", lambda value: isinstance(value, type))
+    kind: type = _member(*_place(module), name, "class", _is_class, _controllers)
     return kind
+
+
+def controllers_in(module: str) -> list[str]:
+    """The names of the controllers that a module defines; raises `InputError` as `load_class`."""
+    return _controllers(_module(*_place(module)))
+
+
+def has_source(module: str) -> bool:
+    """Whether this is the path of a file, or a module in the working directory."""
+    return os.path.isfile(module) or os.path.isfile(_source(Path.cwd(), module))
+
+
+def is_maker(kind: type) -> bool:
+    """Whether a class can make controllers, as far as it tells."""
+    return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
+
+
+def _is_class(value: object) -> bool:
+    return isinstance(value, type)
+
+
+def _controllers(module: ModuleType) -> list[str]:
+    """Those that the module or its parts define, not what it imports from elsewhere."""
+    return [
+        key for key, value in vars(module).items()
+        if isinstance(value, type) and is_maker(value) and not key.startswith("_")
+        and f"{value.__module__}.".startswith(f"{module.__name__}.")
+    ]  # fmt: skip
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
@@ -54,11 +83,18 @@ def _loaded(metric: Asked) -> Asked:
 
 def _metric(folder: str, module: str, name: str) -> Metric:
     """A metric by its place, in this process or in another one on the same machine."""
-    fits = Metric, FunctionType
-    made = _member(folder, module, name, "metric", lambda value: isinstance(value, fits))
+    made = _member(folder, module, name, "metric", _is_metric, _metrics)
     metric: Metric = made if isinstance(made, Metric) else metric_of(made)
     object.__setattr__(metric, "place", (folder, module, name))
     return metric
+
+
+def _is_metric(value: object) -> bool:
+    return isinstance(value, (Metric, FunctionType))
+
+
+def _metrics(module: ModuleType) -> list[str]:
+    return [key for key, it in vars(module).items() if _is_metric(it) and not key.startswith("_")]
 
 
 def _reduced(metric: Metric) -> Any:
@@ -69,26 +105,36 @@ def _reduced(metric: Metric) -> Any:
 copyreg.pickle(Metric, _reduced)
 
 
-def _member(folder: str, module: str, name: str, what: str, fits: Callable[[Any], bool]) -> Any:
-    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest one."""
-    loaded = _from_file(Path(folder), module) if folder else _imported(module)
+def _member(
+    folder: str,
+    module: str,
+    name: str,
+    what: str,
+    fits: Callable[[object], bool],
+    others: Callable[[ModuleType], list[str]],
+) -> Any:
+    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest of others."""
+    loaded = _module(folder, module)
     value = getattr(loaded, name, None)
     if fits(value):
         return value
-    others = [key for key, it in vars(loaded).items() if fits(it) and not key.startswith("_")]
-    if others:
-        choice(f"{what} of {module}", name, others)
+    if names := others(loaded):
+        choice(f"{what} of {module}", name, names)
     raise InputError(f"{module} has no {what} {name!r}, and no other either")
+
+
+def _module(folder: str, name: str) -> ModuleType:
+    return _from_file(Path(folder), name) if folder else _imported(name)
 
 
 def _place(module: str) -> tuple[str, str]:
     """The folder of a module or of the path of its file, "" if installed, and its name."""
     if module.endswith(".py"):
         path = Path(module)
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise InputError(f"cannot read {module}: no such file")
         return str(path.absolute().parent), path.stem
-    return str(Path.cwd()) if _source(Path.cwd(), module).is_file() else "", module
+    return str(Path.cwd()) if os.path.isfile(_source(Path.cwd(), module)) else "", module
 
 
 def _imported(module: str) -> ModuleType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Iterable, Mapping
@@ -17,6 +18,7 @@ from minisim.engine.collision import Collision
 from minisim.engine.state import Records, first_tick
 from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
+from minisim.names import name_of
 from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
@@ -84,6 +86,8 @@ class Run:
     rows: Records  #: vehicle id and path of each row to which the trace refers
     #: What the controller's session has counted since the warm-up.
     counts: Mapping[str, float] = field(default_factory=dict)
+    #: First and last time of the recording [s]; the run may have ended earlier.
+    record_window: tuple[float, float] = (0.0, math.inf)
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
     #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
@@ -120,7 +124,7 @@ class Run:
     ) -> dict[str, Any]:
         """What was run, and the numbers; see `minisim.results.summary.summarise`."""
         return {
-            "controller": self.controller.name,
+            "controller": name_of(self.controller),
             "scenario": self.scenario.name,
             "profile": self.scenario.profile_name,
             "density": self.scenario.density,

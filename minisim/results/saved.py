@@ -39,7 +39,8 @@ PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
-    "seed", "site", "plan", "collisions", "record", "counts", "host", "environment",
+    "seed", "site", "plan", "collisions", "record", "record_window", "counts", "host",
+    "environment",
 )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import typer
 
-from minisim.errors import CollisionError, MinisimError
+from minisim.errors import CollisionError, InputError, MinisimError
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import drop_output, prepare_streams
 from scenarios.termination import Terminated, terminable
@@ -52,6 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        _check_once(given)
         with terminable():
             code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
@@ -81,6 +82,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == 130:
         typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
+
+
+def _check_once(given: Sequence[str]) -> None:
+    """Raise `InputError` for an option that is given twice and would count only once."""
+    words = [word.partition("=")[0] if word[:2] == "--" else word[:2] for word in given]
+    command = typer.main.get_command(app)
+    for option in getattr(command, "commands", {}).get(given[0] if given else "", command).params:
+        used = [word for word in words if word in option.opts]
+        if len(used) > 1 and option.param_type_name == "option" and not option.multiple:
+            raise InputError(f"{used[-1]} is given twice; minisim {given[0]} takes one")
 
 
 def _fail(message: str, code: int = 2) -> int:

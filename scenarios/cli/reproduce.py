@@ -56,6 +56,7 @@ def reproduce(
     from scenarios.studies.shared.reproduction import reproduce as make
     from scenarios.sweep.store import Store
 
+    options.check_distinct({"--only": only})
     effort = Effort.of(quick=quick, seeds=seeds)
     names = [study_named(name).name for name in only or NAMES]
     workers = options.processes(jobs)

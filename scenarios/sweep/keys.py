@@ -102,8 +102,9 @@ def canonical(value: object) -> Any:
     if isinstance(value, set | frozenset):
         return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
     raise InputError(
-        f"{show(value)} cannot be stored: recipes are made of dataclasses, numbers, texts, "
-        "functions, arrays and collections of them"
+        f"{show(value)} cannot be stored: {type(value).__qualname__} is no dataclass, so its "
+        "parameters are not known; make it a frozen dataclass, whose fields are numbers, texts, "
+        "functions, arrays, other dataclasses, and collections of them"
     )
 
 
