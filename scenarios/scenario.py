@@ -23,8 +23,8 @@ class Scenario:
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
     warmup: float = real(
-        "trips demanded before it count in no mean and no number of trips", "s",
-        low=0, default=0.0,
+        "nothing before it is measured: no trip demanded, no close call, no count; only "
+        "collisions always count", "s", low=0, default=0.0,
     )  # fmt: skip
     recorded: Arrivals | None = part(
         "an arrival table to replay instead of drawing one", Arrivals, optional=True, default=None
