@@ -52,7 +52,7 @@ INTERSECTIONS = [
 @pytest.fixture(scope="module")
 def run() -> Run:
     return minisim.simulate(
-        four_way(400, horizon=130), Dim(), seed=1, record="all", record_window=(100, 130)
+        four_way(400, horizon=130), Dim(), seed=4, record="all", record_window=(100, 130)
     )
 
 
