@@ -219,7 +219,7 @@ def decision_table(
 def _participants(movements: Iterable[Movement | str], matrix: HarmonyMatrix) -> Movements:
     """The movements by lane, checked."""
     instance("matrix", matrix, HarmonyMatrix)
-    given = items("participants", movements, "movements such as a1, b2")
+    given = items("participants", movements, "movements such as a1, b2", ordered=False)
     participants = sorted(matrix.movements[matrix.index(m)] for m in given)
     for one, other in pairwise(participants):
         if one.origin == other.origin:

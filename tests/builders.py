@@ -165,6 +165,13 @@ class Deadly:
         return Unregulated().start(site)
 
 
+def hardest_braking(run: Run) -> float:
+    """Of any vehicle in any step of a run that recorded all, from the speeds alone [m/s²]."""
+    trace = run.trace[np.lexsort((run.trace["tick"], run.trace["row"]))]
+    same = (np.diff(trace["row"]) == 0) & (np.diff(trace["tick"]) == 1)
+    return float(-np.diff(trace["v"])[same].min(initial=0.0) / run.site.dt)
+
+
 def repeatable(rows: pd.DataFrame) -> pd.DataFrame:
     """The rows without the columns that differ when a run is repeated."""
     return rows.drop(columns="cpu_s")

@@ -14,7 +14,8 @@ import math
 from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens, shortest_detector
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import declared, real, switch
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5

@@ -15,7 +15,8 @@ from baselines.signals.phases import (
     on_detector,
 )
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0

@@ -12,10 +12,14 @@ from baselines.signals.heads import Colour, Heads, full_order, lane_order, stopp
 from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
-from minisim.parameters import Name, checked, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import checked, declared, real, refuse_idle, switch
 
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
+
+#: Parameters of Webster's formula that given greens replace.
+_WEBSTERS = ("lost_time", "equal_greens", "max_cycle")
 
 
 def _greens(title: str, value: Any) -> tuple[float, ...] | float:
@@ -36,7 +40,8 @@ class FixedTime:
 
     greens: tuple[float, ...] | float | None = checked(
         "green of each lane, or one number for all; none is Webster's, from the expected demand",
-        _greens, "numbers 0.5 … 3600", "s", optional=True, default=None,
+        _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
+        optional=True, default=None,
     )  # fmt: skip
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
     saturation_flow: float = real(
@@ -53,11 +58,16 @@ class FixedTime:
         default=False,
     )
     max_cycle: float = real(
-        "longest cycle, for a demand beyond Webster's formula (Y > 0.95)", "s",
-        above=0, high=3600, default=180.0,
+        "longest cycle, for a demand beyond Webster's formula (Y > 0.95); it must hold the lost "
+        f"times and {MIN_GREEN:g} s of green per lane", "s",
+        low=3 * MIN_GREEN, high=3600, default=180.0,
     )  # fmt: skip
     all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
     order: tuple[int, ...] | None = lane_order()
+
+    def __post_init__(self) -> None:
+        if self.greens is not None:
+            refuse_idle(self, "Webster's greens (greens=none)", *_WEBSTERS)
 
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.

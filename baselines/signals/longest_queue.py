@@ -11,7 +11,8 @@ import math
 
 from baselines.signals.phases import PhaseSession, Verdict, check_detector, on_detector
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 
 @declared

@@ -56,7 +56,9 @@ class PhaseSession:
         self, site: Site, detector_range: float, min_green: float, amber: float,
         marks: tuple[float, ...] = (), order: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
-        sight = max(detector_range, stopping_sight(site))
+        road = site.intersection.approach_length
+        sight = min(max(detector_range, stopping_sight(site)), road)
+        marks = tuple(min(mark, road) for mark in marks)
         self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
         self._order = full_order(order, site.intersection.n)
         self._heads = Heads(site)

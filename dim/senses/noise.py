@@ -39,7 +39,10 @@ _POSITION, _SPEED = 8, 9
 
 @declared
 class NoisyPerception:
-    """How vehicles misperceive each other; by default they do not."""
+    """How vehicles misperceive each other; by default they do not.
+
+    Parameters of errors that never happen are allowed, so that a series may begin without errors.
+    """
 
     intent_error: float = real(
         "probability that a shown intent is misread", low=0, high=1, default=0.0

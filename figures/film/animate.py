@@ -32,6 +32,7 @@ from figures.junction import drawing
 from minisim.errors import InputError, number
 from minisim.files import replacing
 from minisim.junction.paths import Floats
+from minisim.names import name_of
 from minisim.results.run import Run
 
 #: Picture size in inches, and its resolution: 720 × 880 pixels. Video needs even numbers.
@@ -98,7 +99,7 @@ class Picture:
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run
-        self.title = f"{run.scenario.name} · {run.controller.name}"
+        self.title = f"{run.scenario.name} · {name_of(run.controller)}"
         self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection

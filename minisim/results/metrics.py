@@ -84,7 +84,7 @@ class Metric:
         "number (None where there is none)",
         _function, "function", label="function of a metric",
     )  # fmt: skip
-    unit: str = text("such as s", default="")
+    unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
     needs: str = word(
         "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
@@ -93,10 +93,10 @@ class Metric:
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",
     )  # fmt: skip
-    title: str = text("for headings and axes; empty is its name", default="")
-    symbol: str = text("in equations", default="")
-    meaning: str = text("in one line", default="")
-    equation: str = text("with its source", default="")
+    title: str = text("for headings and axes; empty is its name", empty=True, default="")
+    symbol: str = text("in equations", empty=True, default="")
+    meaning: str = text("in one line", empty=True, default="")
+    equation: str = text("with its source", empty=True, default="")
     usual: bool = switch("whether every summary has it", default=False)
 
     @property

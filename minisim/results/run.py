@@ -18,6 +18,7 @@ from minisim.engine.collision import Collision
 from minisim.engine.state import Records, first_tick
 from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
+from minisim.names import name_of
 from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
@@ -123,7 +124,7 @@ class Run:
     ) -> dict[str, Any]:
         """What was run, and the numbers; see `minisim.results.summary.summarise`."""
         return {
-            "controller": self.controller.name,
+            "controller": name_of(self.controller),
             "scenario": self.scenario.name,
             "profile": self.scenario.profile_name,
             "density": self.scenario.density,

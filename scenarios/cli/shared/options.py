@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -79,6 +80,14 @@ Start = Annotated[
 def processes(jobs: int | None) -> int:
     """The number of processes that --jobs asks for; one per core if it is not given."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
+
+
+def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
+    """Raise `InputError` for a value that an option has twice; None is an option not given."""
+    for option_name, values in given.items():
+        for k, value in enumerate(values or ()):
+            if value in (values or ())[:k]:
+                raise InputError(f"{option_name} {value} is given twice")
 
 
 def build_scenario(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dim import NoisyPerception
 from dim.senses.noise import UNSIGNALLED
-from minisim.parameters import spelled
+from minisim.names import spelled
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.recipe import Recipe

@@ -188,7 +188,7 @@ def test_sites_that_it_cannot_serve() -> None:
     [
         ("inflows", r"unknown priorities 'inflows'.*did you mean 'inflow'"),
         ((0, 2), "priorities of 2 lanes are the ranks 0 … 1"),
-        (3, "priorities must be lane ranks or 'inflow', got 3"),
+        (3, "priorities must be a sequence of ranks .*, got 3"),
         (("a", "b"), "lane rank"),
         ((0, 10**5000), "priorities of 2 lanes"),
     ],
