@@ -113,7 +113,7 @@ def test_what_has_no_order_is_no_sequence(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, (_, it) in ALL.items() if "text" in it[1].allowed])
 @pytest.mark.parametrize("value", ["a\0", "a\nb", "\x1b[31m", "\ud800", "\u202e"])
 def test_texts_can_be_printed(name: str, value: str) -> None:
-    kind, (field, it, default) = ALL[name]
+    _, (field, it, default) = ALL[name]
     with pytest.raises(InputError, match="must be a text of one line, without control characters"):
         it.check(it.title(field), value)
     if default != "":

@@ -72,7 +72,7 @@ def test_a_text_or_table_names_the_controller() -> None:
 
 def test_simulate_says_how_a_text_becomes_a_controller() -> None:
     named: Any = "dim:gate=harmonious"
-    with pytest.raises(InputError, match="make it by scenarios.controllers.controller_named"):
+    with pytest.raises(InputError, match=r"make it by scenarios\.controllers\.controller_named"):
         simulate(four_way(), named)
 
 
@@ -101,11 +101,11 @@ def test_rows_tell_parameters_of_one_name_apart() -> None:
 @pytest.mark.parametrize("name", ["", "a\nb", "\ud800", 3])
 def test_a_controller_needs_a_name_that_can_be_printed(name: Any) -> None:
     nameless: Any = SimpleNamespace(name=name, start=Unregulated().start)
-    with pytest.raises(InputError, match="the name of controller .* must be a text"):
+    with pytest.raises(InputError, match=r"the name of controller .* must be a text"):
         Recipe(four_way(), nameless)
 
 
 def test_a_misspelt_density_gets_the_nearest_keyword() -> None:
     misspelt: Any = {"densty": 300}
-    with pytest.raises(InputError, match="'densty'; allowed: density, .*; did you mean 'density'"):
+    with pytest.raises(InputError, match=r"'densty'; allowed: density, .*; did you mean 'density'"):
         four_way(**misspelt)
