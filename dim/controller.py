@@ -47,7 +47,7 @@ from dim.priorities import (
 from dim.senses.noise import NoisyPerception
 from dim.senses.tally import Tally
 from dim.zones import Zones
-from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
+from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, items
 from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, refuse_idle, word
@@ -167,7 +167,7 @@ class Dim:
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
-    Vehicles whose id `follows` rejects are seen but have no agent. `takes` says how vehicles
+    Vehicles that `follows` rejects are seen but have no agent. `takes` says how vehicles
     interpret what they have seen of a true view: (true, seen) -> taken.
     """
 
@@ -175,7 +175,7 @@ class DimSession:
         self,
         dim: Dim,
         site: Site,
-        follows: Callable[[int], bool] = lambda _: True,
+        follows: Callable[[Observed], bool] = lambda _: True,
         takes: Callable[[View, View], View] | None = None,
     ) -> None:
         instance("site", site, Site)
@@ -223,7 +223,7 @@ class DimSession:
         sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
-            if ego.distance > self._start or not self._follows(vehicle):
+            if ego.distance > self._start or not self._follows(ego):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent

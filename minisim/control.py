@@ -84,6 +84,8 @@ class Observed(NamedTuple):
         speed: [m/s].
         length: [m].
         demand_time: when it wanted to enter the road [s].
+        rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
+            rank: its id depends on the arrivals on other lanes.
     """
 
     id: int
@@ -93,6 +95,7 @@ class Observed(NamedTuple):
     speed: float
     length: float
     demand_time: float = 0.0
+    rank: int = 0
 
     @property
     def movement(self) -> Movement:
@@ -270,15 +273,15 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may be one of a summary's own."""
 
 
 @runtime_checkable
 class Kinds(Session, Protocol):
     """A session whose vehicles are of several kinds, by which summaries group them."""
 
-    def kind(self, vehicle: int) -> str:
-        """Kind of a vehicle, such as "human"."""
+    def kind(self, lane: int, rank: int) -> str:
+        """Kind of a vehicle, such as "human", by its lane and its place there."""
 
 
 @runtime_checkable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from minisim.arrivals import Arrivals
@@ -98,6 +98,8 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
+    #: What the session had counted when the warm-up ended.
+    before: dict[str, float] = field(default_factory=dict)
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
@@ -106,6 +108,8 @@ class Hosted:
             ControllerError: the session answered with something that cannot be carried out.
         """
         commands = list(self.session.decide(view))
+        if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
+            self.before.update(self.session.counts)
         try:
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
@@ -125,8 +129,12 @@ class Hosted:
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
-        session = self.session
-        kinds = map(session.kind, range(len(self.arrivals))) if isinstance(session, Kinds) else ()
+        session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
+        counts = dict(session.counts) if isinstance(session, Counting) else {}
+        counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
+        kinds = (
+            map(session.kind, lanes.tolist(), ranks.tolist()) if isinstance(session, Kinds) else ()
+        )
         return Run(
             scenario=self.scenario,
             controller=self.controller,
@@ -134,7 +142,7 @@ class Hosted:
             site=self.site,
             plan=self.plan,
             record=self.record,
-            counts=dict(session.counts) if isinstance(session, Counting) else {},
+            counts=counts,
             kinds=tuple(kinds),
             **measured,
         )

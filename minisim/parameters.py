@@ -171,5 +171,6 @@ def _shown(default: Any) -> str:
     """A default in a few words: recipes by their class, with … where they are not its default."""
     if not dataclasses.is_dataclass(default):
         return show(default)
-    plain = all(getattr(default, name) == given for name, _, given in parameters(type(default)))
-    return f"{type(default).__name__}({'' if plain else '…'})"
+    kind: Any = type(default)
+    plain = all(getattr(default, name) == given for name, _, given in parameters(kind))
+    return f"{kind.__name__}({'' if plain else '…'})"

@@ -79,7 +79,7 @@ class SmallScenario:
     )
     demand_time: float = real("vehicles come until then", "s", default=300.0, above=0, high=1e6)
     drain: float = real("how much longer the run goes on", "s", default=0.0, low=0, high=1e6)
-    warmup: float = real("trips demanded before it do not count", "s", default=0.0, low=0)
+    warmup: float = real("nothing before it is measured", "s", default=0.0, low=0)
     vehicle: VehicleType = part("type of the vehicles", VehicleType, default_factory=VehicleType)
     speed_limit: float = real("of the roads", "m/s", default=14.0, above=0, high=100)
     arm_length: float = real("of a road, from the centre", "m", default=500.0)

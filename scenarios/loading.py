@@ -1,8 +1,8 @@
-"""A caller's own classes, named `module:Class`, from the working directory or installed.
+"""A caller's own classes and metrics: `module:Name`, from the working directory or installed.
 
 Python may not search the working directory, and a worker process never does. So the directory is
-on the search path while one of its modules is imported, and objects of the module's classes are
-pickled together with their folder.
+on the search path while one of its modules is imported, and objects of the module's classes and
+its metrics are pickled together with their folder.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ import os
 import pickle
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from minisim.errors import InputError, choice
+from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}
@@ -33,20 +34,14 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    file = _file_of(module)
-    loaded = _imported(module) if file is None else _from_file(*file)
-    kind = getattr(loaded, name, None)
-    if isinstance(kind, type):
-        return kind
-    if classes := _controllers(loaded):
-        choice(f"controller of {module}", name, classes)
-    raise InputError(f"{module} has no class {name!r}, and no controller either")
+    kind: type = _member(*_place(module), name, "class", lambda value: isinstance(value, type))
+    return kind
 
 
 def controllers_in(module: str) -> list[str]:
     """The names of the controllers that a module defines; raises `InputError` as `load_class`."""
-    file = _file_of(module)
-    return _controllers(_imported(module) if file is None else _from_file(*file))
+    loaded = _module(*_place(module))
+    return [key for key, it in vars(loaded).items() if isinstance(it, type) and _is_own(it, loaded)]
 
 
 def has_source(module: str) -> bool:
@@ -59,23 +54,72 @@ def is_maker(kind: type) -> bool:
     return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
 
 
-def _controllers(module: ModuleType) -> list[str]:
-    """Those that the module or its parts define, not what it imports from elsewhere."""
-    return [
-        key for key, value in vars(module).items()
-        if isinstance(value, type) and is_maker(value) and not key.startswith("_")
-        and f"{value.__module__}.".startswith(f"{module.__name__}.")
+def _is_own(kind: type, module: ModuleType) -> bool:
+    """Whether it makes controllers, and is defined in the module or its parts, not imported."""
+    return is_maker(kind) and f"{kind.__module__}.".startswith(f"{module.__name__}.")
+
+
+def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
+    """The metrics asked for, ours by name; `module:name` is a caller's `Metric` or function.
+
+    Raises `InputError` as `asked_metrics` and `load_class` do.
+    """
+    asked = asked_metrics(_loaded(it) for it in listed(metrics))
+    return tuple(it.name if it.name in METRICS else it for it in asked)
+
+
+def _loaded(metric: Asked) -> Asked:
+    if not isinstance(metric, str) or ":" not in metric:
+        return metric
+    module, _, name = metric.rpartition(":")
+    return _metric(*_place(module), name)
+
+
+def _metric(folder: str, module: str, name: str) -> Metric:
+    """A metric by its place, in this process or in another one on the same machine."""
+    fits = Metric, FunctionType
+    made = _member(folder, module, name, "metric", lambda value: isinstance(value, fits))
+    metric: Metric = made if isinstance(made, Metric) else metric_of(made)
+    object.__setattr__(metric, "place", (folder, module, name))
+    return metric
+
+
+def _reduced(metric: Metric) -> Any:
+    place = getattr(metric, "place", None)
+    return object.__reduce_ex__(metric, 4) if place is None else (_metric, place)
+
+
+copyreg.pickle(Metric, _reduced)
+
+
+def _member(folder: str, module: str, name: str, what: str, fits: Callable[[Any], bool]) -> Any:
+    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest one."""
+    loaded = _module(folder, module)
+    value = getattr(loaded, name, None)
+    if fits(value):
+        return value
+    others = [
+        key for key, it in vars(loaded).items()
+        if fits(it) and not key.startswith("_")
+        and not (isinstance(it, type) and not _is_own(it, loaded))
     ]  # fmt: skip
+    if others:
+        choice(f"{what} of {module}", name, others)
+    raise InputError(f"{module} has no {what} {name!r}, and no other either")
 
 
-def _file_of(module: str) -> tuple[Path, str] | None:
-    """The folder and the module's name within it; None for an installed module."""
+def _place(module: str) -> tuple[str, str]:
+    """The folder of a module or of the path of its file, "" if installed, and its name."""
     if module.endswith(".py"):
         path = Path(module)
         if not os.path.isfile(path):
             raise InputError(f"cannot read {module}: no such file")
-        return path.absolute().parent, path.stem
-    return (Path.cwd(), module) if os.path.isfile(_source(Path.cwd(), module)) else None
+        return str(path.absolute().parent), path.stem
+    return str(Path.cwd()) if os.path.isfile(_source(Path.cwd(), module)) else "", module
+
+
+def _module(folder: str, module: str) -> ModuleType:
+    return _from_file(Path(folder), module) if folder else _imported(module)
 
 
 def _imported(module: str) -> ModuleType:

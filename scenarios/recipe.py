@@ -14,15 +14,14 @@ from typing import Any
 from dim import Dim, Mixed
 from minisim.control import Controller, as_controller
 from minisim.errors import InputError, show
+from minisim.hosting import REACTIONS
 from minisim.names import name_of
 from minisim.parameters import checked, declared, part, real, text, whole, word
-from minisim.results.metrics import Metric, named_metrics, recording
+from minisim.results.metrics import Metric, asked_metrics
 from minisim.results.run import Run
 from scenarios.controllers import controller_named
+from scenarios.loading import metrics_named
 from scenarios.scenario import Scenario
-
-#: What a collision does to a run; "teleport" is for SUMO only.
-ON_COLLISION = ("stop", "record", "teleport")
 
 #: Makes a run of a scenario, a controller and a seed, such as `minisim.simulate`.
 Host = Callable[..., Run]
@@ -57,12 +56,12 @@ class Recipe:
     )
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
-        ON_COLLISION, default="stop",
+        REACTIONS, default="stop",
     )  # fmt: skip
     metrics: tuple[str | Metric, ...] = checked(
         "columns besides the usual ones (`minisim.results.metrics`)",
-        lambda _, value: named_metrics(value),
-        "names and Metrics", default=(),
+        lambda _, value: metrics_named(value),
+        "names, module:name and Metrics", default=(),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -100,8 +99,8 @@ class Recipe:
         """
         from minisim.simulation import simulate
 
-        if options.get("record") is None and (record := recording(self.metrics)):
-            options["record"] = record
+        if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
+            options["record"] = options.get("record") or "junction"
         return (host or simulate)(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

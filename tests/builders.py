@@ -138,8 +138,8 @@ def killing(once: str) -> int:
 
 
 def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0) -> Observed:
-    """One vehicle of 5 m."""
-    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+    """One vehicle of 5 m, whose rank is its id."""
+    return Observed(id, lane, manoeuvre, distance, speed, 5.0, rank=id)
 
 
 def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed:

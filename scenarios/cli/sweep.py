@@ -44,9 +44,9 @@ STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
     '  scenario = \\["four-way", "five-way"]\n\n'
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
-    "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
-    "warmup, on_collision, metrics (minisim metrics lists them); what it leaves out is "
-    f"{LEFT_OUT}. Your own junction is written\n\n"
+    "and also humans, profile, side, split, turns, model, min_headway, arrivals, start, seeds, "
+    "horizon, warmup, on_collision, metrics (minisim metrics lists them; mymodule:name is yours). "
+    f"What it leaves out is {LEFT_OUT}. Your own junction is written\n\n"
     f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
@@ -116,7 +116,7 @@ def sweep(
     ):
         rows = _run(experiments, executor, workers, store, out)
     averaged = cells(rows)
-    show(sweep_table(averaged), sweep_notes(rows, averaged, experiments))
+    show(sweep_table(averaged, experiments), sweep_notes(rows, averaged, experiments))
     typer.echo(f"  {len(rows)} runs in {out}")
     if export is not None:
         write_table(rows, export)

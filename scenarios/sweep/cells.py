@@ -10,8 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import AVERAGED, Metric
-from minisim.results.summary import GROUPS
+from minisim.results.metrics import BEGINNINGS, Metric
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
 from scenarios.sweep.rows import grows
 
@@ -20,26 +19,15 @@ if TYPE_CHECKING:
 
 #: Columns that name a cell.
 CELL: Final = (
-    "scenario",
-    "arms",
-    "side",
-    "profile",
-    "split",
-    "turns",
-    "density",
-    "horizon_s",
-    "warmup_s",
+    "scenario", "arms", "side", "profile", "split", "turns", "density", "horizon_s", "warmup_s",
     "controller",
-)
+)  # fmt: skip
 
 #: Summed over the runs of a cell.
 SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are not metrics.
 OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
-
-#: Prefixes of the columns for groups of trips.
-GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
@@ -66,15 +54,16 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
+def averaged(rows: pd.DataFrame) -> list[str]:
     """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
-    known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
-    more = [
+    known = {*CELL, *SUMS, *OTHERS, "host"}
+    return [
         column
         for column in rows.columns
-        if column not in known and not column.startswith(GROUPED) and _is_numeric(rows[column])
+        if column not in known
+        and not column.startswith(BEGINNINGS[1:])  # of groups of trips
+        and _is_numeric(rows[column])
     ]
-    return (*AVERAGED, *more)
 
 
 def _is_numeric(column: pd.Series[Any]) -> bool:

@@ -6,6 +6,8 @@
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
     # humans = [0, 0.2]                 # with controllers of DIM only
+    # arrivals = "count.csv"            # a table to replay, instead of density, split and turns,
+    # start = "07:00"                   # which begins at a time of day
 
     [[experiment]]                      # the lines above hold here too
     scenario = "four-way"
@@ -30,12 +32,12 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from minisim.arrivals import read_arrivals
 from minisim.errors import FileError, InputError, MinisimError, choice, instance, integer, show
 from minisim.hosting import ON_COLLISION
-from minisim.results.metrics import named_metrics
+from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.library import scenario_named
+from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
@@ -61,7 +63,7 @@ AXES: dict[str, Any] = {
 #: Key with one value for a block -> its default.
 SINGLE: dict[str, Any] = {
     "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
-    "metrics": (),
+    "metrics": (), "start": None,
 }  # fmt: skip
 
 #: Keys that recorded arrivals replace.
@@ -155,7 +157,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
-    metrics = named_metrics(single.pop("metrics"))
+    metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
         scenario = _scenario({**dict(zip(axes, values, strict=True)), **single}, folder)
@@ -169,7 +171,9 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
-    recorded = chosen.pop("arrivals")
+    recorded, start = chosen.pop("arrivals"), chosen.pop("start")
+    if recorded is None and start is not None:
+        raise InputError("start goes with arrivals: it is a time in the table")
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
         _check_keys("key of a scenario", junction, JUNCTION)
@@ -179,7 +183,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        made = replace(made, recorded=read_arrivals(folder / recorded, made.intersection.n))
+        table = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
+        made = replace(made, recorded=table)
     return replace(made, name=label or made.name)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from numbers import Integral, Real
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -75,12 +75,12 @@ def canonical(value: object) -> Any:
             **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
         }
     if inspect.isfunction(value):
+        code = _code(value)
         return {
             "function": f"{value.__module__}.{value.__qualname__}",
-            "line": value.__code__.co_firstlineno,  # tells two lambdas apart
             "defaults": canonical([value.__defaults__, value.__kwdefaults__]),
             "encloses": canonical([cell.cell_contents for cell in value.__closure__ or ()]),
-            **_code(value),
+            **(code if "version" in code else {"rule": _rule(value), **code}),
         }
     if isinstance(value, tuple | list):
         return [canonical(item) for item in value]
@@ -94,6 +94,27 @@ def canonical(value: object) -> Any:
         "parameters are not known; make it a frozen dataclass, whose fields are numbers, texts, "
         "functions, arrays, other dataclasses, and collections of them"
     )
+
+
+def _rule(function: FunctionType) -> str:
+    """A digest of a function's instructions, its constants and the plain globals that it reads.
+
+    It tells apart two functions of one name in one file, such as lambdas.
+    """
+
+    def told(code: CodeType) -> list[Any]:
+        known = {name: function.__globals__.get(name) for name in code.co_names}
+        return [
+            code.co_code, code.co_names, [constant(value) for value in code.co_consts],
+            {name: it for name, it in known.items() if isinstance(it, bool | int | float | str)},
+        ]  # fmt: skip
+
+    def constant(value: object) -> Any:
+        if isinstance(value, CodeType):
+            return told(value)
+        return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+    return digest_of(repr(told(function.__code__)))
 
 
 @cache

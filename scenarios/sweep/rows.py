@@ -12,8 +12,8 @@ import numpy as np
 
 from minisim.errors import MinisimError
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.run import environment
 from minisim.results.trips import Trips
-from minisim.version import __version__
 from scenarios.recipe import Recipe
 from scenarios.statistics import growing
 from scenarios.sweep.keys import RESULTS, results_version
@@ -96,13 +96,7 @@ def _fingerprint(trips: Trips) -> str:
 
 
 def _provenance() -> dict[str, str]:
-    return {
-        "minisim": __version__,
-        "results": str(RESULTS),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "machine": platform.machine(),
-    }
+    return {**environment(), "results": str(RESULTS), "machine": platform.machine()}
 
 
 def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

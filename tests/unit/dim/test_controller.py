@@ -177,7 +177,7 @@ def test_sites_that_it_cannot_serve() -> None:
         Dim(matrix=HarmonyMatrix.paper(4)).start(site)
     with pytest.raises(InputError, match="priorities of 5 lanes"):
         Dim(priorities=(0, 1, 2)).start(site)
-    with pytest.raises(InputError, match="make arm_length longer"):
+    with pytest.raises(InputError, match="increase arm_length"):
         Dim().start(four_way(arm_length=40.0).site())
     with pytest.raises(InputError, match="site must be a Site"):
         Dim().start("four-way")  # type: ignore[arg-type]

@@ -146,7 +146,7 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
     some = having(lambda e: (e.label, e.seed) != ("all-way-stop", 2))
     (note,) = [t for t in texts_of(drawn("fair", some)) if "s each" in t]
-    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
+    assert note.startswith("180 of 192 runs (2 seeds per case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5))

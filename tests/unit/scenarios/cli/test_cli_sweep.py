@@ -56,6 +56,24 @@ def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
     assert rows["error"].isna().all()
 
 
+def test_the_table_shows_what_was_asked_for_and_tells_cells_apart(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    file, store = tmp_path / "e.toml", str(tmp_path / "s.db")
+    file.write_text(
+        'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n'
+        'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
+    )
+    lines = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", store).splitlines()
+    head = next(line for line in lines if "veh/h/lane" in line)
+    for word in ("turns", "time loss [s]", "p95", "trips", "hardest braking [m/s²]"):
+        assert head.count(word) == 1
+    assert head.count("collisions") == 1
+    assert "waiting" not in head
+    cells = [line.split() for line in lines if " dim " in line]
+    assert [cell[3] for cell in cells] == ["uniform", "1:2:1"]
+
+
 def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text('horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n')

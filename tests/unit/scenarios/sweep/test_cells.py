@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ import pytest
 
 from dim import Dim
 from minisim.errors import InputError
-from minisim.results.metrics import AVERAGED, Metric
+from minisim.results.metrics import MEANS, Metric
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, three_way
@@ -80,7 +82,7 @@ def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     first = found.iloc[0]
     group = rows[:3]
     assert (first["runs"], first["failed"]) == (3, 0)
-    for metric in AVERAGED:
+    for metric in (*MEANS, *(f"complete_{name}" for name in MEANS)):
         interval = mean_interval(group[metric].tolist())
         assert first[metric] == interval.mean
         assert first[f"{metric}_ci95"] == interval.half_width
@@ -185,21 +187,41 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
 
     assert key(one) == key(one)
     assert key(power(1.0)) == key(power(1.0)) != key(power(2.0)), "what it encloses counts"
-    first, second = (
-        lambda run: 1.0,
-        lambda run: 2.0,
-    )
-    assert key(first) != key(second)
+    pair = lambda run: 1.0, lambda run: 2.0  # fmt: skip  # one name, one line
+    assert key(pair[0]) == key(pair[0]) != key(pair[1])
+    inner = [lambda run: max(x for x in (1, 2)), lambda run: max(x for x in (1, 3))]
+    assert key(inner[0]) != key(inner[1])
     told = power(1.0)
     told.version = 2  # type: ignore[attr-defined]
     assert key(told) != key(power(1.0))
 
 
-def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
-    wrong = Metric("mine", lambda run: "many")
+LIMIT = 1.0
+
+
+def test_a_global_that_an_own_metric_reads_is_part_of_the_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recipe = Recipe(four_way(), Dim(), metrics=(Metric("mine", lambda run: LIMIT),))
+    before = key_of(recipe)
+    monkeypatch.setattr(sys.modules[__name__], "LIMIT", 2.0)
+    assert key_of(recipe) != before
+
+
+@pytest.mark.parametrize(
+    ("of", "message"),
+    [
+        (lambda run: "many", r"metric 'mine' must give one finite number or None, got 'many'"),
+        (
+            lambda run: run.trips["wait"],
+            r"metric 'mine' raised KeyError: 'wait' \(test_cells.py, .*",
+        ),
+    ],
+)
+def test_a_metric_that_fails_is_a_failed_run(of: Callable[[Run], Any], message: str) -> None:
     todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
-    (error,) = sweep(todo, jobs=1, metrics=[wrong])["error"]
-    assert error == "metric 'mine' must give one finite number or None, got 'many'"
+    (error,) = sweep(todo, jobs=1, metrics=[Metric("mine", of)])["error"]
+    assert re.fullmatch(message, error)
 
 
 # --- experiments -----------------------------------------------------------------------------

@@ -8,8 +8,8 @@ import pytest
 
 from baselines import FixedTime
 from dim import Dim, Mixed
-from minisim.arrivals import write_arrivals
 from minisim.errors import FileError, InputError, MinisimError
+from minisim.recorded import write_arrivals
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.cli import main, sweep
 from scenarios.cli.sweep import DEFAULTS
@@ -32,7 +32,7 @@ def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
 
 def test_the_help_has_the_values_of_what_is_left_out() -> None:
     drawn = {**AXES, **SINGLE}
-    assert drawn.pop("arrivals") is None
+    assert drawn.pop("arrivals") is drawn.pop("start") is None
     assert drawn.pop("metrics") == ()
     assert drawn == DEFAULTS
     assert sweep.CUSTOM == CUSTOM
@@ -100,6 +100,9 @@ def test_warmup_and_metrics_hold_for_the_block(tmp_path: Path) -> None:
     (one,) = read(tmp_path, 'seeds = [1]\nwarmup = 600\nmetrics = ["travel_time_s", "min_pet_s"]')
     assert one.scenario == four_way(warmup=600.0)
     assert one.metrics == ("travel_time_s", "min_pet_s")
+    for text in ('"pets"', '"pets, trips"', '["pets", "trips"]'):
+        (one,) = read(tmp_path, f"seeds = [1]\nmetrics = {text}")
+        assert one.metrics == ("pets", "trips")[: 1 + ("trips" in text)]
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -126,6 +129,11 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     assert found.scenario.recorded is not None
     assert found.scenario.recorded.time.tolist() == arrivals.time.tolist()
     assert found.scenario.density == pytest.approx(len(arrivals) * 36 / 4)
+    (later,) = read(tmp_path, 'arrivals = "a.csv"\nstart = "00:01"\nseeds = [0]\nhorizon = 100\n')
+    assert (
+        later.scenario.recorded.time.tolist()
+        == (arrivals.time[arrivals.time >= 60.0] - 60.0).tolist()
+    )
     assert identity_of(found)["split"] == "recorded"
 
 
@@ -172,11 +180,13 @@ WRONG = [
     ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
     ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
-    ('metrics = "trips"', r"metrics must be a sequence"),
+    ('metrics = "trip"', r"unknown metric 'trip'.*did you mean 'trips'"),
+    ("metrics = 3", r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a str"),
+    ('start = "07:00"', r"start goes with arrivals"),
     ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
      r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
