@@ -30,7 +30,7 @@ from typing import NamedTuple
 import shapely
 
 from baselines.v2ic import CRAWL
-from minisim.control import Advise, Command, Plan, Site, View, Wake
+from minisim.control import NOTHING, Advise, Command, Plan, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.names import Name
@@ -63,6 +63,7 @@ class V2ICAsRun:
     """V2I-C as the authors of the paper ran it, for 4 arms; it may collide."""
 
     name = Name("v2ic-as-run")
+    covers = NOTHING
 
     approach_speed: float = real(
         "speed desired from insertion to the first advice: 16.6 in the balanced runs, 14 (the "

@@ -41,7 +41,7 @@ import networkx as nx
 
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
-from minisim.control import Advise, Command, Observed, Plan, Site, View, Wake
+from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, printable
 from minisim.junction.movements import Movement
 from minisim.names import Name
@@ -93,6 +93,7 @@ class AsRunDim:
     """DIM as the authors ran it for the published numbers, on 3, 4 and 5 arms; it may collide."""
 
     name = Name("dim-as-run")
+    covers = NOTHING
 
     order: str = word(
         "what comes first: the highest-priority lanes, as in every published run, or the largest "

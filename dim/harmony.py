@@ -14,14 +14,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, show
-from minisim.files import write_text
+from minisim.files import read_file, write_text
 from minisim.junction.conflicts import CLEARANCE, conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
@@ -83,13 +82,7 @@ class HarmonyMatrix:
         Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
         for labels or entries that are no harmony matrix (with the entry).
         """
-        instance("path of a harmony matrix", path, (str, os.PathLike))
-        try:
-            data = Path(path).read_bytes()
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise FileError(f"cannot read harmony matrix {path!s}: {reason}") from None
-        return _parse(data, f"harmony matrix {path!s}")
+        return _parse(read_file("harmony matrix", path), f"harmony matrix {path!s}")
 
     def to_text(self) -> str:
         """The matrix as `from_csv` reads it."""

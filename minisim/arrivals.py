@@ -7,6 +7,7 @@ vehicles.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -106,7 +107,7 @@ class Arrivals:
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers or as text such as "4:3:2:1"; None if they are equal.
+    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)"; None if equal.
 
     Args:
         name: what messages call them.
@@ -121,8 +122,10 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if isinstance(value, str):
         if value == equal:
             return None
+        text = value.strip()
+        listed = text[1:-1] if text[:1] + text[-1:] in ("()", "[]") else text
         try:
-            value = tuple(map(float, value.split(":")))
+            value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
             raise InputError(
                 f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
@@ -131,6 +134,11 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
         raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
     return shares
+
+
+def shares_text(shares: Shares, equal: str) -> str:
+    """Shares as `read_shares` returns them, as text such as "4:3:2:1" or the word `equal`."""
+    return equal if shares is None else ":".join(f"{float(share):g}" for share in shares)
 
 
 @declared(kw_only=True)

@@ -5,7 +5,8 @@ movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.na
 `minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
 numbers), and
 `minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
-engine, the hosts or the results; `make lint` checks this.
+engine, the hosts or the results; `make lint` checks this. `baselines.prediction` alone also takes
+the engine's laws, so that it predicts by the one that drives the vehicles.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -27,7 +28,7 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
 from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
-from minisim.vehicle import VehicleType
+from minisim.vehicle import MODELS, VehicleType
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
 #: `--junctions.limit-turn-speed`, so that turn speeds are comparable with SUMO's.
@@ -284,9 +285,51 @@ class Kinds(Session, Protocol):
         """Kind of a vehicle, such as "human", by its lane and its place there."""
 
 
+@dataclass(frozen=True)
+class Cover:
+    """The vehicles with which a controller promises: none collides, and each is served.
+
+    Attributes:
+        laws: names of their car-following models (`minisim.vehicle.MODELS`).
+        alike: whether their drivers must be alike, which is a `speed_deviation` of 0.
+    """
+
+    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")
+    alike: bool = False
+
+    def __contains__(self, vehicle: VehicleType) -> bool:
+        return vehicle.model in self.laws and not (self.alike and vehicle.speed_deviation > 0.0)
+
+    def __str__(self) -> str:
+        laws = f"vehicles of the models {', '.join(self.laws)}" if self.laws else "no vehicles"
+        return laws + (" whose drivers are alike (speed_deviation 0)" if self.alike else "")
+
+    def check(self, name: str, vehicle: VehicleType) -> None:
+        """Raise `InputError` for a vehicle that is not covered, for a controller that needs it."""
+        if vehicle not in self:
+            raise InputError(
+                f"{name} is for {self}, got model {vehicle.model!r} with a speed_deviation of "
+                f"{vehicle.speed_deviation:g}"
+            )
+
+
+#: What a controller covers that says nothing else, and what one does that may collide.
+ORDINARY, NOTHING = Cover(), Cover(laws=())
+
+
+def cover_of(controller: object) -> Cover:
+    """What a controller, or its class, covers: its attribute `covers`, if it has one."""
+    covers: Cover = getattr(controller, "covers", ORDINARY)
+    return covers
+
+
 @runtime_checkable
 class Controller(Protocol):
-    """A recipe for sessions: hashable, picklable, never changed by a run."""
+    """A recipe for sessions: hashable, picklable, never changed by a run.
+
+    It promises that no vehicles collide and each is served wherever it starts, if the vehicles are
+    `ORDINARY`. One that promises less or more says so by an attribute `covers`, a `Cover`.
+    """
 
     @property
     def name(self) -> str:
@@ -316,6 +359,7 @@ class Unregulated:
     """
 
     name = Name("unregulated")
+    covers = NOTHING
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""

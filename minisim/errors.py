@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
+import traceback
 from collections.abc import Callable, Iterable, Mapping, Set
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 #: What users call values of these classes.
@@ -187,6 +190,18 @@ def show(value: object) -> str:
     except ValueError:  # Python refuses to print integers of thousands of digits
         return f"a {type(value).__name__} too large to print"
     return text if len(text) <= 200 else f"{text[:200]}…"
+
+
+def told(error: BaseException, folder: str | os.PathLike[str] = "/") -> str:
+    """An error of a caller's own code, preceded by the last line in the folder that led to it."""
+    if isinstance(error, SyntaxError):
+        return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
+    lines = [
+        f"{Path(frame.filename).name}, line {frame.lineno}: "
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).is_relative_to(folder)
+    ]
+    return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
 
 
 def _range(low: float, high: float, above: float, below: float) -> str:

@@ -31,7 +31,7 @@ from baselines import (
     V2ICAsRun,
 )
 from dim import AsRunDim, Dim
-from minisim.control import Controller, Unregulated, as_controller
+from minisim.control import Controller, Unregulated, as_controller, cover_of
 from minisim.errors import InputError, nearest, show
 from minisim.spelling import Call, build, call_of, parse_arguments
 from scenarios.loading import controllers_in, has_source, is_maker, load_class
@@ -68,14 +68,12 @@ class Entry(NamedTuple):
         name: the controller's name, without parameters.
         make: its class, which declares the parameters; its docstring's first line is the help text.
         variants: those that have a look or are rivals.
-        safe: whether these variants never collide, with any number of arms.
         as_run: what the bare name means under the profile `as_run`; empty means the same as usual.
     """
 
     name: str
     make: type[Any]
     variants: tuple[Variant, ...] = (Variant(),)
-    safe: bool = True
     as_run: str = ""
 
 
@@ -86,11 +84,11 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("dim", Dim, (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
-            Variant("order=lanes", Look("DIM, lanes first", "green", "^", "--")),
-            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "s", "--")),
-            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "D", ":")),
+            Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "P", "--")),
+            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),
             Variant("order=lanes,priorities=waiting"),
-            Variant("monitor=on", Look("DIM with safety monitor", "purple", "v", "-.")),
+            Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
         Entry("fixed-time", FixedTime, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
@@ -111,9 +109,9 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("", Look("longest queue first", "brown", "<", ":"), rival=True),
         )),
         Entry("actuated", Actuated),
-        Entry("dim-as-run", AsRunDim, safe=False),
-        Entry("v2ic-as-run", V2ICAsRun, safe=False),
-        Entry("unregulated", Unregulated, safe=False),
+        Entry("dim-as-run", AsRunDim),
+        Entry("v2ic-as-run", V2ICAsRun),
+        Entry("unregulated", Unregulated),
     )
 })  # fmt: skip
 
@@ -128,7 +126,7 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType({
 RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 
 #: Spellings of the variants that never collide and that serve any number of arms.
-SAFE = tuple(name for name in VARIANTS if CONTROLLERS[name.partition(":")[0]].safe)
+SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":")[0]].make).laws)
 
 #: How a class of a caller's own is written: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)

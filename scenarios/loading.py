@@ -13,14 +13,13 @@ import io
 import os
 import pickle
 import sys
-import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from minisim.errors import InputError, choice
+from minisim.errors import InputError, choice, told
 from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
@@ -34,14 +33,13 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    kind: type = _member(*_place(module), name, "class", lambda value: isinstance(value, type))
+    kind: type = _member(*_place(module), name, "class", _is_class, _controllers)
     return kind
 
 
 def controllers_in(module: str) -> list[str]:
     """The names of the controllers that a module defines; raises `InputError` as `load_class`."""
-    loaded = _module(*_place(module))
-    return [key for key, it in vars(loaded).items() if isinstance(it, type) and _is_own(it, loaded)]
+    return _controllers(_module(*_place(module)))
 
 
 def has_source(module: str) -> bool:
@@ -54,9 +52,17 @@ def is_maker(kind: type) -> bool:
     return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
 
 
-def _is_own(kind: type, module: ModuleType) -> bool:
-    """Whether it makes controllers, and is defined in the module or its parts, not imported."""
-    return is_maker(kind) and f"{kind.__module__}.".startswith(f"{module.__name__}.")
+def _is_class(value: object) -> bool:
+    return isinstance(value, type)
+
+
+def _controllers(module: ModuleType) -> list[str]:
+    """Those that the module or its parts define, not what it imports from elsewhere."""
+    return [
+        key for key, value in vars(module).items()
+        if isinstance(value, type) and is_maker(value) and not key.startswith("_")
+        and f"{value.__module__}.".startswith(f"{module.__name__}.")
+    ]  # fmt: skip
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
@@ -77,11 +83,18 @@ def _loaded(metric: Asked) -> Asked:
 
 def _metric(folder: str, module: str, name: str) -> Metric:
     """A metric by its place, in this process or in another one on the same machine."""
-    fits = Metric, FunctionType
-    made = _member(folder, module, name, "metric", lambda value: isinstance(value, fits))
+    made = _member(folder, module, name, "metric", _is_metric, _metrics)
     metric: Metric = made if isinstance(made, Metric) else metric_of(made)
     object.__setattr__(metric, "place", (folder, module, name))
     return metric
+
+
+def _is_metric(value: object) -> bool:
+    return isinstance(value, (Metric, FunctionType))
+
+
+def _metrics(module: ModuleType) -> list[str]:
+    return [key for key, it in vars(module).items() if _is_metric(it) and not key.startswith("_")]
 
 
 def _reduced(metric: Metric) -> Any:
@@ -92,20 +105,26 @@ def _reduced(metric: Metric) -> Any:
 copyreg.pickle(Metric, _reduced)
 
 
-def _member(folder: str, module: str, name: str, what: str, fits: Callable[[Any], bool]) -> Any:
-    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest one."""
+def _member(
+    folder: str,
+    module: str,
+    name: str,
+    what: str,
+    fits: Callable[[object], bool],
+    others: Callable[[ModuleType], list[str]],
+) -> Any:
+    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest of others."""
     loaded = _module(folder, module)
     value = getattr(loaded, name, None)
     if fits(value):
         return value
-    others = [
-        key for key, it in vars(loaded).items()
-        if fits(it) and not key.startswith("_")
-        and not (isinstance(it, type) and not _is_own(it, loaded))
-    ]  # fmt: skip
-    if others:
-        choice(f"{what} of {module}", name, others)
+    if names := others(loaded):
+        choice(f"{what} of {module}", name, names)
     raise InputError(f"{module} has no {what} {name!r}, and no other either")
+
+
+def _module(folder: str, name: str) -> ModuleType:
+    return _from_file(Path(folder), name) if folder else _imported(name)
 
 
 def _place(module: str) -> tuple[str, str]:
@@ -118,10 +137,6 @@ def _place(module: str) -> tuple[str, str]:
     return str(Path.cwd()) if os.path.isfile(_source(Path.cwd(), module)) else "", module
 
 
-def _module(folder: str, module: str) -> ModuleType:
-    return _from_file(Path(folder), module) if folder else _imported(module)
-
-
 def _imported(module: str) -> ModuleType:
     try:
         return importlib.import_module(module)
@@ -131,7 +146,7 @@ def _imported(module: str) -> ModuleType:
                 f"no module {module!r}: there is no {module.replace('.', '/')}.py in the working "
                 "directory, and none of that name is installed"
             ) from None
-        raise InputError(f"cannot import {module}: {_told(error)}") from error
+        raise InputError(f"cannot import {module}: {told(error)}") from error
 
 
 def _from_file(folder: Path, name: str) -> ModuleType:
@@ -149,7 +164,7 @@ def _from_file(folder: Path, name: str) -> ModuleType:
         try:
             module = importlib.reload(known) if known else importlib.import_module(name)
         except (Exception, SystemExit) as error:
-            raise InputError(f"cannot import {name}: {_told(error, folder)}") from error
+            raise InputError(f"cannot import {name}: {told(error, folder)}") from error
     _check_own(module, file)
     _texts[file] = text
     for kind in vars(module).values():
@@ -185,18 +200,6 @@ def _found_in(folder: Path) -> Iterator[None]:
     finally:
         sys.path[:] = before
         sys.dont_write_bytecode = written
-
-
-def _told(error: BaseException, folder: Path = Path("/")) -> str:
-    """What went wrong, preceded by the last line in the folder's files that led to it."""
-    if isinstance(error, SyntaxError):
-        return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
-    lines = [
-        f"{Path(frame.filename).name}, line {frame.lineno}: "
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(folder)
-    ]
-    return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
 
 
 class _Reduce:

@@ -195,8 +195,8 @@ def controller_of(
     if cell.controller == "fts":
         return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
     if cell.controller == "ats":
-        signal = Actuated if ran.controller == "actuated" else Adaptive
-        return signal(order=PHASES)
+        actuated = ran.controller == "actuated"
+        return Actuated(order=PHASES, presence=False) if actuated else Adaptive(order=PHASES)
     if cell.controller == "dim" and cell.split == RENAMED:
         return AsRunDim(names=RENAMED_ARMS)
     return controller_named(ran.controller or LABELS[cell.controller][0], _profile(cell, ran))

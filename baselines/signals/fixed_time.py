@@ -33,7 +33,7 @@ class FixedTime:
     """A signal that gives each approach its green in turn, with Webster's green times.
 
     The cycle is the sum of all greens, ambers and all-reds and starts with the first lane's green.
-    With the defaults the ambers are Webster's lost times.
+    Webster's effective greens are longer than those shown by amber and all-red less `lost_time`.
     """
 
     name = Name("fixed-time")
@@ -47,9 +47,11 @@ class FixedTime:
     saturation_flow: float = real(
         "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
     )
-    lost_time: float = real(
-        "lost time of each phase, which only Webster's formula uses", "s",
-        low=0, high=60, default=2.0,
+    # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
+    # 2 s of amber that drivers still use.
+    lost_time: float | None = real(
+        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        low=0, high=120, optional=True, default=None,
     )  # fmt: skip
     equal_greens: bool = switch(
         "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
@@ -73,23 +75,28 @@ class FixedTime:
         Raises `InputError` if the number of greens is not the number of lanes, `max_cycle` is too
         short, or `order` does not list every lane once.
         """
-        n = site.intersection.n
+        n, change = site.intersection.n, self.amber + self.all_red
+        lost = change if self.lost_time is None else self.lost_time
+        longer = change - lost
         if self.greens is None:
             optimum = webster(
                 site.demand,
                 saturation_flow=self.saturation_flow,
-                lost_time_per_phase=self.lost_time,
+                lost_time_per_phase=lost,
                 equal_greens=self.equal_greens,
+                min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
             )
-            greens, capped = optimum.greens, optimum.capped
+            greens, capped = tuple(green - longer for green in optimum.greens), optimum.capped
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
             capped = False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens).cycle
-        return timing_of(greens, cycle, site.demand, self.saturation_flow, capped=capped)
+        return timing_of(
+            greens, cycle, site.demand, self.saturation_flow, longer=longer, capped=capped
+        )
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""

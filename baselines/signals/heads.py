@@ -142,7 +142,7 @@ def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
 
 
 def stopping_sight(site: Site) -> float:
-    """How far a view must reach so that every vehicle beyond it can still stop [m]."""
+    """How far a view must reach on the approach lanes so that what is beyond it can stop [m]."""
     fastest = site.speed_limit * (FASTEST_DRIVER if site.vehicle.speed_deviation else 1.0)
     needed = stopping_distance(fastest, site.vehicle.deceleration)
-    return needed + COMMIT_MARGIN + SIGHT_MARGIN
+    return min(needed + COMMIT_MARGIN + SIGHT_MARGIN, site.intersection.approach_length)

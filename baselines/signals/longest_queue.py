@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from baselines.signals.phases import PhaseSession, Verdict, on_detector
+from baselines.signals.phases import PhaseSession, Verdict, check_detector, on_detector
 from minisim.control import Site, View
 from minisim.names import Name
 from minisim.parameters import declared, real
@@ -41,7 +41,8 @@ class LongestQueue:
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
 
     def start(self, site: Site) -> QueueSession:
-        """Begin a run."""
+        """Begin a run; raises `InputError` for a detector that is too short."""
+        check_detector(self.detector_range, site)
         return QueueSession(self, site)
 
 

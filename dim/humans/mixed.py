@@ -78,7 +78,7 @@ class MixedSession:
         self.plan: Plan = replace(
             plan,
             marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another becomes first
-            sight=max(plan.sight, self._humans.sight),
+            sight=min(max(plan.sight, self._humans.sight), site.intersection.approach_length),
         )
 
     def kind(self, lane: int, rank: int) -> str:

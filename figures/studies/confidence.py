@@ -17,15 +17,16 @@ def confidence_figure(results: Results) -> Figure:
     """Collisions, false grants and delay, plotted against the confidence threshold."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
-        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.735,
+        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.79,
         bottom=0.155, wspace=0.22,
     )  # fmt: skip
     for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
-        for kind, look in outcomes.KIND_LOOKS.items():
+        for (kind, look), aside in zip(outcomes.KIND_LOOKS.items(), (-0.08, 0.08), strict=True):
             cells = [
                 outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
             ]
-            outcomes.draw(axes, range(len(THRESHOLDS)), cells, outcome, look)
+            places = [k + aside for k in range(len(THRESHOLDS))]
+            outcomes.draw(axes, places, cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
         outcomes.dress(axes, outcome, outcome, "lowest confidence that is believed", ticks)
     plots.heading(figure, f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of "

@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
-from minisim.errors import InputError
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path
 from minisim.streams import Draws
@@ -201,11 +200,6 @@ def build_law(
     """Collect the scalars of a run."""
     vehicle = site.vehicle
     entry = site.intersection.approach_length
-    if plan.hold_distance > entry - vehicle.length:
-        raise InputError(
-            f"the hold line, {plan.hold_distance:g} m before the junction, is not on the approach "
-            f"lane of {entry:g} m"
-        )
     near = record == "junction"
     return Law(
         dt=site.dt,

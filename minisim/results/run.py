@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Iterable, Mapping
@@ -85,6 +86,8 @@ class Run:
     rows: Records  #: vehicle id and path of each row to which the trace refers
     #: What the controller's session has counted since the warm-up.
     counts: Mapping[str, float] = field(default_factory=dict)
+    #: First and last time of the recording [s]; the run may have ended earlier.
+    record_window: tuple[float, float] = (0.0, math.inf)
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
     #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})

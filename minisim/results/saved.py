@@ -20,14 +20,13 @@ import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Final, NoReturn
 
 import numpy as np
 import pandas as pd
 
 from minisim.errors import FileError, InputError, MissingExtraError, instance, show
-from minisim.files import replacing
+from minisim.files import read_file, replacing
 from minisim.results.run import Run
 from minisim.results.trips import TRIP_ARRAYS, Trips
 
@@ -40,7 +39,8 @@ PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
-    "seed", "site", "plan", "collisions", "record", "counts", "host", "environment",
+    "seed", "site", "plan", "collisions", "record", "record_window", "counts", "host",
+    "environment",
 )  # fmt: skip
 
 
@@ -111,14 +111,9 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
 
 def load(path: str | os.PathLike[str]) -> Run:
     """Read a run; see `Run.load`."""
-    instance("saved run", path, (str, os.PathLike))
     _need_pyarrow()
+    data = read_file("saved run", path, 2**32)
     place = os.fspath(path)
-    try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read {place}: {reason}") from error
     if not data.startswith(b"PK"):
         raise FileError(f"{place} is not a saved run of minisim")
     try:

@@ -7,9 +7,12 @@ needs when it runs, so that `minisim --help` is quick.
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import shlex
+import signal
 import sys
+import traceback
 from collections.abc import Sequence
 
 import typer
@@ -41,9 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input gives one line on stderr and code 2. A collision that stops a run, or a stdout that
-    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback.
+    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback,
+    unless the environment variable MINISIM_TRACEBACK is set.
     """
     prepare_streams()
+    if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         _check_once(given)
@@ -51,6 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
     except MinisimError as error:
+        if os.environ.get("MINISIM_TRACEBACK"):
+            traceback.print_exception(error)
         told = "; ".join([str(error), *getattr(error, "__notes__", ())])
         return _fail(told, 1 if isinstance(error, CollisionError) else 2)
     except _USAGE_ERROR as error:
@@ -68,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except OSError as error:
         if error.filename is not None:
-            raise
+            return _fail(f"cannot use {error.filename}: {error.strerror}")
         drop_output()
         return _fail(f"cannot write to stdout: {error.strerror or error}", 1)
     if code == 130:

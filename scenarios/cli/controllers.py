@@ -26,6 +26,7 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
+    from minisim.control import cover_of
     from scenarios.controllers import controller_named, maker_of, read_spec
 
     if name is None:
@@ -40,11 +41,12 @@ def controllers(
     call = read_spec(name)
     make = maker_of(call.name)
     made = controller_named(name) if call.places or call.named else None
-    meaning, parameters = _meaning(make), list(_parameters(make, made))
+    meaning, parameters, covers = _meaning(make), list(_parameters(make, made)), str(cover_of(make))
     if as_json:
-        show_json({"name": name, "meaning": meaning, "parameters": parameters})
+        show_json({"name": name, "meaning": meaning, "covers": covers, "parameters": parameters})
         return
     typer.echo(wrapped(f"{name}: {meaning}", 0))
+    typer.echo(wrapped(f"None collides, and each is served: {covers}.", 0))
     _show_parameters(parameters)
     for parameter in parameters:
         for word, kind in parameter["kinds"].items():

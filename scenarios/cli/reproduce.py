@@ -72,6 +72,8 @@ def reproduce(
             took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
             failed = f", {len(done.failed)} failed" if done.failed else ""
             typer.echo(f"{name}: {took}{failed}", err=True)
+        if rows.outdated:
+            typer.echo(f"minisim: {rows.outdated}", err=True)
         with bar("drawing") as progress:
             files = write_report(
                 Archive(find_in(rows), effort), made, workers, folder, progress, parts=names

@@ -64,6 +64,7 @@ def run(
     from scenarios.controllers import controller_named
     from scenarios.loading import metrics_named
     from scenarios.recipe import Recipe
+    from scenarios.sweep.rows import identity_of
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -102,6 +103,10 @@ def run(
     try:
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
+        if as_json:
+            touched = [collision._asdict() for collision in error.collisions]
+            facts = identity_of(recipe) | {"collisions": len(touched), "touched": touched}
+            show_json({**facts, "error": str(error)})
         unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
         error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise

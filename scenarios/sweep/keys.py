@@ -8,7 +8,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from numbers import Integral, Real
 from types import CodeType, FunctionType
@@ -41,6 +41,18 @@ def description_of(recipe: Recipe) -> str:
 def key_of(recipe: Recipe) -> str:
     """The key of a recipe in a store; raises `InputError` as `canonical`."""
     return digest_of(description_of(recipe))
+
+
+def content_of(recipe: Recipe) -> str | None:
+    """A digest of what runs, whatever it is called; None if it cannot be described.
+
+    Equal for runs that differ in nothing but their seed and, if so, their recorded arrivals.
+    """
+    scenario = replace(recipe.scenario, recorded=None)
+    try:
+        return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]
+    except InputError:
+        return None
 
 
 def digest_of(description: str) -> str:
@@ -125,7 +137,8 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     in its session, so the whole file counts, but not what it imports.
 
     Raises:
-        InputError: neither a version nor a file, as in an interactive session.
+        InputError: neither a version nor a file, as in an interactive session; or a class without a
+            version that a function has made, perhaps with values that are in no field.
     """
     modules = sorted({
         parent.__module__
@@ -137,6 +150,12 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     version = getattr(kind, "version", None)
     if isinstance(version, str | int):
         return {"version": canonical(version)}
+    if isinstance(kind, type) and "<locals>" in kind.__qualname__:
+        raise InputError(
+            f"{kind.__qualname__} cannot be stored: a function makes this class, and may give it "
+            "values that are in none of its fields; move it to the top of its module, or give it a "
+            "`version` that says what it was made with"
+        )
     try:
         texts = "".join(inspect.getsource(sys.modules[name]) for name in modules)
     except (OSError, TypeError, KeyError) as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from minisim.arrivals import BALANCED, UNIFORM, shares_text
 from minisim.errors import MinisimError
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import environment
@@ -43,8 +44,8 @@ def identity_of(recipe: Recipe) -> Row:
         "side": intersection.side,
         "profile": scenario.profile.name,
         "density": scenario.density,
-        "split": "recorded" if recorded else _shares(demand.split, "balanced"),
-        "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
+        "split": "recorded" if recorded else shares_text(demand.split, BALANCED),
+        "turns": "recorded" if recorded else shares_text(demand.turns, UNIFORM),
         "seed": recipe.seed,
         "horizon_s": scenario.horizon,
         "warmup_s": scenario.warmup,
@@ -105,7 +106,3 @@ def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
             yield from _flat(value, f"{prefix}{key}_")
         else:
             yield f"{prefix}{key}", value
-
-
-def _shares(shares: Any, equal: str) -> str:
-    return equal if shares is None else ":".join(f"{share:g}" for share in shares)

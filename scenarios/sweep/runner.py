@@ -15,7 +15,7 @@ from minisim.errors import ExecutorError, InputError, instance, integer, show
 from minisim.results.metrics import Asked
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
-from scenarios.sweep.keys import key_of
+from scenarios.sweep.keys import content_of, key_of
 from scenarios.sweep.pool import given, handed, pooled
 from scenarios.sweep.rows import Row, failed, outcome_of
 from scenarios.sweep.store import Store
@@ -60,7 +60,8 @@ def sweep(
         What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
         ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
         (`scenarios.statistics.growing`, with its limits), `arrivals` (equal for common arrivals),
-        `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
+        `cpu_s`, `version`, `error`: why a run failed, missing where it did not, and `recipe`
+        (`scenarios.sweep.keys.content_of`).
 
     Raises:
         InputError: something other than a `Recipe` or a `Store`, or a controller or metric that
@@ -121,6 +122,7 @@ def finished(
                 lost += 1
                 continue
             outcome = failed(todo[k], result) if isinstance(result, BaseException) else result
+            outcome.row["recipe"] = content_of(todo[k])
             if store is not None:
                 store.put(todo[k], outcome)
             yield k, outcome.row

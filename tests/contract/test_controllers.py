@@ -31,10 +31,12 @@ from minisim.control import (
     Unregulated,
     View,
     Wake,
+    cover_of,
 )
 from minisim.errors import InputError
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
+from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
 from tests.builders import as_run
@@ -66,6 +68,36 @@ CONTROLLERS = (*map(controller_named, SAFE), *MORE)
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_every_controller_keeps_the_contract(controller: Controller) -> None:
     check_controller(controller, horizon=120.0)
+
+
+#: Corners of what a scenario may be, each with options of `small_scenario` and of its vehicles.
+EDGES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "drivers who differ": ({}, {"speed_deviation": 0.5}),
+    "Krauss's law": ({"dt": 0.25}, {"model": "krauss", "deceleration": 0.5, "headway": 10.0}),
+    "the improved IDM": ({}, {"model": "iidm", "min_gap": 0.5}),
+    "long and slow vehicles": ({}, {"length": 6.0, "acceleration": 0.8, "min_gap": 20.0}),
+    "a crawl": ({"speed_limit": 0.5, "arm_length": 60.0}, {}),
+    "coarse steps": ({"speed_limit": 1.0, "dt": 0.5, "arm_length": 60.0}, {}),
+    "a race track": ({"speed_limit": 100.0}, {}),
+}
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+def test_what_a_controller_covers_is_safe_and_served_and_it_refuses_what_it_cannot(
+    controller: Controller,
+) -> None:
+    for what, (options, vehicle) in EDGES.items():
+        scenario = small_scenario(
+            3, demand_time=30.0, drain=20_000.0, vehicle=VehicleType(**vehicle), **options
+        )
+        if scenario.vehicle not in cover_of(controller):
+            with pytest.raises(InputError, match="is for vehicles of the models"):
+                minisim.simulate(scenario, controller, 1)
+            continue
+        run = minisim.simulate(scenario, controller, 1, on_collision="record")
+        assert len(run.columns.lane) > 3
+        assert run.collisions == (), what
+        assert run.columns.arrived.all(), what
 
 
 @pytest.mark.parametrize("controller", [AsRunDim(), AsRunDim(order="size")], ids=lambda c: c.name)

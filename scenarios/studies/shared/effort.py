@@ -58,7 +58,7 @@ class Effort:
     @property
     def warning(self) -> str:
         """A warning before the numbers of a smoke test; empty otherwise."""
-        return "" if self.densities is None else "Smoke test, which means nothing: "
+        return "" if self.densities is None else "A smoke test: its numbers mean nothing. "
 
     def command(self, *names: str) -> str:
         """The command line that makes the runs of these studies."""

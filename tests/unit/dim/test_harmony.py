@@ -227,7 +227,7 @@ def test_unreadable_and_unwritable_paths(
 
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])
 def test_a_path_is_text(path: object) -> None:
-    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
+    with pytest.raises(InputError, match=r"^harmony matrix file must be"):
         HarmonyMatrix.from_csv(path)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]

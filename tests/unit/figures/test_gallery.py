@@ -315,7 +315,7 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "- as-run: DIM, 5 arms, balanced, 350 veh/h/lane: 4 in 0.1 h" in text
     assert "Why DIM collides as it was run: the published five-arm table" in text
-    assert "- `as-run`: Smoke test, which means nothing: " in text
+    assert "- `as-run`: A smoke test: its numbers mean nothing. " in text
 
 
 def test_the_report_keeps_its_appendix_for_the_end() -> None:

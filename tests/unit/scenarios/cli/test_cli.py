@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -196,6 +199,12 @@ def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: 
     assert "touched" in said
     assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
     assert list(tmp_path.iterdir()) == []
+    assert main([*arguments, "--json"]) == 1
+    printed = capsys.readouterr()
+    facts = json.loads(printed.out)
+    assert (facts["controller"], facts["seed"], facts["collisions"]) == ("unregulated", 0, 1)
+    assert len(facts["touched"][0]["vehicles"]) == 2
+    assert f"minisim: {facts['error']}; {trips} not written" in printed.err
     out = ok(capsys, *arguments, "--on-collision", "record")
     assert " touched" in out
     assert trips.exists()
@@ -509,6 +518,15 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
+    (("sweep", "capacity"), "earlier ones: minisim reproduce --only capacity"),
+    (("sweep", "x" * 300), "unknown study 'xxx"),
+    (("sweep", "x" * 300 + ".toml"), "File name too long"),
+    (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "File name too long"),
+    (("sweep", "/dev/full"), "/dev/full: it is neither an ordinary file nor a pipe"),
+    (("sweep", "/"), "cannot read experiments from /: Is a directory"),
+    (("run", "four-way", "--arrivals", "/dev/zero"), "neither an ordinary file nor a pipe"),
+    (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
+    (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("sweep", "missing.toml"), "cannot read experiments from missing.toml"),
     (("sweep",), "Missing argument"),
@@ -662,3 +680,100 @@ def test_arrivals_of_a_smaller_junction_are_refused(capsys: Captured, tmp_path: 
     assert "junction with 3 arms" in message
     table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows[:3], ""]))
     assert main(["run", "four-way", "--arrivals", str(table), "--horizon", "60"]) == 0
+
+
+FAULTY = """
+from dataclasses import dataclass
+from minisim.control import Plan
+
+@dataclass(frozen=True)
+class Faulty:
+    name: str = "faulty"
+    plan: Plan = Plan(period=1.0)
+
+    def start(self, site):
+        return self
+
+    def decide(self, view):
+        return [] if view.time < 3 else 1 / 0
+"""
+
+
+def test_an_error_of_a_controller_is_one_line(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine_faulty.py").write_text(FAULTY)
+    run = ("run", "four-way", "--horizon", "10", "-c", "mine_faulty:Faulty")
+    told = "controller 'faulty' at 3.0 s: mine_faulty.py, line 14: ZeroDivisionError: division by"
+    assert told in fails(capsys, *run)
+    Path("e.toml").write_text('seeds = 1\nhorizon = 10\ncontroller = "mine_faulty:Faulty"\n')
+    assert main(["sweep", "e.toml", "--jobs", "1"]) == 1
+    said = capsys.readouterr().out
+    assert "the first (faulty, four-way, 350 veh/h/lane, seed 1): " + told in said
+    monkeypatch.setenv("MINISIM_TRACEBACK", "1")
+    assert main(list(run)) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [
+    ["--version"], pytest.param(["sweep", "e.toml", "--jobs", "2"], marks=pytest.mark.slow),
+])  # fmt: skip
+def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_path: Path) -> None:
+    """Neither for the command nor for its workers; `collections.py` would, for all of Python."""
+    for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
+    (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "minisim", *command], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+#: Runs `minisim reproduce`, and presses Ctrl-C when a module is looked for.
+PRESSING = """
+import os, runpy, signal, sys
+
+wanted = sys.argv.pop()
+
+class Presses:
+    def find_spec(self, name, *_):
+        if name == wanted:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Presses())
+runpy.run_module("minisim", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize("module", ["scenarios.cli", "typer", "figures.reproduction_report"])
+def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSING, "reproduce", module], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode in (130, -signal.SIGINT)
+    assert done.stderr in ("", "minisim: interrupted\n")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups are POSIX's")
+@pytest.mark.parametrize("seconds", [0.5 * k for k in range(1, 13)])
+def test_ctrl_c_shows_no_traceback_at_any_moment(seconds: float, tmp_path: Path) -> None:
+    """Not even of a worker that has just been started."""
+    command = [sys.executable, "-m", "minisim", "reproduce", "--only", "text", "--jobs", "2"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    ) as process:  # fmt: skip
+        time.sleep(seconds)
+        told = None
+        while told is None:  # a library may swallow the first one
+            os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                _, told = process.communicate(timeout=20)
+    assert process.returncode in (130, -signal.SIGINT)
+    assert "Traceback" not in told
+    assert "KeyboardInterrupt" not in told
