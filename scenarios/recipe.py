@@ -14,14 +14,12 @@ from typing import Any
 from dim import Dim, Mixed
 from minisim.control import Controller
 from minisim.errors import InputError, show
+from minisim.hosting import REACTIONS
 from minisim.parameters import checked, declared, part, real, text, whole, word
 from minisim.results.metrics import Metric, named_metrics, recording
 from minisim.results.run import Run
 from scenarios.controllers import check_controller
 from scenarios.scenario import Scenario
-
-#: What a collision does to a run; "teleport" is for SUMO only.
-ON_COLLISION = ("stop", "record", "teleport")
 
 #: Makes a run of a scenario, a controller and a seed, such as `minisim.simulate`.
 Host = Callable[..., Run]
@@ -46,8 +44,8 @@ class Recipe:
     )  # fmt: skip
     label: str = text("what rows call the controller; its own name where empty", default="")
     on_collision: str = word(
-        "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
-        ON_COLLISION, default="stop",
+        "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
+        REACTIONS, default="stop",
     )  # fmt: skip
     metrics: tuple[str | Metric, ...] = checked(
         "columns besides the usual ones (`minisim.results.metrics`)",

@@ -28,8 +28,8 @@ from dataclasses import replace
 
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
-from dim.perception import ROUNDING, STANDING, UNKNOWN
-from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
+from dim.perception import ROUNDING, UNKNOWN
+from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.junction.movements import Bools, Movements
 from minisim.parameters import declared, part, real, word
@@ -177,12 +177,12 @@ class _Humans:
             if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
                 heads.setdefault(vehicle.lane, vehicle)
         here = [v for v in heads.values() if drivers[v.id].human and v.distance <= self._yellow]
-        rolling = [v for v in heads.values() if v.speed > STANDING and not drivers[v.id].human]
+        rolling = [v for v in heads.values() if v.speed > HALTING and not drivers[v.id].human]
         before = self._standing
         self._standing = {
             v.id: before.get(v.id, now)
             for v in here
-            if v.speed <= STANDING and v.distance <= self._line
+            if v.speed <= HALTING and v.distance <= self._line
         }
         queue = [v for v in here if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))
