@@ -671,3 +671,14 @@ def test_a_crossed_vehicle_still_follows_into_its_exit(
         for run in (ours, theirs)
     ]
     assert max(slowest) < 1.0
+
+
+def test_a_departure_speed_that_a_driver_cannot_have_is_capped() -> None:
+    """SUMO raises at a speed above the driver's own, and inserts nobody where it is unsafe."""
+    slow = VehicleType(speed_deviation=0.3)
+    what = small_scenario(4, demand_time=60.0, depart_speed=10.0, vehicle=slow)
+    run = simulate(what, FixedTime(), seed=1, record="all")
+    assert run.columns.departed.all()
+    first = run.trajectories.groupby("vehicle")["speed_mps"].first()
+    assert first.max() == pytest.approx(10.0)
+    assert first.min() < 9.0
