@@ -13,7 +13,8 @@ from collections.abc import Iterable
 
 from minisim.control import HALTING, Command, Go, Observed, Plan, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: A vehicle stands at the line when its front is at most this far before it [m].
 LINE = 1.0

@@ -1,46 +1,34 @@
-"""Where a vehicle will be, step by step, if it drives on by the car-following law of the hosts.
+"""Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
 
-The vehicle follows at most two others, whose motion is known: the one ahead in its lane, and the
-one that enters the same exit lane before it. Positions are distances past the junction entry,
-negative before it.
+It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
+motion is known, by the run's own law (`minisim.engine.laws`). Positions are distances past the
+junction entry, negative before it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from minisim.carfollowing import ballistic, gap_ratio, idm, iidm, speed_towards
-from minisim.control import LATERAL_ACCELERATION, Site
+from minisim.carfollowing import ballistic, semi_implicit
+from minisim.control import LATERAL_ACCELERATION, Plan, Site
+from minisim.engine.laws import braking_begins, closeness, follow, slow_down
+from minisim.engine.state import Law, build_law
 from minisim.jit import njit
 
 Floats = npt.NDArray[np.float64]
 
+#: A number of steps: there was no room for all of them.
+UNFINISHED = -1
 
-class Following(NamedTuple):
-    """How a site's vehicles follow each other, from `minisim.vehicle.VehicleType` (SI units)."""
 
-    dt: float
-    a: float
-    b: float
-    b_max: float
-    headway: float
-    min_gap: float
-    delta: float
-    improved: bool
-    length: float
-    limit: float
-
-    @classmethod
-    def of(cls, site: Site) -> Following:
-        """The law of a site's vehicles on its roads."""
-        v = site.vehicle
-        rates = v.acceleration, v.deceleration, v.max_deceleration
-        gaps = v.headway, v.min_gap, v.exponent
-        return cls(site.dt, *rates, *gaps, v.model == "iidm", v.length, site.speed_limit)
+def law_of(site: Site) -> Law:
+    """The law of a site's vehicles."""
+    return build_law(site, Plan(), depart_speed=None, record=None, record_window=(0.0, math.inf))
 
 
 class Course(NamedTuple):
@@ -48,17 +36,22 @@ class Course(NamedTuple):
 
     crossing: float  #: from entry to exit [m]
     turn: float  #: highest speed inside the junction [m/s]
+    limit: float  #: and outside [m/s]
+    end: float  #: where a vehicle has arrived [m]
     exit_arm: int  #: index of the arm that it leaves by
 
 
 def courses(site: Site) -> tuple[Course, ...]:
     """The courses of all movements of a site."""
-    junction = site.intersection
+    junction, margin = site.intersection, law_of(site).margin
     turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
     return tuple(
-        Course(path.crossing, min(site.speed_limit, turn), path.exit_arm)
+        Course(
+            path.crossing, min(site.speed_limit, turn), site.speed_limit,
+            path.length - margin - path.entry, path.exit_arm,
+        )
         for path, turn in zip(junction.paths, turns, strict=True)
-    )
+    )  # fmt: skip
 
 
 class Leader(NamedTuple):
@@ -70,72 +63,108 @@ class Leader(NamedTuple):
     shift: float = 0.0  #: added to its position to measure it on the follower's path [m]
 
 
-NO_LEADER = Leader(np.empty(0), np.empty(0))
+class Leaders(NamedTuple):
+    """Several of them as arrays; a position is infinite once the vehicle is gone."""
+
+    s: Floats  #: shape (leaders, steps) [m]
+    v: Floats  #: the same [m/s]
+    bound: Floats  #: `until` or `shift` of each [m]
+
+
+class Motion(NamedTuple):
+    """How a vehicle will drive."""
+
+    s: Floats  #: positions [m], one per step from now on, until it has arrived
+    v: Floats  #: speeds [m/s]
+    hard: bool  #: whether it brakes harder than is comfortable for another lane's vehicle
 
 
 def predict(
-    law: Following,
+    law: Law,
     course: Course,
     position: float,
     speed: float,
     *,
-    lane: Leader = NO_LEADER,
-    exit_lane: Leader = NO_LEADER,
-    beyond: float = 0.0,
-    horizon: float = 60.0,
-) -> tuple[Floats, Floats] | None:
-    """Positions [m] and speeds [m/s] of a vehicle, one per step from now on, if it may drive on.
+    lane: Sequence[Leader] = (),
+    exit_lane: Sequence[Leader] = (),
+) -> Motion | None:
+    """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    It follows the vehicle ahead in its lane and the one that enters its exit lane before it, until
-    its rear is `beyond` [m] past the exit. None if that takes longer than the horizon [s], or if a
-    leader appears beside or behind it, which would be an emergency.
+    Args:
+        lane: the vehicles ahead in its lane, nearest first.
+        exit_lane: those that enter its exit lane before it, in this order.
     """
-    steps = math.ceil(horizon / law.dt)
-    s, v = np.empty(steps), np.empty(steps)
-    count = _drive(law, course, position, speed, lane, exit_lane, beyond, s, v)
-    return (s[:count].copy(), v[:count].copy()) if count else None
+    stacked = (
+        _stacked(lane, [leader.until for leader in lane]),
+        _stacked(exit_lane, [leader.shift for leader in exit_lane]),
+    )
+    steps, count = 512, UNFINISHED
+    while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
+        steps *= 2
+        s, v = np.empty(steps), np.empty(steps)
+        count, hard = _drive(law, course, position, speed, *stacked, s, v)
+    return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
+
+
+def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
+    steps = max((len(leader.s) for leader in leaders), default=0)
+    s, v = np.full((len(leaders), steps), np.inf), np.zeros((len(leaders), steps))
+    for j, leader in enumerate(leaders):
+        s[j, : len(leader.s)], v[j, : len(leader.v)] = leader.s, leader.v
+    return Leaders(s, v, np.array(bound))
 
 
 @njit
 def _drive(
-    law: Following,
+    law: Law,
     course: Course,
     position: float,
     speed: float,
-    lane: Leader,
-    exit_lane: Leader,
-    beyond: float,
+    lane: Leaders,
+    exit_lane: Leaders,
     s_out: Floats,
     v_out: Floats,
-) -> int:
-    """Fill `s_out` and `v_out`; return the number of steps, 0 if the vehicle cannot get through."""
-    s, v = position, speed
-    end = course.crossing + law.length + beyond
+) -> tuple[int, bool]:
+    """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
+
+    Returns the number of steps, 0 if it hits a leader or `UNFINISHED`, and whether it brakes hard.
+    """
+    s, v, hard = position, speed, False
     for k in range(len(s_out)):
+        if s >= course.end:
+            return k, hard
         s_out[k], v_out[k] = s, v
-        if s >= end:
-            return k + 1
-        z = 0.0
         first = True  # no vehicle is between it and the junction
-        if k < len(lane.s):
-            first = lane.s[k] >= 0.0
-            rear = lane.s[k] - law.length
-            if rear < lane.until:
+        z = 0.0
+        for j in range(len(lane.s)):
+            if k >= lane.s.shape[1] or lane.s[j, k] == math.inf:
+                continue
+            first = first and lane.s[j, k] >= 0.0
+            rear = lane.s[j, k] - law.length
+            if rear < lane.bound[j]:
                 if rear <= s:
-                    return 0
-                z = gap_ratio(v, rear - s, lane.v[k], law.a, law.b, law.headway, law.min_gap)
-        if k < len(exit_lane.s) and exit_lane.s[k] >= 0.0 and (first or s >= 0.0):
-            gap = exit_lane.s[k] + exit_lane.shift - law.length - s
-            if gap <= 0.0:
-                return 0
-            z = max(z, gap_ratio(v, gap, exit_lane.v[k], law.a, law.b, law.headway, law.min_gap))
-        v0 = course.turn if 0.0 <= s < course.crossing else law.limit
-        if law.improved:
-            acc = iidm(v, v0, z, law.a, law.b, law.delta)
+                    return 0, hard
+                z = closeness(v, rear - s, lane.v[j, k], law)
+                break
+            if s >= course.crossing:
+                break
+        z_exit = 0.0
+        if first or s >= 0.0:
+            for j in range(len(exit_lane.s) - 1, -1, -1):
+                if k >= exit_lane.s.shape[1] or exit_lane.s[j, k] >= 0.0:  # the last to enter it
+                    if k < exit_lane.s.shape[1] and exit_lane.s[j, k] < math.inf:
+                        gap = exit_lane.s[j, k] + exit_lane.bound[j] - law.length - s
+                        z_exit = closeness(v, gap, exit_lane.v[j, k], law)
+                    break
+        v0 = course.turn if 0.0 <= s < course.crossing else course.limit
+        acc = follow(v, v0, max(z, z_exit), law)
+        if z_exit > z and acc < -law.b:
+            hard = True
+        if s < 0.0 and braking_begins(v, -s, law):
+            acc = min(acc, slow_down(v, acc, course.turn, -s, law))
+        acc = max(acc, -law.b_max)
+        if law.semi_implicit:
+            s, v = semi_implicit(s, v, acc, law.dt)
         else:
-            acc = idm(v, v0, z, law.a, law.b, law.delta)
-        if s < 0.0 and v + acc * law.dt > course.turn:
-            slower = max(speed_towards(v, course.turn, -s, law.b, law.dt), course.turn)
-            acc = min(acc, max((slower - v) / law.dt, -law.b))
-        s, v = ballistic(s, v, max(acc, -law.b_max), law.dt)
-    return 0
+            s, v = ballistic(s, v, acc, law.dt)
+    return UNFINISHED, hard

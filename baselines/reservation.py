@@ -7,12 +7,14 @@ movements (`minisim.junction.conflicts`): only pairs matter, and each pair's str
 
 The protocol:
 - From `reach` before the junction on, the first vehicle of a lane asks, and so does any vehicle
-  directly behind a holder. Its passage is predicted at full acceleration up to the limits
-  (`baselines.prediction`), behind the vehicle ahead in its lane and behind the last vehicle that
-  enters its exit lane before it.
+  directly behind a holder. Its passage is predicted by the vehicles' own law up to the limits
+  (`baselines.prediction`), behind the vehicles ahead in its lane and those that enter its exit lane
+  before it.
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
-  their grants, so a later grant never slows down an earlier one.
+  their grants, so a later grant never slows down an earlier one. The law lets a vehicle in the
+  junction follow the one before it into the exit lane as if both were on one arc. A passage on
+  which it brakes harder than is comfortable for that vehicle is refused.
 - A refused vehicle drives up to its stop line and slows down as late as is comfortable. Refused
   requests are considered again every `period`, in the order in which they were first made.
 
@@ -21,8 +23,8 @@ their predictions, and predicts anew where they differ. A holder whose new passa
 loses its reservation if it can still stop, and so does a vehicle that follows it. So when a vehicle
 can no longer stop, its passage fits the passages of all others that cannot, and the rest yield.
 What remains is the error of a prediction over the last few seconds before the zones, from a state
-at most one period old. `buffer` covers it. In minisim this error is small: up to 0.15 m beyond the
-point of no return (4 arms, 350 veh/h/lane), due to leaders other than the two in a prediction.
+at most one period old. `buffer` covers it. In minisim predictions come true, because vehicles that
+are alike and follow a known law have nothing left to differ in; so others are refused.
 """
 
 from __future__ import annotations
@@ -32,9 +34,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-from baselines.prediction import NO_LEADER, Floats, Following, Leader, courses, predict
+from baselines.prediction import Floats, Leader, courses, law_of, predict
 from minisim.control import (
     Command,
+    Cover,
     Go,
     Hold,
     Observed,
@@ -45,24 +48,24 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
-from minisim.parameters import Name, declared, real
-from minisim.vehicle import CruiseVehicle
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
 
-#: How far past the junction exit a rear is predicted, for the vehicles behind it [m].
-BEYOND = 60.0
+#: A held vehicle stands up to this far before its line [m], so no vehicle may ask any later.
+STANDS_BEFORE = 1.0
 
 
 @declared
 class Reservation:
-    """Space-time reservation, first come first served, for vehicles that follow the IDM."""
+    """Space-time reservation, first come first served, for vehicles whose drivers are alike."""
 
     name = Name("reservation")
+    covers = Cover(alike=True)
 
     # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
@@ -82,6 +85,7 @@ class Reservation:
 
     def start(self, site: Site) -> ReservationSession:
         """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        self.covers.check(self.name, site.vehicle)
         return ReservationSession(self, site)
 
 
@@ -90,6 +94,7 @@ class Slot:
     """A reservation: how a vehicle will cross."""
 
     vehicle: int
+    lane: int
     movement: int  #: its index
     start: int  #: when the prediction was made [steps]
     s: Floats  #: positions past the entry [m], one per step from `start` on
@@ -97,11 +102,16 @@ class Slot:
     enters: int  #: when its front is in the junction [steps]
     #: For each conflicting movement, the last step before and the first step past the zone.
     zones: dict[int, tuple[int, int]]
+    hard: bool  #: whether it brakes hard for a vehicle from another lane
 
     @property
     def ends(self) -> int:
         """The last step that is predicted."""
         return self.start + len(self.s) - 1
+
+    def at(self, now: int) -> float:
+        """Where its front is at `now` [steps], past the entry [m]."""
+        return float(self.s[now - self.start])
 
     def leader(self, now: int, until: float = math.inf, shift: float = 0.0) -> Leader:
         """What a follower meets from `now` [steps] on."""
@@ -109,8 +119,7 @@ class Slot:
 
     def expects(self, seen: Observed, now: int) -> bool:
         """Whether the vehicle is where it was predicted to be."""
-        k = now - self.start
-        off, faster = float(self.s[k]) + seen.distance, float(self.v[k]) - seen.speed
+        off, faster = self.at(now) + seen.distance, float(self.v[now - self.start]) - seen.speed
         return abs(off) <= POSITION_TOLERANCE and abs(faster) <= SPEED_TOLERANCE
 
 
@@ -118,13 +127,8 @@ class Manager:
     """Which vehicle holds which reservation, and which are possible; times in host steps."""
 
     def __init__(self, site: Site, buffer: float) -> None:
-        if isinstance(site.vehicle, CruiseVehicle):
-            raise InputError(
-                "reservation predicts vehicles that follow the IDM, not a CruiseVehicle; "
-                "use the profile paper or fair"
-            )
         self.slots: dict[int, Slot] = {}  #: by vehicle, in the order of their grants
-        self._motion = Following.of(site)
+        self._law = law_of(site)
         self._ways = courses(site)
         self._zones: list[dict[int, tuple[float, float]]] = [
             {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
@@ -135,30 +139,39 @@ class Manager:
         self._rows = site.intersection.movements.rows
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
-    def predict(self, seen: Observed, now: int, ahead: Slot | None) -> Slot | None:
-        """The passage of a vehicle behind `ahead` in its lane; None if none can be predicted.
+    def predict(self, seen: Observed, now: int) -> Slot | None:
+        """The passage of a vehicle behind the holders in its lane; None if it hits one.
 
-        It also drives behind the last other holder to enter the same exit lane.
+        It also drives behind the other holders that enter the same exit lane before it.
         """
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
-        lane = NO_LEADER
-        if ahead is not None and ahead.ends >= now:
-            lane = ahead.leader(now, until=float(self._branch[ahead.movement, p]))
-        rival = self._before(way.exit_arm, seen)
-        exit_lane = NO_LEADER
-        if rival is not None and rival.ends >= now:
-            crossing = self._ways[rival.movement].crossing
-            exit_lane = rival.leader(now, shift=way.crossing - crossing)
-        motion = predict(
-            self._motion, way, -seen.distance, seen.speed,
-            lane=lane, exit_lane=exit_lane, beyond=BEYOND,
-        )  # fmt: skip
+        others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]
+        in_lane = [
+            slot for slot in others if slot.lane == seen.lane and slot.at(now) > -seen.distance
+        ]
+        lane = [
+            slot.leader(now, until=float(self._branch[slot.movement, p]))
+            for slot in sorted(in_lane, key=lambda slot: slot.at(now))
+        ]
+        own = self.slots.get(seen.id)
+        latest = math.inf if own is None else own.enters
+        rivals = [
+            slot
+            for slot in others
+            if slot.enters < latest and self._ways[slot.movement].exit_arm == way.exit_arm
+        ]
+        rivals.sort(key=lambda slot: slot.enters)
+        exit_lane = [
+            slot.leader(now, shift=way.crossing - self._ways[slot.movement].crossing)
+            for slot in rivals
+        ]
+        motion = predict(self._law, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane)
         if motion is None:
             return None
-        s, v = motion
+        s, v, hard = motion
         return Slot(
-            seen.id, p, now, s, v,
+            seen.id, seen.lane, p, now, s, v, hard=hard,
             enters=now + int(s.searchsorted(0.0)),
             zones={
                 q: (
@@ -174,6 +187,8 @@ class Manager:
 
         If it must be the `last`, it comes after all others that share its exit lane.
         """
+        if slot.hard:
+            return False
         exit_arm = self._ways[slot.movement].exit_arm
         for other in self.slots.values():
             if other.vehicle == slot.vehicle or other.movement not in slot.zones:
@@ -189,14 +204,6 @@ class Manager:
         through = first.zones[second.movement][1] + self._buffer <= second.zones[first.movement][0]
         return through and (not merges or first.enters < second.enters)
 
-    def _before(self, exit_arm: int, seen: Observed) -> Slot | None:
-        """The last holder to enter an exit lane, before the vehicle itself if it holds a slot."""
-        own = self.slots.get(seen.id)
-        latest = math.inf if own is None else own.enters
-        slots = [s for s in self.slots.values() if s.vehicle != seen.id and s.enters < latest]
-        rivals = [s for s in slots if self._ways[s.movement].exit_arm == exit_arm]
-        return max(rivals, key=lambda slot: slot.enters, default=None)
-
 
 class ReservationSession:
     """One run: keeps reservations in line with what is seen, and serves requests."""
@@ -206,7 +213,8 @@ class ReservationSession:
         reach = controller.reach
         if reach is None:
             braking = stopping_distance(site.speed_limit, site.vehicle.deceleration)
-            reach = braking + controller.period * site.speed_limit
+            reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
+        reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
         self._period = controller.period
         self._dt = site.dt
@@ -266,10 +274,9 @@ class ReservationSession:
 
     def _predict(self, me: Observed, now: int, leader: int | None) -> Slot | None:
         """A vehicle's passage behind its leader; None behind one without a reservation."""
-        ahead = None if leader is None else self.manager.slots.get(leader)
-        if leader is not None and ahead is None:
+        if leader is not None and leader not in self.manager.slots:
             return None
-        return self.manager.predict(me, now, ahead)
+        return self.manager.predict(me, now)
 
     def _grant(
         self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int

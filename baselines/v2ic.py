@@ -22,7 +22,8 @@ import math
 from collections.abc import Iterable
 
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Added to speeds used as divisors, as in the authors' code [m/s].
 CRAWL = 1e-5
@@ -36,8 +37,9 @@ class V2IC:
 
     # 200 m in the authors' code.
     reach: float = real(
-        "how far before the junction vehicles register", "m", low=1, high=2000, default=200.0
-    )
+        "how far before the junction, on the road, vehicles register", "m",
+        low=1, high=2000, default=200.0,
+    )  # fmt: skip
     # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
     # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), at an eighth of the
     # work.
@@ -85,7 +87,8 @@ class V2ICSession:
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:
-        self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
+        reach = min(controller.reach, site.intersection.approach_length)
+        self.plan = Plan(marks=(reach,), wake_on_clear=True, sight=reach)
         paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way

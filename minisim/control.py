@@ -1,10 +1,12 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
 Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
-movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
-and their checks), `minisim.files` (writers), `minisim.streams` (random numbers), and
+movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.names` and
+`minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
+numbers), and
 `minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
-engine, the hosts or the results; `make lint` checks this.
+engine, the hosts or the results; `make lint` checks this. `baselines.prediction` alone also takes
+the engine's laws, so that it predicts by the one that drives the vehicles.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -20,12 +22,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance, number, printable
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
+from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
-from minisim.vehicle import VehicleType
+from minisim.vehicle import MODELS, VehicleType
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
 #: `--junctions.limit-turn-speed`, so that turn speeds are comparable with SUMO's.
@@ -85,6 +88,8 @@ class Observed(NamedTuple):
         speed: [m/s].
         length: [m].
         demand_time: when it wanted to enter the road [s].
+        rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
+            rank: its id depends on the arrivals on other lanes.
     """
 
     id: int
@@ -94,6 +99,7 @@ class Observed(NamedTuple):
     speed: float
     length: float
     demand_time: float = 0.0
+    rank: int = 0
 
     @property
     def movement(self) -> Movement:
@@ -236,9 +242,11 @@ class Plan:
         "m", default=(), low=-1000,
     )  # fmt: skip
     wake_on_clear: bool = switch("wake when a rear bumper leaves the junction", default=False)
-    period: float | None = real("wake at this interval", "s", default=None, above=0, optional=True)
+    period: float | None = real(
+        "wake at this interval, at least the step", "s", default=None, above=0, optional=True
+    )
     sight: float = real(
-        "how far before the junction entry a view reaches", "m", default=50.0, low=0
+        "how far before the junction entry a view reaches, on the road", "m", default=50.0, low=0
     )
     reach: float = real(
         "a view holds a vehicle until its front is at least this far past the junction entry, even "
@@ -271,27 +279,81 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may be one of a summary's own."""
 
 
 @runtime_checkable
 class Kinds(Session, Protocol):
     """A session whose vehicles are of several kinds, by which summaries group them."""
 
-    def kind(self, vehicle: int) -> str:
-        """Kind of a vehicle, such as "human"."""
+    def kind(self, lane: int, rank: int) -> str:
+        """Kind of a vehicle, such as "human", by its lane and its place there."""
+
+
+@dataclass(frozen=True)
+class Cover:
+    """The vehicles with which a controller promises: none collides, and each is served.
+
+    Attributes:
+        laws: names of their car-following models (`minisim.vehicle.MODELS`).
+        alike: whether their drivers must be alike, which is a `speed_deviation` of 0.
+    """
+
+    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")
+    alike: bool = False
+
+    def __contains__(self, vehicle: VehicleType) -> bool:
+        return vehicle.model in self.laws and not (self.alike and vehicle.speed_deviation > 0.0)
+
+    def __str__(self) -> str:
+        laws = f"vehicles of the models {', '.join(self.laws)}" if self.laws else "no vehicles"
+        return laws + (" whose drivers are alike (speed_deviation 0)" if self.alike else "")
+
+    def check(self, name: str, vehicle: VehicleType) -> None:
+        """Raise `InputError` for a vehicle that is not covered, for a controller that needs it."""
+        if vehicle not in self:
+            raise InputError(
+                f"{name} is for {self}, got model {vehicle.model!r} with a speed_deviation of "
+                f"{vehicle.speed_deviation:g}"
+            )
+
+
+#: What a controller covers that says nothing else, and what one does that may collide.
+ORDINARY, NOTHING = Cover(), Cover(laws=())
+
+
+def cover_of(controller: object) -> Cover:
+    """What a controller, or its class, covers: its attribute `covers`, if it has one."""
+    covers: Cover = getattr(controller, "covers", ORDINARY)
+    return covers
 
 
 @runtime_checkable
 class Controller(Protocol):
-    """A recipe for sessions: hashable, picklable, never changed by a run."""
+    """A recipe for sessions: hashable, picklable, never changed by a run.
+
+    It promises that no vehicles collide and each is served wherever it starts, if the vehicles are
+    `ORDINARY`. One that promises less or more says so by an attribute `covers`, a `Cover`.
+    """
 
     @property
     def name(self) -> str:
-        """Short name, as on the command line."""
+        """What rows, figures and messages call it."""
 
     def start(self, site: Site) -> Session:
         """Begin a run. Raises `InputError` for a site that it cannot serve."""
+
+
+def as_controller(what: str, value: object) -> Controller:
+    """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
+    if isinstance(value, Controller) and not isinstance(value, type):
+        printable(f"the name of {what}", value.name)
+        return value
+    lacks = [part for part in ("name", "start") if not hasattr(value, part)]
+    why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
+    named = isinstance(value, str | Mapping)
+    hint = "; make it by scenarios.controllers.controller_named" if named else ""
+    raise InputError(f"{what} is no controller: {why}{hint}")
 
 
 @dataclass(frozen=True)
@@ -301,10 +363,8 @@ class Unregulated:
     For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """
 
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-        return "unregulated"
+    name = Name("unregulated")
+    covers = NOTHING
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""

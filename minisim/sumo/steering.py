@@ -3,7 +3,7 @@
 `Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.engine.laws`) compute what a
 hold line, a marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`)
 where a lower limit applies, or a commanded speed (`setSpeed`) while a vehicle has to brake for
-what is ahead. Behind a leader, SUMO may still drive the vehicle more slowly.
+what is ahead. A command heeds the leaders, too.
 
 `minisim.sumo.cruising` steers SUMO's `CC`.
 """
@@ -21,13 +21,14 @@ from minisim.engine.state import STOP_MARGIN, Law, Records
 from minisim.junction.movements import Movements
 from minisim.sumo.messages import Job
 
-#: SUMO keeps a safe gap (1) and the maximum acceleration (2). It heeds no right of way (no 8), and
-#: minisim limits the braking (no 4). (SUMO, TraCI/Change Vehicle State, speed mode.) Inside the
-#: junction, a vehicle follows those from its own lane and those that leave by its exit. It also
-#: yields to crossing vehicles, although the controller alone decides which vehicle goes. So it
-#: ignores all vehicles in the junction (32) while one of them shares neither lane nor exit with it.
-#: Meanwhile it follows the vehicle ahead into its exit by minisim's law.
-FOLLOWING, IGNORING = 1 + 2, 1 + 2 + 32
+#: SUMO keeps the maximum acceleration (2). It heeds no right of way (no 8). A commanded speed may
+#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1), its
+#: vehicles would stop at once where their brakes cannot. (SUMO, TraCI/Change Vehicle State, speed
+#: mode.) Inside the junction, a vehicle follows those from its own lane and those that leave by its
+#: exit. It also yields to crossing vehicles, although the controller alone decides which vehicle
+#: goes. So it ignores all vehicles in the junction (32) while one of them shares neither lane nor
+#: exit with it. Meanwhile it follows the vehicle ahead into its exit by minisim's law.
+FOLLOWING, IGNORING = 2, 2 + 32
 
 #: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
 LEAST_SPEED = 0.01
@@ -46,8 +47,8 @@ class Car:
 
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
-        "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "row", "s",
-        "section", "seen", "v",
+        "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
+        "s", "section", "seen", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records, law: Law) -> None:
@@ -55,6 +56,7 @@ class Car:
         self.id = int(record["id"])
         self.name = str(self.id)
         self.lane = int(record["lane"])
+        self.rank = int(record["rank"])
         self.path = int(record["path"])
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
@@ -118,12 +120,14 @@ class Follower:
 
     def __init__(self, job: Job, libsumo: Any) -> None:
         self.near = -math.inf
-        self._law, self._model = job.law, job.model
+        # SUMO's Krauss may drive vehicles whose own law is another.
+        self._law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
         self._vehicle = libsumo.vehicle
         self._speeds = Speeds(libsumo)
         self._limits = limits(job)
         self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
         self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
+        self._branch = job.road.branch
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def load(self, cars: Iterable[Car]) -> None:
@@ -147,12 +151,12 @@ class Follower:
         inside = {car.path for car in self._inside}
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
-            for car in lane:
+            for k, car in enumerate(lane):
                 held = car.s < entry and not released(car)
                 crossed = not inside.isdisjoint(self._crossing[car.path])
                 merges = crossed and not held and (car.s >= entry or foremost)
                 foremost &= car.s >= entry
-                self._steer(car, held, self._merging(car) if merges else 0.0)
+                self._steer(car, lane[:k], held, self._merging(car) if merges else 0.0)
                 ignoring = held or crossed
                 if ignoring != car.ignoring:
                     mode = IGNORING if ignoring else FOLLOWING
@@ -179,7 +183,16 @@ class Follower:
         gap = (ahead.s - self._exit[ahead.path][0]) - law.length - (car.s - mine)
         return float(laws.closeness(car.v, gap, ahead.v, law))
 
-    def _steer(self, car: Car, held: bool, z: float) -> None:
+    def _leading(self, car: Car, lane: Sequence[Car]) -> float:
+        """Closeness to the vehicle of its own lane that this car follows; `lane` is ahead of it."""
+        law = self._law
+        for ahead in reversed(lane):
+            rear = ahead.s - law.length
+            if rear < self._branch[ahead.path, car.path]:
+                return float(laws.closeness(car.v, rear - car.s, ahead.v, law))
+        return 0.0
+
+    def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
         law = self._law
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
@@ -193,8 +206,8 @@ class Follower:
         if not (slower or held or braked or v > v0 or v0 < LEAST_SPEED or z > 0.0):
             self._speeds.hand_back(car)
             return
-        free = self._free(v, v0)
-        acc = min(free, laws.follow(v, max(v0, LEAST_SPEED), z, law)) if z > 0.0 else free
+        free = laws.follow(v, v0, 0.0, law)
+        acc = laws.follow(v, v0, z, law)
         while laws.braking_begins(v, starts[k] - s, law):
             acc = min(acc, laws.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1
@@ -203,16 +216,10 @@ class Follower:
         if braked:
             acc = min(acc, -car.brake)
         if acc < free or v > v0 or v0 < LEAST_SPEED:
+            acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), law))
             self._speeds.command(car, v + max(acc, -law.b_max) * law.dt)
         else:
             self._speeds.hand_back(car)
-
-    def _free(self, v: float, v0: float) -> float:
-        """The model's acceleration on an empty road."""
-        law = self._law
-        if self._model == "IDM":
-            return laws.follow(v, v0, 0.0, law)
-        return min(law.a, max((v0 - v) / law.dt, -law.b))
 
     def _desire(self, car: Car, speed: float) -> None:
         speed = max(speed, LEAST_SPEED)

@@ -132,8 +132,9 @@ class Worker:
                     break
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
-                    car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time
-                )
+                    car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
+                    car.rank,
+                )  # fmt: skip
 
     def _apply(self, command: Command) -> None:
         match command:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
 import pytest
 
 import minisim
@@ -30,10 +31,13 @@ from minisim.control import (
     Unregulated,
     View,
     Wake,
+    cover_of,
 )
 from minisim.errors import InputError
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
+from minisim.vehicle import VehicleType
+from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
 from tests.builders import as_run
 
@@ -66,6 +70,36 @@ def test_every_controller_keeps_the_contract(controller: Controller) -> None:
     check_controller(controller, horizon=120.0)
 
 
+#: Corners of what a scenario may be, each with options of `small_scenario` and of its vehicles.
+EDGES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "drivers who differ": ({}, {"speed_deviation": 0.5}),
+    "Krauss's law": ({"dt": 0.25}, {"model": "krauss", "deceleration": 0.5, "headway": 10.0}),
+    "the improved IDM": ({}, {"model": "iidm", "min_gap": 0.5}),
+    "long and slow vehicles": ({}, {"length": 6.0, "acceleration": 0.8, "min_gap": 20.0}),
+    "a crawl": ({"speed_limit": 0.5, "arm_length": 60.0}, {}),
+    "coarse steps": ({"speed_limit": 1.0, "dt": 0.5, "arm_length": 60.0}, {}),
+    "a race track": ({"speed_limit": 100.0}, {}),
+}
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+def test_what_a_controller_covers_is_safe_and_served_and_it_refuses_what_it_cannot(
+    controller: Controller,
+) -> None:
+    for what, (options, vehicle) in EDGES.items():
+        scenario = small_scenario(
+            3, demand_time=30.0, drain=20_000.0, vehicle=VehicleType(**vehicle), **options
+        )
+        if scenario.vehicle not in cover_of(controller):
+            with pytest.raises(InputError, match="is for vehicles of the models"):
+                minisim.simulate(scenario, controller, 1)
+            continue
+        run = minisim.simulate(scenario, controller, 1, on_collision="record")
+        assert len(run.columns.lane) > 3
+        assert run.collisions == (), what
+        assert run.columns.arrived.all(), what
+
+
 @pytest.mark.parametrize("controller", [AsRunDim(), AsRunDim(order="size")], ids=lambda c: c.name)
 def test_the_published_rules_keep_the_contract_but_for_collisions(controller: Controller) -> None:
     """With the vehicle and the step that they are made for; 0.1 s is too coarse for their zones."""
@@ -74,6 +108,21 @@ def test_the_published_rules_keep_the_contract_but_for_collisions(controller: Co
         return minisim.simulate(as_run(scenario), controller, seed, **options)
 
     check_controller(controller, horizon=120.0, collision_free=False, host=run)
+
+
+def before(run: Run, time: float) -> pd.DataFrame:
+    """The trips that were over by then."""
+    return run.trips[run.trips["arrival_s"] < time]
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+def test_what_happens_does_not_depend_on_the_horizon(controller: Controller) -> None:
+    short, long = (
+        minisim.simulate(four_way(300, profile="fair", arm_length=200.0, horizon=t), controller, 3)
+        for t in (120.0, 180.0)
+    )
+    assert len(before(short, 120.0)) > 10
+    pd.testing.assert_frame_equal(before(short, 120.0), before(long, 120.0))
 
 
 def test_the_contract_without_safety() -> None:

@@ -7,19 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import minisim
 from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
-from minisim.control import Controller, Site
+from minisim.control import Controller, Site, cover_of
+from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE, conflict_zones, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.results.safety import encroachments
 from minisim.vehicle import VehicleType
+from scenarios import four_way
+from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, Profile
 from scenarios.strategies import demands, emptying, floats, intersections, vehicles
-from tests.builders import share
+from tests.builders import replayed, share
 
 #: None at all, less than a step, and no whole number of steps among them [s].
 AMBERS = st.sampled_from([0.0, 0.04, 2.0, 3.03])
@@ -35,7 +38,7 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     ),
     "adaptive": st.builds(
         Adaptive,
-        detector_range=floats(5.0, 200.0),
+        detector_range=floats(15.0, 200.0),
         min_time_loss=floats(0.0, 5.0),
         extend_max_green=st.booleans(),
         **GREENS,
@@ -45,10 +48,11 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
         max_gap=floats(0.0, 10.0),
         detector_gap=floats(0.1, 20.0),
         passing_time=floats(0.1, 5.0),
+        presence=st.booleans(),
         **GREENS,
     ),
     "longest-queue": st.builds(
-        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(5.0, 200.0), amber=AMBERS
+        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
     ),
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
@@ -79,6 +83,65 @@ def test_no_vehicle_collides_and_each_is_served(name: str, data: st.DataObject) 
     assert run.trips["arrival_s"].notna().all()
     if name not in PREDICTING:
         assert (encroachments(run.trajectories, run.site)["pet_s"] > 0.0).all()
+
+
+#: One body each, since the geometry of conflicts is what takes long.
+BODIES = [{}, {"length": 3.0, "min_gap": 1.0}, {"length": 6.0}]
+EDGE_CASE = {"bodies": {}, "model": "idm", "limit": 14.0, "dt": 0.1, "b": 4.5, "headway": 1.0}
+
+
+@share(0.5)
+@given(
+    name=st.sampled_from(SAFE),
+    bodies=st.sampled_from(BODIES),
+    model=st.sampled_from(["idm", "iidm", "krauss"]),
+    limit=st.sampled_from([0.5, 1.0, 100.0]) | floats(0.5, 100.0),
+    dt=st.sampled_from([0.05, 0.1, 0.25, 0.5]),
+    b=floats(1.5, 5.0),
+    headway=floats(0.8, 3.0),
+    deviation=st.sampled_from([0.0, 0.1, 0.5]),
+    trips=st.lists(
+        st.tuples(floats(0.0, 20.0), st.integers(0, 3), st.integers(1, 3)), min_size=1, max_size=9
+    ),
+)
+@example(**EDGE_CASE | {"limit": 0.5}, name="reservation", deviation=0.0, trips=[(0.0, 0, 2)])
+@example(
+    **EDGE_CASE | {"limit": 0.5, "dt": 0.5}, name="reservation", deviation=0.0, trips=[(0.0, 0, 2)]
+)
+@example(
+    **EDGE_CASE | {"limit": 1.0, "dt": 0.5},
+    name="v2ic", deviation=0.0, trips=[(0.0, a, m) for a in range(4) for m in (1, 2, 3)],
+)  # fmt: skip
+@example(
+    **EDGE_CASE | {"model": "krauss", "limit": 100.0, "dt": 0.25, "b": 0.5, "headway": 10.0},
+    name="reservation", deviation=0.0, trips=[(3.0 * i, i % 4, 1 + i % 3) for i in range(12)],
+)  # fmt: skip
+def test_at_any_limit_step_and_law_each_is_served_or_all_are_refused(
+    name: str,
+    bodies: dict[str, float],
+    model: str,
+    limit: float,
+    dt: float,
+    b: float,
+    headway: float,
+    deviation: float,
+    trips: list[tuple[float, int, int]],
+) -> None:
+    vehicle = VehicleType(
+        **bodies, model=model, deceleration=b, headway=headway, speed_deviation=deviation
+    )
+    profile = Profile(name="random", vehicle=vehicle, speed_limit=limit, dt=dt)
+    scenario = replayed(
+        four_way(100, profile=profile, arm_length=80.0), *sorted(trips), horizon=50_000.0
+    )
+    controller = controller_named(name)
+    if vehicle not in cover_of(controller):
+        with pytest.raises(InputError, match="speed_deviation"):
+            minisim.simulate(scenario, controller)
+        return
+    run = minisim.simulate(scenario, controller, on_collision="record")
+    assert run.collisions == ()
+    assert run.columns.arrived.all()
 
 
 @share(0.2)

@@ -13,11 +13,13 @@ from baselines import FixedTime
 from dim import Dim
 from minisim.control import Controller, Plan, Unregulated
 from minisim.engine.collision import near_bodies, touching
+from minisim.errors import InputError
 from minisim.results.run import Run
 from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
+from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.strategies import scenarios, vehicles
-from tests.builders import Fixed, digest, drained, replayed
+from tests.builders import Fixed, digest, drained, hardest_braking, replayed, share
 
 #: Time to serve the arrivals of two minutes; far more than any fair share of the junction needs.
 PATIENCE = 3000.0
@@ -34,8 +36,7 @@ def served_without_collision(scenario: Scenario, controller: Controller, seed: i
     assert (trace["v"] >= 0.0).all()
     assert (np.diff(trace["s"])[same] >= 0.0).all(), "a vehicle reversed"
     assert trace["a"].min(initial=0.0) >= -run.site.vehicle.max_deceleration
-    real = np.diff(trace["v"])[same] / run.site.dt
-    assert real.min(initial=0.0) >= -run.site.vehicle.max_deceleration - 1e-6
+    assert hardest_braking(run) <= run.site.vehicle.max_deceleration + 1e-6
     limit = run.site.speed_limit + run.site.vehicle.acceleration * run.site.dt
     assert trace["v"].max(initial=0.0) <= limit
     assert_no_overlap_in_lane(run)
@@ -53,6 +54,20 @@ def assert_no_overlap_in_lane(run: Run) -> None:
     together = (np.diff(approach["tick"]) == 0) & (np.diff(lane) == 0)
     gaps = -np.diff(approach["s"]) - run.site.vehicle.length
     assert (gaps[together] > 0.0).all()
+
+
+@share(0.3)
+@given(scenarios(), st.sampled_from([*CONTROLLERS]), seeds)
+def test_no_vehicle_brakes_beyond_its_brakes(scenario: Scenario, name: str, seed: int) -> None:
+    """Whatever the controller does; where the brakes do not suffice, vehicles collide."""
+    try:
+        run = minisim.simulate(
+            scenario, controller_named(name), seed, record="all", on_collision="record"
+        )
+    except InputError:
+        assert name.endswith("as-run")
+        return
+    assert hardest_braking(run) <= run.site.vehicle.max_deceleration + 1e-6
 
 
 @given(scenarios(), seeds)
