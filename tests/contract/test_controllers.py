@@ -299,8 +299,8 @@ BROKEN = {
     "no session": (Starting(make=str), "must give a Session"),
     "no plan": (Starting(make=without_plan), "must be a Plan"),
     "no name": (Broken(name=""), "its name must be a text"),
-    "no controller": (5, "is not a Controller"),
-    "a class": (FixedTime, "is not a Controller"),
+    "no controller": (5, "is no controller"),
+    "a class": (FixedTime, "is no controller"),
 }
 
 
