@@ -159,7 +159,7 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("own_mine:Mien", "unknown controller of own_mine 'Mien'; allowed: Mine, Plain, Failing;"),
+        ("own_mine:Mien", "unknown class of own_mine 'Mien'; allowed: Mine, Plain, Failing;"),
         ("own_mine:Mine(kk=3)", "unknown own_mine:Mine parameter 'kk'.*; did you mean 'k'"),
         ("own_mine:Mine(k='a')", "k of own_mine:Mine must be a number, got 'a'"),
         ("own_mine:Mine(k=true)", "k of own_mine:Mine must be a number, got True"),
@@ -179,7 +179,7 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
         ("own_raises:Mine", "cannot import own_raises: own_raises.py, line 2: ValueError: no"),
         ("own_exits:Mine", "cannot import own_exits: own_exits.py, line 1: SystemExit: 3"),
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
-        ("own_empty:Mine", "own_empty has no class 'Mine', and no controller either"),
+        ("own_empty:Mine", "own_empty has no class 'Mine', and no other either"),
         ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
         ("time:Mine", "time.py has the name of another module, time; rename the file"),
     ],
