@@ -298,9 +298,9 @@ BROKEN = {
     "no answer": (Says(answer=None), "must answer with commands, got None"),
     "no session": (Starting(make=str), "must give a Session"),
     "no plan": (Starting(make=without_plan), "must be a Plan"),
-    "no name": (Broken(name=""), "its name must be a text"),
-    "no controller": (5, "is not a Controller"),
-    "a class": (FixedTime, "is not a Controller"),
+    "no name": (Broken(name=""), "the name of .* must be a text"),
+    "no controller": (5, "is no controller"),
+    "a class": (FixedTime, "is no controller"),
 }
 
 

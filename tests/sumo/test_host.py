@@ -518,7 +518,7 @@ def test_the_gui_needs_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"model": "idm"}, "unknown SUMO model 'idm'; allowed: IDM, Krauss, CC"),
         ({"record": "some"}, "unknown record 'some'"),
         ({"on_collision": "explode"}, "unknown on_collision"),
-        ({"keep_files": 3}, "keep_files must be a str or PathLike"),
+        ({"keep_files": 3}, "keep_files must be a text or a PathLike"),
         ({"record_window": (5.0, 1.0)}, "end of record_window .* at least 5, got 1"),
         ({"seed": -1}, "seed must be an integer of at least 0"),
     ],

@@ -137,8 +137,8 @@ def test_scenarios_have_the_names_of_the_command_line() -> None:
         ("٤-way", "unknown scenario"),
         ("custom", "needs bearings"),
         ("", "unknown scenario"),
-        (4, "scenario must be a str"),
-        (["four-way"], "scenario must be a str"),
+        (4, "scenario must be a text"),
+        (["four-way"], "scenario must be a text"),
     ],
 )
 def test_unknown_scenarios_are_refused(name: str, message: str) -> None:
