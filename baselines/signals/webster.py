@@ -90,9 +90,9 @@ def timing_of(
     longer: float = 0.0,
     capped: bool = False,
 ) -> SignalTiming:
-    """Describe given greens and cycle [s] under the inflows `rates` [veh/h].
+    """Describe greens and cycle [s] under the inflows `rates` [veh/h].
 
-    Effective greens are `longer` [s] than these; a lane that has none has an infinite saturation.
+    The effective greens are `longer` [s] than those given.
     """
     greens, rates = tuple(greens), tuple(rates)
     return SignalTiming(
@@ -101,8 +101,6 @@ def timing_of(
         flow_ratio=sum(rates) / saturation_flow,
         saturation=tuple(
             rate * cycle / (saturation_flow * (green + longer))
-            if green + longer > 0.0
-            else math.inf
             for rate, green in zip(rates, greens, strict=True)
         ),
         capped=capped,

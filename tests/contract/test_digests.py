@@ -18,7 +18,7 @@ KEPT = {
     "fair/4/dim/1 humans=0.3": "1616b0007eae9dbd",
     "paper/4/fixed-time/1": "2ecea1096805f85d",
     "fair/4/adaptive/2": "abc0c33341f21f73",
-    "fair/3/actuated/1": "4ab28569487290ac",
+    "fair/3/actuated/1": "effec0198d6afa5c",
     "fair/4/longest-queue/1": "75fec4a79f90e06c",
     "paper/4/all-way-stop/1": "f1aaaa3887c49665",
     "fair/4/v2ic/1": "03e5b1e65cfdd957",
