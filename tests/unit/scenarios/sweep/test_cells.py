@@ -151,7 +151,7 @@ OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="tri
 
 def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
     todo = [
-        Recipe(four_way(400, horizon=120), controller_named(name), seed)
+        Recipe(four_way(300, horizon=180), controller_named(name), seed)
         for name in ("dim", "fixed-time")
         for seed in (1, 2)
     ]
@@ -321,7 +321,7 @@ def refused(todo: Sequence[Recipe], first: str, second: str, told: str) -> None:
 def test_two_controllers_of_one_name_are_not_one_cell(shift: int) -> None:
     scenario = four_way(100, horizon=10)
     todo = [
-        Recipe(scenario, Fixed(Plan(period=float(k))), seed + shift * k)
+        Recipe(scenario, Fixed(Plan(period=float(k))), seed + shift * k, label="fixed")
         for k in (1, 2)
         for seed in (1, 2, 3)
     ]
