@@ -90,7 +90,7 @@ def test_the_horizon_is_exclusive() -> None:
     assert sum(scenario.rates) == pytest.approx(6.0)
     run = simulate(scenario, Unregulated())
     assert (run.summary()["trips"], run.summary()["unfinished"]) == (1, 0)
-    assert run.counted.demand_time.tolist() == [0.0]
+    assert run.counted.columns.demand_time.tolist() == [0.0]
     assert len(run.trips) == 1
 
 
