@@ -11,13 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
+from minisim.control import HALTING, Command, Go, Observed, Plan, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.names import Name
 from minisim.parameters import declared, real
 
-#: A vehicle slower than this counts as standing [m/s]: SUMO's threshold for waiting.
-STANDING = 0.1
 #: A vehicle stands at the line when its front is at most this far before it [m].
 LINE = 1.0
 #: How far views reach beyond that [m].
@@ -73,10 +71,10 @@ class AllWayStopSession:
         crossing = [v for v in view.vehicles if v.id in self._gone or v.distance < 0.0]
         heads = self._heads(view)
         since = self._standing
-        self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= STANDING}
+        self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
         # A moving head can stand as soon as comfortable braking has stopped it.
         looks = [
-            view.time + (v.speed - STANDING) / self._vehicle.deceleration
+            view.time + (v.speed - HALTING) / self._vehicle.deceleration
             for v in heads
             if v.id not in self._standing
         ]

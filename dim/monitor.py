@@ -36,8 +36,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from dim.harmony import HarmonyMatrix
-from dim.perception import STANDING, UNKNOWN
-from minisim.control import Brake, Command, Observed, Site, View, can_stop, stopping_distance
+from dim.perception import UNKNOWN
+from minisim.control import (
+    HALTING,
+    Brake,
+    Command,
+    Observed,
+    Site,
+    View,
+    can_stop,
+    stopping_distance,
+)
 from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
@@ -157,7 +166,7 @@ class Monitors:
         if room == math.inf:
             return 0.0
         first = (ego.distance, ego.lane) < (other.distance, other.lane)
-        if other.speed < STANDING and self._open(mine, x, other):
+        if other.speed < HALTING and self._open(mine, x, other):
             stuck = not self._open(theirs, y, ego)  # the other, as long as the ego stands
             if first or stuck:
                 return 0.0
@@ -177,7 +186,7 @@ class Monitors:
         self, ego: Observed, other: Observed, shared: Region, mirrored: Region
     ) -> bool:
         """Whether the ego, at its present speed, leaves the region well before the other comes."""
-        if ego.speed < STANDING:
+        if ego.speed < HALTING:
             return False
         leaves = (shared.ends(-other.distance) + ego.distance) / ego.speed
         ahead = mirrored.room(-other.distance, -ego.distance)
@@ -225,7 +234,7 @@ class Patience:
         Only positions and speeds of the others are taken from `view`, the true one.
         """
         alone = ego.id in self._alone
-        if not alone and (decided or ego.speed >= STANDING):
+        if not alone and (decided or ego.speed >= HALTING):
             self._since.pop(ego.id, None)
             return decided
         ids = {v.id for v in seen.vehicles}
@@ -237,7 +246,7 @@ class Patience:
             self._alone.discard(ego.id)
             return False
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
-        stuck = free and all(v.speed < STANDING for v in fronts.values())
+        stuck = free and all(v.speed < HALTING for v in fronts.values())
         if not stuck or fronts.get(ego.lane) != ego:
             self._since.pop(ego.id, None)
             return False

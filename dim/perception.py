@@ -22,9 +22,6 @@ COMMITS = ("stoppable", "paper")
 #: A host's rounding error [m]: a front bumper that has just passed a mark may seem to be before it.
 ROUNDING = 1e-6
 
-#: A vehicle slower than this counts as standing [m/s]: SUMO's threshold for waiting.
-STANDING = 0.1
-
 #: The manoeuvre that an ego sees if it does not know the intent, which may be any.
 UNKNOWN = 0
 

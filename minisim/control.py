@@ -39,6 +39,9 @@ LATERAL_ACCELERATION = 5.5
 #: never committed. The margin exceeds rounding errors, so a vehicle that can stop always does.
 COMMIT_MARGIN = 0.1
 
+#: A vehicle no faster than this stands or waits [m/s]: SUMO's `SUMO_const_haltingSpeed`.
+HALTING = 0.1
+
 
 @declared
 class Site:

@@ -87,7 +87,7 @@ class SmallScenario:
     name: str = text("of the scenario", default="small")
     profile_name: str = text("of its profile", default="test")
     depart_speed: float | None = real(
-        "speed at insertion; none is the highest safe one", "m/s", default=None, optional=True
+        "the most at insertion; none is the highest safe one", "m/s", default=None, optional=True
     )
 
     def __post_init__(self) -> None:

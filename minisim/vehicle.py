@@ -70,8 +70,8 @@ class VehicleType:
 
     The headway has a lower bound because no law reacts faster than the longest step allows
     (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
-    (`needed_braking`). They can still be too weak when a leader stops from high speed: then the
-    vehicles collide, and the run reports it.
+    (`needed_braking`). Under any law but cruise control a vehicle also brakes, as hard as it can if
+    need be, for a leader that it could not stop behind (`minisim.engine.laws.keep_room`).
     """
 
     length: float = real(
@@ -131,6 +131,7 @@ class CruiseVehicle(VehicleType):
 
     It ignores speed limits: it drives at `cruise_speed` until a controller advises another
     speed. Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`.
+    It keeps no distance to stop in (SUMO's speed mode 0), so that vehicles may collide as in SUMO.
     The defaults come from SUMO's model (`MSCFModel_CC`, from Plexe) unless the authors' vehicle
     type overrides them; the base class's headway and spacing are the ACC's.
     """

@@ -17,7 +17,7 @@ class Profile:
     vehicle: VehicleType = part("the type of all vehicles", VehicleType)
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     depart_speed: float | None = real(
-        "at insertion; None is the highest safe speed up to the limit", "m/s",
+        "the most at insertion; None is the highest safe speed up to the limit", "m/s",
         low=0, optional=True, default=None,
     )  # fmt: skip
     dt: float = real("step", "s", low=0.001, high=0.5, default=0.1)

@@ -55,7 +55,7 @@ class Recipe:
         "what rows call the controller; its own name where empty", empty=True, default=""
     )
     on_collision: str = word(
-        "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
+        "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
         REACTIONS, default="stop",
     )  # fmt: skip
     metrics: tuple[str | Metric, ...] = checked(

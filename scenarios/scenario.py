@@ -51,7 +51,7 @@ class Scenario:
 
     @property
     def depart_speed(self) -> float | None:
-        """Speed at insertion [m/s]; None means the highest safe one."""
+        """The most at insertion [m/s]; None means the highest safe one."""
         return self.profile.depart_speed
 
     @property

@@ -28,8 +28,8 @@ from dataclasses import replace
 
 from dim.controller import Dim, DimSession
 from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
-from dim.perception import ROUNDING, STANDING, UNKNOWN
-from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
+from dim.perception import ROUNDING, UNKNOWN
+from minisim.control import HALTING, Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
 from minisim.junction.movements import Movements
 from minisim.parameters import declared, part, real, word
@@ -175,13 +175,13 @@ class _Humans:
             if drivers[v.lane, v.rank].human and v.distance <= self._yellow
         ]
         rolling = [
-            v for v in heads.values() if v.speed > STANDING and not drivers[v.lane, v.rank].human
+            v for v in heads.values() if v.speed > HALTING and not drivers[v.lane, v.rank].human
         ]
         before = self._standing
         self._standing = {
             v.id: before.get(v.id, now)
             for v in here
-            if v.speed <= STANDING and v.distance <= self._line
+            if v.speed <= HALTING and v.distance <= self._line
         }
         queue = [v for v in here if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))

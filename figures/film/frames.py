@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from figures.junction import drawing
-from minisim.engine.kernel import WAITING_SPEED
+from minisim.control import HALTING
 from minisim.errors import InputError
 from minisim.junction.paths import Floats
 from minisim.junction.turns import indicator
@@ -43,7 +43,7 @@ class Frames:
         self.entry = paths[0].entry
         clear = self.exit[self.path] + site.vehicle.length
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
-        self.still = frame["speed_mps"].to_numpy() <= WAITING_SPEED
+        self.still = frame["speed_mps"].to_numpy() <= HALTING
         self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
         human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
         self.human = human[frame["vehicle"].to_numpy()]

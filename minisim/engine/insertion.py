@@ -17,8 +17,9 @@ def insert(
 ) -> bool:
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 
-    Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
-    lower limits ahead and, while the lane is closed, stop at the hold line.
+    Its speed is the highest up to `law.depart_speed` from which it can follow the vehicle ahead,
+    brake comfortably for the lower limits ahead, stop before the junction and, while the lane is
+    closed, stop comfortably at the hold line.
 
     Returns whether a vehicle was inserted past a wake-up mark.
     """
@@ -38,6 +39,8 @@ def insert(
         for k in range(section + 1, road.section_start.shape[1] - 1):
             room = max(road.section_start[p, k] - s, 0.0)
             v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * law.b * room))
+        # It must be able to stop before the junction, where other vehicles may be.
+        v = min(v, law.depart_speed, math.sqrt(2.0 * law.b_max * max(law.entry - s, 0.0)))
         if lanes[lane]["open"] == 0:
             v = min(v, math.sqrt(2.0 * law.b * max(law.hold - STOP_MARGIN - s, 0.0)))
         j = i - 1
@@ -47,10 +50,6 @@ def insert(
                 continue
             room = room_behind(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
             v = min(v, safe, math.sqrt(max(room, 0.0)))
-        if law.depart_speed >= 0.0:
-            if law.depart_speed > v:
-                continue
-            v = law.depart_speed
         lanes[lane]["next"] = i + 1
         vehicles[i]["status"] = DRIVING
         vehicles[i]["s"] = s

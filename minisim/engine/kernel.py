@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import ballistic, semi_implicit
+from minisim.control import HALTING
 from minisim.engine.broad_phase import may_touch
 from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import Cruise
@@ -30,9 +31,6 @@ from minisim.jit import njit
 
 #: Reasons to return, as bits.
 MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
-
-#: SUMO's limit below which a vehicle counts as waiting [m/s].
-WAITING_SPEED = 0.1
 
 
 @njit
@@ -200,7 +198,7 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
                 s, v = ballistic(s, v, acc, law.dt)
             vehicles[i]["s"] = s
             vehicles[i]["v"] = v
-            if v <= WAITING_SPEED:
+            if v <= HALTING:
                 vehicles[i]["waiting_ticks"] += 1
             section = vehicles[i]["section"]
             while s >= start[p, section + 1]:

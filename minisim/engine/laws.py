@@ -47,11 +47,13 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
     """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
 
-    The leader comes to rest no sooner than its brakes can stop it.
+    The leader comes to rest no sooner than its brakes can stop it, and half the gap at standstill
+    stays free: the laws themselves never come that near.
     """
+    room = gap - 0.5 * law.min_gap
     if law.semi_implicit:
-        return 2.0 * law.b_max * (gap - STILL + braking_distance(v_leader, law.b_max, law.dt))
-    return 2.0 * law.b_max * (gap - STILL) + v_leader * v_leader
+        return 2.0 * law.b_max * (room + braking_distance(v_leader, law.b_max, law.dt))
+    return 2.0 * law.b_max * room + v_leader * v_leader
 
 
 @njit_inline

@@ -138,7 +138,7 @@ class Law(NamedTuple):
     leave: float  # s up to which a vehicle at least stays in view
     margin: float  # see `minisim.vehicle.Model`
     sight: float  # how far before the entry a view reaches
-    depart_speed: float  # negative means the highest safe speed
+    depart_speed: float  # the most at insertion
     wake_on_clear: bool
     record_from: int  # ticks
     record_to: int
@@ -218,7 +218,7 @@ def build_law(
         leave=entry + plan.reach,
         margin=MODELS[vehicle.model].margin,
         sight=plan.sight,
-        depart_speed=-1.0 if depart_speed is None else depart_speed,
+        depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
         record_from=first_tick(record_window[0], site.dt) if record else NEVER,
         record_to=first_tick(record_window[1], site.dt) if record else NEVER,

@@ -54,7 +54,7 @@ class ScenarioLike(Protocol):
 
     @property
     def depart_speed(self) -> float | None:
-        """Speed at insertion [m/s]; None means the highest safe speed."""
+        """The most at insertion [m/s]; None means the highest safe speed."""
 
     def site(self, seed: int) -> Site:
         """What the controller may know."""

@@ -65,7 +65,7 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
                 "route": movements[vehicles["path"][i]],
                 "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
                 "departPos": site.vehicle.length + MODELS[site.vehicle.model].margin,
-                "departSpeed": "max" if depart_speed is None else depart_speed,
+                "departSpeed": "max" if depart_speed != 0.0 else 0,
                 "speedFactor": f"{vehicles['factor'][i]:.9f}",
             },
         )

@@ -181,6 +181,9 @@ class Worker:
         car.seen = self._tick
         car.s = law.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
+        if car.v > law.depart_speed:  # SUMO was told "max", since it never lowers a given speed
+            car.v = law.depart_speed
+            self._libsumo.vehicle.setPreviousSpeed(car.name, car.v)
         self._lanes[car.lane].append(car)
         self._steering.depart(car)
         self._turn_to(car)

@@ -22,7 +22,7 @@ from scenarios.recipe import Recipe
 
 #: Raise it by one when a recipe gives another row than before and the version of the package stays
 #: the same. Stored rows are then computed again.
-RESULTS = 4
+RESULTS = 5
 
 #: Packages whose changes `RESULTS` counts.
 OURS = ("minisim", "dim", "baselines", "scenarios")

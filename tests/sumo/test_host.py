@@ -715,3 +715,14 @@ def test_no_green_ends_in_sumo_while_its_queue_stands(signal: Controller) -> Non
     simulate(queues(VehicleType(length=6.0)), watched)
     assert watched.left
     assert not any(watched.left)
+
+
+def test_a_departure_speed_that_a_driver_cannot_have_is_capped() -> None:
+    """SUMO raises at a speed above the driver's own, and inserts nobody where it is unsafe."""
+    slow = VehicleType(speed_deviation=0.3)
+    what = small_scenario(4, demand_time=60.0, depart_speed=10.0, vehicle=slow)
+    run = simulate(what, FixedTime(), seed=1, record="all")
+    assert run.columns.departed.all()
+    first = run.trajectories.groupby("vehicle")["speed_mps"].first()
+    assert first.max() == pytest.approx(10.0)
+    assert first.min() < 9.0

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from minisim.carfollowing import braking_distance
+from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, NEVER, Floats, Ints, Law, Records
 from minisim.jit import njit, njit_inline
@@ -18,9 +19,6 @@ INSIDE = 64
 
 NOWHERE, JOIN, PART = int(Meeting.NOWHERE), int(Meeting.JOIN), int(Meeting.PART)
 CROSS, WAIT = int(Meeting.CROSS), int(Meeting.WAIT)
-
-#: SUMO's speed below which a vehicle halts (`SUMO_const_haltingSpeed`) [m/s].
-HALTING = 0.1
 
 #: More than any gap [m].
 FAR = 1e9

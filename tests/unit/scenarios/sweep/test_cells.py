@@ -271,7 +271,7 @@ def test_changed_results_need_another_version(
     )  # fmt: skip
     found = [row[column] for column in columns]
     assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
-    assert RESULTS == 4
+    assert RESULTS == 5
 
 
 # --- growing queues -------------------------------------------------------------------------

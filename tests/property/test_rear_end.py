@@ -1,0 +1,70 @@
+"""No law and no step that a constructor allows makes a vehicle run into the one ahead."""
+
+from __future__ import annotations
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from minisim.carfollowing import ballistic, stop_within
+from minisim.simulation import simulate
+from minisim.testing import small_scenario
+from minisim.vehicle import VehicleType
+from scenarios.controllers import controller_named
+from scenarios.strategies import floats
+
+STEPS = st.sampled_from([0.5, 0.3, 0.2, 0.1])
+
+
+@st.composite
+def any_vehicle(draw: st.DrawFn) -> VehicleType:
+    """Any driver that a constructor accepts, with brakes that are just enough or far more."""
+    parts = {
+        "model": draw(st.sampled_from(["idm", "iidm", "krauss"])),
+        "acceleration": draw(floats(0.05, 100.0)),
+        "deceleration": draw(floats(0.5, 100.0)),
+        "headway": draw(floats(0.5, 10.0)),
+        "min_gap": draw(floats(0.5, 20.0)),
+        "exponent": draw(floats(1.0, 50.0)),
+        "speed_deviation": draw(st.sampled_from([0.0, 0.1, 0.5])),
+    }
+    needed = VehicleType(max_deceleration=1000.0, **parts).needed_braking
+    most = draw(st.sampled_from([1.0, 1.3, 10.0])) * needed + 1e-9
+    return VehicleType(max_deceleration=min(most, 1000.0), **parts)
+
+
+def car(**parts: float) -> VehicleType:
+    return VehicleType(max_deceleration=parts.pop("max_deceleration", 1000.0), **parts)
+
+
+@given(any_vehicle(), STEPS, floats(0.5, 100.0), st.sampled_from(["fixed-time", "dim"]))
+@example(car(acceleration=50.0, deceleration=20.0, min_gap=0.5), 0.2, 5.0, "fixed-time")
+@example(
+    car(acceleration=10.0, deceleration=20.0, exponent=50.0, headway=0.8), 0.5, 0.5, "fixed-time"
+)
+@example(
+    car(acceleration=50.0, deceleration=1.0, headway=0.5, speed_deviation=0.5), 0.5, 1.0, "dim"
+)
+@example(car(acceleration=0.1, headway=0.5, max_deceleration=6.0), 0.3, 100.0, "fixed-time")
+@settings(max_examples=25)
+def test_nobody_runs_into_the_one_ahead(
+    vehicle: VehicleType, dt: float, limit: float, controller: str
+) -> None:
+    scenario = small_scenario(
+        3, vehicle=vehicle, dt=dt, speed_limit=limit, density=1000.0, demand_time=40.0, drain=40.0,
+        arm_length=150.0,
+    )  # fmt: skip
+    run = simulate(scenario, controller_named(controller), seed=1, on_collision="record")
+    lane = run.columns.lane
+    touched = [c for c in run.collisions if lane[c.vehicles[0]] == lane[c.vehicles[1]]]
+    assert not touched, str(touched[0])
+
+
+@given(floats(0.0, 100.0), floats(0.0, 200.0), floats(0.5, 1000.0), STEPS)
+def test_who_can_stop_still_can_after_the_step(v: float, more: float, b: float, dt: float) -> None:
+    """And never has to brake harder than the brakes can."""
+    distance = v * v / (2.0 * b) + more
+    a = stop_within(v, distance, b, dt)
+    assert a >= -b * (1.0 + 1e-6)
+    driven, v_new = ballistic(0.0, v, a, dt)
+    left = distance - driven
+    assert v_new * v_new / (2.0 * b) <= left + 1e-6 * (1.0 + distance)
