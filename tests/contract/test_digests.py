@@ -22,7 +22,7 @@ KEPT = {
     "fair/4/longest-queue/1": "75fec4a79f90e06c",
     "paper/4/all-way-stop/1": "f1aaaa3887c49665",
     "fair/4/v2ic/1": "03e5b1e65cfdd957",
-    "fair/5/reservation/2": "ac20feda12386622",
+    "fair/5/reservation/2": "2d1ce58f6f1556e6",
     "as_run/4/dim/1": "25bba17c88569873",
     "as_run/4/v2ic-as-run/1": "5640e6dfdec90219",
     "as_run_signals/4/fixed-time/1": "17f242b455294cf7",
