@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c co
 TEST   := $(BIN)/python -m pytest -n auto --maxprocesses 8
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint bench mutants figures reproduce clean
+.PHONY: help demo test test-all lint bench mutants pictures figures reproduce clean
 
 help:  ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -36,6 +36,13 @@ bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call goes on with it
 	$(BIN)/python tests/mutants.py run
 	$(BIN)/python tests/mutants.py table
+
+pictures: demo  ## the pictures of README and docs, drawn anew from out/runs.sqlite (make reproduce)
+	cp out/demo.png out/demo.gif docs
+	$(BIN)/minisim decide four-way a1 b2 c2 d2 --plot docs/decision.png
+	$(BIN)/minisim figures waiting-balanced perception --store out/runs.sqlite --out out/figures
+	cp out/figures/waiting-balanced.png docs/waiting.png
+	cp out/figures/perception.png docs/perception.png
 
 figures: $(VENV)/.installed  ## every figure and table, from out/runs.sqlite (make reproduce) or else a quick run
 	if [ -f out/runs.sqlite ]; then $(BIN)/minisim figures --store out/runs.sqlite --out out/figures; \

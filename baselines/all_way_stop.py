@@ -13,7 +13,8 @@ from collections.abc import Iterable
 
 from minisim.control import Command, Go, Observed, Plan, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: A vehicle slower than this counts as standing [m/s]: SUMO's threshold for waiting.
 STANDING = 0.1

@@ -50,7 +50,8 @@ from minisim.control import (
 )
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Smaller differences from the prediction do not count [m], [m/s].
 POSITION_TOLERANCE, SPEED_TOLERANCE = 0.05, 0.05
@@ -213,6 +214,7 @@ class ReservationSession:
         if reach is None:
             braking = stopping_distance(site.speed_limit, site.vehicle.deceleration)
             reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
+        reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
         self._period = controller.period
         self._dt = site.dt

@@ -22,7 +22,8 @@ import math
 from collections.abc import Iterable
 
 from minisim.control import Advise, Command, Go, Observed, Plan, Site, View, Wake
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 #: Added to speeds used as divisors, as in the authors' code [m/s].
 CRAWL = 1e-5
@@ -85,7 +86,8 @@ class V2ICSession:
     """
 
     def __init__(self, controller: V2IC, site: Site) -> None:
-        self.plan = Plan(marks=(controller.reach,), wake_on_clear=True, sight=controller.reach)
+        reach = min(controller.reach, site.intersection.approach_length)
+        self.plan = Plan(marks=(reach,), wake_on_clear=True, sight=reach)
         paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way

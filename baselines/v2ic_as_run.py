@@ -33,7 +33,8 @@ from baselines.v2ic import CRAWL
 from minisim.control import NOTHING, Advise, Command, Plan, Site, View, Wake
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 REFERENCE = 400.0  #: where the rules take the junction to be: distance driven [m]
 RANGE = 200.0  #: how far before it vehicles register [m]
@@ -198,7 +199,7 @@ class V2ICAsRunSession:
     def _platoons(self, view: View) -> dict[int, Platoon]:
         """The vehicles that may be in the list; most of those in view cannot be."""
         platoons = {}
-        for vehicle, lane, manoeuvre, distance, speed, _, demand_time in view.vehicles:
+        for vehicle, lane, manoeuvre, distance, speed, _, demand_time, _ in view.vehicles:
             driven = self._origin - distance + ROUNDING
             if FIRST <= driven < LEFT:
                 order = (math.floor(demand_time + ROUNDING), lane, vehicle)

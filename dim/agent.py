@@ -1,4 +1,4 @@
-"""Algorithm 1 of the paper for one vehicle: does it go, from what it perceives, alone?"""
+"""The paper's Algorithm 1 for one vehicle: to go or not, decided alone from what it perceives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dim.perception import COMMITS, Percept
 from minisim.parameters import declared, part, word
 
 #: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious" (ours): a
-#: participant in harmony with all of them, except that it just follows those of its own lane.
+#: participant in harmony with all that cross; those of its own lane do not count, since it simply
+#: follows them.
 GATES = ("clear", "harmonious")
 
 
@@ -15,7 +16,7 @@ GATES = ("clear", "harmonious")
 class Rules:
     """The public rules: all that the vehicles have in common."""
 
-    table: DecisionTable = part("the decision of every case", DecisionTable)
+    table: DecisionTable = part("the decision for every case", DecisionTable)
     gate: str = word(
         "which vehicles may enter while others cross, see `GATES`", GATES, default="clear"
     )
@@ -37,16 +38,18 @@ class Agent:
         self.right_of_way = False
 
     def decide(self, percept: Percept, table: DecisionTable | None = None) -> bool:
-        """Whether it goes, from what it perceives now (lines 4–12 of Algorithm 1).
+        """Whether the vehicle goes, given what it perceives now (lines 4–12 of Algorithm 1).
 
-        - A crossing vehicle keeps going. By the paper's commit rule it also goes when it rolled
-          past half of the green zone after losing its right of way ("it is granted the right of
-          way by others"). By the stoppable rule such a vehicle is stopping, and waits.
-        - A vehicle that is not yet the first of its lane, or that the gate keeps out, does what it
-          did before.
-        - Any other vehicle goes if and only if it belongs to the clique. Where it does not know
-          another's intent, it must belong to the clique of every possible case. So all that go
-          belong to the clique of the true case, however little each of them knows.
+        - A crossing vehicle keeps going. Under the paper's commit rule it also goes if it has
+          rolled past the middle of the green zone after losing its right of way ("it is granted
+          the right of way by others"). Under the stoppable rule such a vehicle is stopping, and
+          waits.
+        - A vehicle that is not yet the first in its lane, or that the gate keeps out, goes on doing
+          what it did before.
+        - Any other vehicle goes if and only if it belongs to the clique. If it does not know
+          another vehicle's intent, it must belong to the clique of every possible case. So all the
+          vehicles that go belong to the clique of the true case, however little each of them
+          knows.
 
         Where lane priorities change, `table` is for the present ones; by default it is the rules'.
         """

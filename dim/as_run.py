@@ -42,9 +42,10 @@ import networkx as nx
 from dim.decision import ORDERS
 from dim.harmony import HarmonyMatrix
 from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError, instance
+from minisim.errors import InputError, printable
 from minisim.junction.movements import Movement
-from minisim.parameters import checked, declared, part, real, spelled, word
+from minisim.names import Name
+from minisim.parameters import checked, declared, part, real, word
 
 #: Where the junction begins for the rules, by number of arms: distance driven [m]. The numbers are
 #: the authors' (`JUNC_BOUND` of their three drivers).
@@ -81,16 +82,17 @@ ROUNDING = 1e-9
 
 def _names(title: str, value: Any) -> str:
     """Check `AsRunDim.names`."""
-    instance(title, value, str)
-    if len(set(value)) != len(value):
-        raise InputError(f"{title} must be different letters, got {value!r}")
-    return str(value)
+    text = printable(title, value)
+    if not text.isalpha() or len(set(text)) != len(text):
+        raise InputError(f"{title} must be different letters, got {text!r}")
+    return text
 
 
 @declared
 class AsRunDim:
     """DIM as the authors ran it for the published numbers, on 3, 4 and 5 arms; it may collide."""
 
+    name = Name("dim-as-run")
     covers = NOTHING
 
     order: str = word(
@@ -113,11 +115,6 @@ class AsRunDim:
         "speed desired behind the junction, 20 in every published run of DIM", "m/s",
         above=0.0, default=EXIT_SPEED,
     )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `dim-as-run:order=size`."""
-        return spelled("dim-as-run", self)
 
     def start(self, site: Site) -> AsRunSession:
         """Begin a run; raises `InputError` where the rules do not fit the site."""

@@ -47,9 +47,10 @@ from dim.priorities import (
 from dim.senses.noise import NoisyPerception
 from dim.senses.tally import Tally
 from dim.zones import Zones
-from minisim.control import Command, Go, Hold, Plan, Site, View, Wake
-from minisim.errors import InputError, choice, instance, show
-from minisim.parameters import checked, declared, part, real, spelled, word
+from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
+from minisim.errors import InputError, choice, instance, items
+from minisim.names import Name
+from minisim.parameters import checked, declared, part, real, refuse_idle, word
 
 #: Lane priorities that change with time.
 CHANGING = ("rotating", "waiting")
@@ -62,9 +63,8 @@ def _priorities(title: str, value: Any) -> Any:
     """Check `Dim.priorities`."""
     if isinstance(value, str):
         return choice(title, value, ("inflow", *CHANGING))
-    if not isinstance(value, (tuple, list)):
-        raise InputError(f"{title} must be lane ranks or 'inflow', got {show(value)}")
-    return lane_ranks(value, len(value))
+    ranks = items(title, value, "ranks such as (0,1,2,3), or inflow, rotating or waiting")
+    return lane_ranks(ranks, len(ranks))
 
 
 @declared
@@ -73,6 +73,8 @@ class Dim:
 
     `gate="harmonious"`, priorities other than the lanes' own order, and the monitor are ours.
     """
+
+    name = Name("dim")
 
     order: str = word(
         "what comes first: the largest clique, or the highest-priority lanes",
@@ -89,9 +91,11 @@ class Dim:
         GATES, default="clear",
     )  # fmt: skip
     priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = checked(
-        "rank of each lane, 0 first: given; by descending demand; each lane first in turn; or the "
-        "lane that has waited longest first; none is the lanes' own order",
-        _priorities, "ranks | inflow | rotating | waiting", optional=True, default=None,
+        "which lane comes first: ranks of the lanes a, b, c, …, 0 first; inflow, the one with the "
+        "highest demand; rotating, each in turn; waiting, the one that has waited longest; none is "
+        "their own order",
+        _priorities, "ranks such as (0,1,2,3) | inflow | rotating | waiting",
+        optional=True, default=None,
     )  # fmt: skip
     zones: Zones = part("the road markings", Zones, kinds={"zones": Zones}, default=Zones())
     matrix: HarmonyMatrix | None = part(
@@ -124,10 +128,11 @@ class Dim:
         above=0, optional=True, default=None,
     )  # fmt: skip
 
-    @property
-    def name(self) -> str:
-        """Its spelling, such as `dim:gate=harmonious`."""
-        return spelled("dim", self)
+    def __post_init__(self) -> None:
+        if self.priorities not in CHANGING:
+            refuse_idle(self, "priorities=rotating or waiting", "turn_time")
+        if self.priorities != "waiting":
+            refuse_idle(self, "priorities=waiting", "sensor_range")
 
     def start(self, site: Site) -> DimSession:
         """Begin a run.
@@ -162,7 +167,7 @@ class Dim:
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part.
 
-    Vehicles whose id `follows` rejects are seen but have no agent. `takes` says how vehicles
+    Vehicles that `follows` rejects are seen but have no agent. `takes` says how vehicles
     interpret what they have seen of a true view: (true, seen) -> taken.
     """
 
@@ -170,7 +175,7 @@ class DimSession:
         self,
         dim: Dim,
         site: Site,
-        follows: Callable[[int], bool] = lambda _: True,
+        follows: Callable[[Observed], bool] = lambda _: True,
         takes: Callable[[View, View], View] | None = None,
     ) -> None:
         instance("site", site, Site)
@@ -218,7 +223,7 @@ class DimSession:
         sights: dict[int, View] = {}
         for ego in view.vehicles:
             vehicle = ego.id
-            if ego.distance > self._start or not self._follows(vehicle):
+            if ego.distance > self._start or not self._follows(ego):
                 continue
             agent = self._agents.get(vehicle) or Agent(vehicle, ego.lane, self.rules)
             agents[vehicle] = agent

@@ -1,9 +1,9 @@
-"""Which vehicles cross: one right of way from the participants' movements, the same for all.
+"""Which vehicles cross: one right of way, the same for all, from the participants' movements.
 
-The participants are the nodes of a graph, with an edge where two movements are in harmony; a
-clique of it can cross at once (paper, "Decentralized Intersection Management"). A total order of
-our own chooses among several cliques: vehicles that decide alone must agree, and a graph library
-lists cliques in an arbitrary order.
+The participants are the nodes of a graph, with an edge where two movements are in harmony; the
+members of a clique can cross at the same time (paper, "Decentralized Intersection Management"). If
+there are several cliques, a total order of our own chooses among them, because vehicles that decide
+alone must agree, and a graph library lists cliques in an arbitrary order.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from dim.harmony import HarmonyMatrix
 from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.junction.movements import ARM_NAMES, Movement
 
-#: "size": the largest clique, among equals the one of the higher-priority lanes (the paper's
-#: words). "lanes": the higher-priority lanes among all maximal cliques (its published runs).
+#: "size": the largest clique and, among equally large ones, the one with the higher-priority lanes
+#: (as the paper words it). "lanes": of all maximal cliques, the one with the higher-priority lanes
+#: (as in its published runs).
 ORDERS = ("size", "lanes")
 
 #: `DecisionTable.complete` refuses more cases than this: 7 arms have 823,542, 8 arms 17 million.
@@ -52,17 +53,17 @@ def decide(
     """The right of way among participants: a pure function of the set of their movements.
 
     Args:
-        movements: of the participants, at most one a lane, in any order.
+        movements: those of the participants, at most one per lane, in any order.
         matrix: harmony of the movements.
         order: "size" or "lanes", see `ORDERS`.
         priorities: rank of each lane, 0 first; by default the lanes' own order.
 
     Returns:
-        The movements that may cross, by lane; empty only when there is no participant.
+        The movements that may cross, by lane; empty only when there are no participants.
 
     Raises:
         InputError: unknown movement or order, two movements of one lane, or priorities that are
-            no permutation of the lanes.
+            not a permutation of the lanes.
     """
     participants = _participants(movements, matrix)
     choice("order", order, ORDERS)
@@ -76,7 +77,7 @@ class Explanation:
 
     participants: Movements  # by lane
     edges: tuple[tuple[Movement, Movement], ...]  # pairs in harmony
-    cliques: tuple[Movements, ...]  # all maximal ones, the preferred first
+    cliques: tuple[Movements, ...]  # all maximal ones, the preferred one first
     tied: tuple[Movements, ...]  # those of the largest size, in the same order
     right_of_way: Movements  # the first of `cliques`
     reason: str  # in one sentence
@@ -110,25 +111,25 @@ def explain(
 
 
 class DecisionTable:
-    """The decision of every case: the paper's "generated offline, queried online".
+    """The decision for every case: the paper's "generated offline, queried online".
 
-    A case says what the front vehicle of each lane wants, 0 where there is none: n^n − 1 cases
-    with a vehicle. It is written as the integer Σ manoeuvre·n^lane, so every integer 1 … n^n − 1 is
-    a case and 0 is the empty junction. An entry is computed with networkx when it is first asked
-    for, and kept. Right of way is an integer with bit i set for lane i.
+    A case says what the front vehicle of each lane wants, with 0 for a lane that has none; n^n − 1
+    cases have at least one vehicle. A case is written as the integer Σ manoeuvre·n^lane, so every
+    integer 1 … n^n − 1 is a case and 0 is the empty junction. An entry is computed with networkx
+    when it is first asked for, and kept. Right of way is an integer with bit i set for lane i.
 
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.
         lanes: case -> lanes with the right of way; the case is not checked.
-        admitted: (case, crossing) -> the case without the participants in conflict with one of the
-            movements `crossing`, an integer with bit k set for the k-th movement. Movements of one
-            lane follow each other and are not in conflict.
-        surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those with the
-            right of way whatever the participants of the lanes `unknown` (bit i for lane i) do,
-            which the case leaves out.
+        admitted: (case, crossing) -> the case without the participants that conflict with any of
+            the movements in `crossing`, an integer with bit k set for the k-th movement. Movements
+            of one lane follow each other and are not in conflict.
+        surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those that have
+            the right of way whatever the participants on the lanes in `unknown` (bit i for lane i)
+            do; the case leaves these participants out.
 
     Raises:
-        InputError: unknown order, or priorities that are no permutation of the lanes.
+        InputError: unknown order, or priorities that are not a permutation of the lanes.
     """
 
     def __init__(
@@ -151,7 +152,7 @@ class DecisionTable:
         return sum(m.manoeuvre * self.matrix.n**m.origin for m in participants)
 
     def participants(self, case: int) -> Movements:
-        """The movements of a case, by lane; raises `InputError` for an integer that is none."""
+        """The movements of a case, by lane; raises `InputError` for any other integer."""
         n = self.matrix.n
         case = integer("case", case, low=0, high=len(self))
         digits = ((lane, case // n**lane % n) for lane in range(n))
@@ -172,10 +173,10 @@ class DecisionTable:
         return (self.participants(case) for case in range(1, len(self) + 1))
 
     def complete(self) -> None:
-        """Compute every entry now; raises `InputError` where they are too many (8 arms on)."""
+        """Compute every entry now; raises `InputError` if there are too many (from 8 arms)."""
         if len(self) > MAX_CASES:
             raise InputError(
-                f"{self.matrix.n} arms have {len(self)} cases, too many to compute them all "
+                f"{self.matrix.n} arms have {len(self)} cases, too many to compute in advance "
                 f"(at most {MAX_CASES}); entries are computed when they are asked for"
             )
         for case in range(1, len(self) + 1):
@@ -218,12 +219,12 @@ def decision_table(
 def _participants(movements: Iterable[Movement | str], matrix: HarmonyMatrix) -> Movements:
     """The movements by lane, checked."""
     instance("matrix", matrix, HarmonyMatrix)
-    given = items("participants", movements, "movements such as a1, b2")
+    given = items("participants", movements, "movements such as a1, b2", ordered=False)
     participants = sorted(matrix.movements[matrix.index(m)] for m in given)
     for one, other in pairwise(participants):
         if one.origin == other.origin:
             raise InputError(
-                f"one participant a lane: lane {ARM_NAMES[one.origin]} has {one} and {other}"
+                f"one participant per lane: lane {ARM_NAMES[one.origin]} has {one} and {other}"
             )
     return tuple(participants)
 
@@ -248,7 +249,7 @@ def _key(clique: Movements, order: str, ranks: tuple[int, ...]) -> tuple[int, li
 
 
 def choose(cliques: list[Movements], order: str, ranks: tuple[int, ...]) -> Movements:
-    """The clique of `maximal_cliques` that is preferred, whatever order they come in."""
+    """The preferred one of the `maximal_cliques`, whatever order they come in."""
     return min(cliques, key=lambda clique: _key(clique, order, ranks), default=())
 
 
@@ -275,5 +276,5 @@ def _reason(
         return f"{names} is the only clique of {len(chosen)}, the largest size."
     return (
         f"{len(tied)} cliques tie at the largest size, {len(chosen)}; "
-        f"{names} holds the highest-priority lanes of them (priority {lanes})."
+        f"{names} holds the highest-priority lanes among them (priority {lanes})."
     )

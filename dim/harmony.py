@@ -1,7 +1,7 @@
-"""Which movements can be driven at once: the paper's harmony matrix.
+"""Which movements can be driven at the same time: the paper's harmony matrix.
 
-A matrix comes from the geometry (two movements are in harmony when the corridors that their bodies
-sweep keep a clearance), from a file, or from the paper.
+A matrix comes from the geometry (two movements are in harmony when the corridors that vehicles
+sweep on them stay a clearance apart), from a file, or from the paper.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, show
-from minisim.files import write_text
+from minisim.files import read_file, write_text
 from minisim.junction.conflicts import CLEARANCE, conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
@@ -83,13 +82,7 @@ class HarmonyMatrix:
         Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
         for labels or entries that are no harmony matrix (with the entry).
         """
-        instance("path of a harmony matrix", path, (str, os.PathLike))
-        try:
-            data = Path(path).read_bytes()
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise FileError(f"cannot read harmony matrix {path!s}: {reason}") from None
-        return _parse(data, f"harmony matrix {path!s}")
+        return _parse(read_file("harmony matrix", path), f"harmony matrix {path!s}")
 
     def to_text(self) -> str:
         """The matrix as `from_csv` reads it."""
@@ -101,7 +94,7 @@ class HarmonyMatrix:
         return buffer.getvalue()
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write the matrix, whole or not at all; raises `FileError` where that is impossible."""
+        """Write the matrix, whole or not at all; raises `FileError` if that is impossible."""
         instance("path of a harmony matrix", path, (str, os.PathLike))
         write_text(path, self.to_text())
 
@@ -111,11 +104,11 @@ class HarmonyMatrix:
         return movements_of(self.n)
 
     def index(self, movement: Movement | str) -> int:
-        """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError`."""
+        """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError` if unknown."""
         return self.movements.number(movement)
 
     def harmony(self, first: Movement | str, second: Movement | str) -> bool:
-        """Whether both can be driven at once; raises `InputError` for an unknown movement."""
+        """Whether both can be driven together; raises `InputError` for an unknown movement."""
         return bool(self.values[self.index(first), self.index(second)])
 
     def __getitem__(self, pair: tuple[Movement | str, Movement | str]) -> bool:
@@ -124,7 +117,7 @@ class HarmonyMatrix:
         return self.harmony(*pair)
 
     def disagreements(self, other: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
-        """The unordered pairs on which two matrices differ; raises `InputError` for another n."""
+        """The unordered pairs on which two matrices differ; raises `InputError` if n differs."""
         instance("other", other, HarmonyMatrix)
         if other.n != self.n:
             raise InputError(f"cannot compare matrices of {self.n} and {other.n} arms")
@@ -145,12 +138,12 @@ class HarmonyMatrix:
 
     @property
     def spelling(self) -> str:
-        """Its name on command lines and in names of controllers; only the paper's have one."""
+        """The matrix's name on command lines and in controller names; empty if not the paper's."""
         paper = self.n in PAPER_ARMS and self == HarmonyMatrix.paper(self.n)
         return f"paper({self.n})" if paper else ""
 
     def __repr__(self) -> str:
-        # A controller's repr is kept as provenance; the digest tells its matrices apart.
+        # The repr of a controller is kept as provenance; the digest tells matrices apart in it.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
         return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
@@ -169,7 +162,7 @@ def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
     try:
         array = np.asarray(values)
     except ValueError:
-        raise InputError("a harmony matrix is square: its rows differ in length") from None
+        raise InputError("a harmony matrix must be square, but its rows differ in length") from None
     if array.shape != (size, size):
         raise InputError(
             f"a harmony matrix of {movements.n} arms is {size} × {size}, "
@@ -183,7 +176,10 @@ def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
     for row, column in _where(result != result.T):
         here, there = int(result[row, column]), int(result[column, row])
         _refuse(
-            labels, row, column, f"is {here} but the other way round {there}: it must be symmetric"
+            labels,
+            row,
+            column,
+            f"is {here} but {there} the other way round: the matrix must be symmetric",
         )
     for row, column in _where(result & ~movements.apart):
         _refuse(labels, row, column, "is 1, but they share a lane: it must be 0")
@@ -209,7 +205,7 @@ def _parse(data: bytes, where: str) -> HarmonyMatrix:
     if len(rows) - 1 != len(labels):
         raise InputError(
             f"{where}, line {rows[-1][0]}: not square: the header names {len(labels)} movements, "
-            f"{len(rows) - 1} rows follow"
+            f"but {len(rows) - 1} rows follow"
         )
     values = [
         _row(cells, label, labels, f"{where}, line {line}")
@@ -222,7 +218,7 @@ def _parse(data: bytes, where: str) -> HarmonyMatrix:
 
 
 def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
-    """The lines with cells, each with its number; all as long as the first."""
+    """The non-blank lines, each with its number; all have as many cells as the first."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -254,7 +250,7 @@ def _arms(columns: int, where: str) -> int:
 def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> list[int]:
     if cells[0] != label:
         raise InputError(
-            f"{where}: the row is labelled {cells[0]!r}, but the columns' order asks for {label!r}"
+            f"{where}: the row is labelled {cells[0]!r}, but the column order calls for {label!r}"
         )
     for other, cell in zip(labels, cells[1:], strict=True):
         if cell not in ("0", "1"):

@@ -11,11 +11,13 @@ KMH = 1.0 / 3.6
 
 @declared
 class Zones:
-    """Red, yellow and green zone, in this order towards the junction (paper, same section).
+    """The red, yellow and green zones, in this order towards the junction.
+
+    Source: the paper, "Decentralized Intersection Management".
 
     A vehicle slows down in the red zone. From the start of the yellow zone it takes part in
-    decisions. At the end of the yellow zone, the hold line, it waits for its right of way. The
-    green zone is a buffer: a vehicle that loses its right of way still stops in it.
+    decisions. It waits for its right of way at the hold line, where the yellow zone ends. The green
+    zone is a buffer: a vehicle that loses its right of way can still stop in it.
     """
 
     red: float = real(
@@ -31,13 +33,13 @@ class Zones:
         label="green zone",
     )  # fmt: skip
     red_speed: float = real(
-        "speed to which the red zone slows; it holds up to the junction", "m/s",
+        "speed to which vehicles slow in the red zone; it holds up to the junction", "m/s",
         default=20.0 * KMH, above=0, high=100,
     )  # fmt: skip
 
     @property
     def yellow_start(self) -> float:
-        """Distance before the junction from which a vehicle takes part [m]."""
+        """Distance before the junction from which a vehicle takes part in decisions [m]."""
         return self.green + self.yellow
 
     @property
@@ -48,11 +50,12 @@ class Zones:
     def markings(self, site: Site) -> tuple[Marking, ...]:
         """The markings of every approach lane, from the far end to the junction.
 
-        In the paper a vehicle enters the red zone and *then* slows down. A host slows it ahead of
-        a limit. So the limit begins where comfortable braking from the start of the red zone has
-        reached it: after (v² − v_red²) / 2b, 23.1 m for the paper's 40 to 20 km/h at 2 m/s². The
-        red zone before that has no limit. In a red zone too short for this, vehicles begin to
-        brake before it: the limit holds in the yellow zone in any case.
+        In the paper a vehicle enters the red zone and *then* slows down. A host, however, slows a
+        vehicle down before a limit begins. So the limit begins where a vehicle that brakes
+        comfortably from the start of the red zone has slowed to it: after (v² − v_red²) / 2b,
+        23.1 m for the paper's 40 to 20 km/h at 2 m/s². The part of the red zone before that has no
+        limit. If the red zone is too short for this, vehicles begin to brake before they reach it,
+        because the limit holds in the yellow zone in any case.
         """
         b = site.vehicle.deceleration
         braking = stopping_distance(site.speed_limit, b) - stopping_distance(self.red_speed, b)
@@ -68,10 +71,10 @@ class Zones:
         )
 
     def check(self, site: Site) -> None:
-        """Raise `InputError` where a vehicle could be inserted past the start of the zones."""
+        """Raise `InputError` if a vehicle could be inserted past the start of the zones."""
         room = site.intersection.approach_length - site.vehicle.length
         if self.red_start > room:
             raise InputError(
-                f"the zones are {self.red_start:g} m long, but the approach lanes leave "
-                f"{room:.4g} m in front of an inserted vehicle; make arm_length longer"
+                f"the zones are {self.red_start:g} m long, but the approach lanes leave only "
+                f"{room:.4g} m in front of an inserted vehicle; increase arm_length"
             )

@@ -1,4 +1,4 @@
-"""What a cross-validation shows: means over density, every trip, and where the hosts part."""
+"""What a cross-validation shows: means over density, every trip, and where the hosts part ways."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ from scenarios.crossval.comparison import JUDGED, Parting, times
 if TYPE_CHECKING:
     import pandas as pd
 
-#: The sources can be told apart without colour, too.
+#: Markers and dashes tell the sources apart even without colour.
 MINISIM = style.Look("minisim", style.BLUE, "o", "-")
 SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
 PUBLISHED = style.Look("published", style.BLACK, "D", ":")
-#: The lines are this far apart, so that their interval bars do not cover each other [veh/h/lane].
+#: The lines are this far apart, so that their interval bars do not overlap [veh/h/lane].
 DODGE: Final = 2.5
 
-#: What a trajectory figure shows: around the parting [s], and around the junction entry [m].
+#: The section that a trajectory figure shows: time around the parting [s], and distance around the
+#: junction entry [m].
 SHOWN_BEFORE, SHOWN_AFTER = 12.0, 28.0
 SHOWN_FROM, SHOWN_TO = -90.0, 40.0
 
-#: Distributions are shown up to this quantile; the few trips beyond would take all the room.
+#: Distributions are shown up to this quantile; the few trips beyond it would take up all the room.
 TAIL: Final = 0.995
 
 
@@ -49,16 +50,16 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
         drawable = [result for result in ordered if _travel_times(result).size]
-        if drawable:  # in a short run it may be that no vehicle has arrived
+        if drawable:  # in a short run, perhaps no vehicle has arrived
             yield _file("trips", *group), f"{title}: every trip", trips_figure(drawable)
     for result in results:
         if result.parting is not None:
             name, figure = result.case.name, parting_figure(result, result.parting)
-            yield _file("parting", name), f"{name}: where the hosts part", figure
+            yield _file("parting", name), f"{name}: where the hosts part ways", figure
 
 
 def means_figure(results: Sequence[Result]) -> Figure:
-    """Means with their 95 % intervals over density: minisim, SUMO and, where known, the paper's."""
+    """Means over density with 95 % intervals: minisim's, SUMO's and, where known, the paper's."""
     figure = style.new_figure(8.6, 4.0)
     panels = figure.subplots(1, len(JUDGED))
     figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
@@ -89,7 +90,7 @@ def means_figure(results: Sequence[Result]) -> Figure:
 
 
 def trips_figure(results: Sequence[Result]) -> Figure:
-    """Distributions of both hosts above, the same trip in both below; one column a density."""
+    """Distributions in both hosts above, each trip in both below; one column per density."""
     columns = len(results)
     figure = style.new_figure(max(6.4, 2.7 * columns + 0.9), 7.6)
     panels = figure.subplots(3, columns, squeeze=False)
@@ -111,7 +112,7 @@ def trips_figure(results: Sequence[Result]) -> Figure:
 
 
 def parting_figure(result: Result, parting: Parting) -> Figure:
-    """Distance to the junction over time, one panel a lane, both hosts over each other."""
+    """Distance to the junction over time, one panel per lane, with both hosts overlaid."""
     junction = result.case.scenario.intersection
     entry, arms = junction.approach_length, junction.n
     start = parting.time - SHOWN_BEFORE
@@ -147,9 +148,9 @@ def parting_figure(result: Result, parting: Parting) -> Figure:
     for look in (MINISIM, SUMO):
         panels[0].plot([], [], color=look.colour, linestyle=look.dashes, label=look.label)
     panels[0].plot(
-        [], [], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, label="first apart"
+        [], [], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, label="parting point"
     )
-    _head(figure, panels[0], result, "front bumper before (−) and behind (+) the junction entry")
+    _head(figure, panels[0], result, "front bumper before (−) or past (+) the junction entry")
     return figure
 
 
@@ -194,7 +195,7 @@ def _limits(values: Floats) -> tuple[float, float]:
 
 
 def _travel_times(result: Result) -> Floats:
-    """In minisim and in SUMO, of the trips that ended in both [s], shape (2, k)."""
+    """Times in minisim and in SUMO of the trips that ended in both [s], shape (2, k)."""
     return np.hstack([
         np.array([pair.minisim.travel_time, pair.sumo.travel_time])[
             :, pair.minisim.arrived & pair.sumo.arrived

@@ -41,10 +41,11 @@ class Estimate(NamedTuple):
 
 
 def mean_estimate(values: pd.Series[Any]) -> Estimate:
-    """Mean and Student-t interval; a single value is its own interval."""
+    """Mean and Student-t interval, cut at 0 if no value is negative; one value is its own."""
     mean, half, size = mean_interval(values.astype(float).tolist())
     half = half if size > 1 else 0.0
-    return Estimate(mean, mean - half, mean + half)
+    low = mean - half
+    return Estimate(mean, low if values.min() < 0.0 else max(low, 0.0), mean + half)
 
 
 def draw_line(

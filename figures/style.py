@@ -27,8 +27,9 @@ PURPLE, SKY, BLACK = "#CC79A7", "#56B4E9", "#000000"
 INK, MUTED, FAINT, PAPER = "#22272E", "#68707C", "#D9DDE3", "#FFFFFF"
 GRASS, ASPHALT, PAINT = "#EEF2E8", "#C9CED6", "#FFFFFF"
 
-#: Road markings by the name of their zone; any other zone is drawn in `SKY`.
-ZONES = {"red": "#E8A49A", "yellow": "#F3D984", "green": "#A3D2AE"}
+#: Road markings by the name of their zone; any other zone is drawn in `SKY`. They differ in
+#: lightness too, so that any two are far apart for colour-blind eyes.
+ZONES = {"red": "#DE856F", "yellow": "#FAE089", "green": "#BEEDC2"}
 #: Vehicles by their state.
 RIGHT_OF_WAY, WAITING, FREE = BLUE, VERMILLION, "#5C6470"
 

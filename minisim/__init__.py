@@ -18,19 +18,21 @@ from typing import TYPE_CHECKING
 from minisim.version import __version__
 
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
+    from minisim.arrivals import Arrivals, Demand
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
+    from minisim.recorded import read_arrivals, write_arrivals
     from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
     from minisim.vehicle import VehicleType
 
 _NAMES = {
-    "minisim.arrivals": ("Arrivals", "Demand", "read_arrivals", "write_arrivals"),
+    "minisim.arrivals": ("Arrivals", "Demand"),
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
+    "minisim.recorded": ("read_arrivals", "write_arrivals"),
     "minisim.results.run": ("Run",),
     "minisim.simulation": ("Simulation", "simulate"),
     "minisim.vehicle": ("VehicleType",),

@@ -6,18 +6,16 @@ vehicles.
 
 from __future__ import annotations
 
-import csv
 import math
-import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, instance, integer, number, numbers, show
+from minisim.errors import InputError, number, numbers, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
@@ -26,15 +24,16 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 MODELS = ("poisson", "exponential", "shifted")
-COLUMNS = ("demand_time_s", "lane", "manoeuvre")
 #: Words for equal shares of the lanes and of the manoeuvres.
 BALANCED, UNIFORM = "balanced", "uniform"
-#: May follow in a table: the drivers' factors on the speed limit.
-FACTORS = "speed_factor"
-#: Of a driver; SUMO cuts its speedFactor to the same range.
+#: A driver's factor on the speed limit; SUMO cuts its speedFactor to the same range.
 LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
 #: More than any lane can carry: a higher density is a typing error.
 MAX_DENSITY = 3600.0
+#: More in one second have a chance below 10⁻¹⁶ at any density.
+MOST_IN_A_SECOND = 20
+#: Seconds, and headways of each lane, drawn at once.
+BLOCK, HEADWAYS = 3600, 64
 #: The forms in which callers may give shares.
 Shares = Sequence[float] | str | None
 #: The longest duration and the latest demand time [s].
@@ -78,6 +77,21 @@ class Arrivals:
     def __len__(self) -> int:
         return len(self.time)
 
+    @cached_property
+    def rank(self) -> Ints:
+        """Each vehicle's place among those of its lane, from 0.
+
+        What a vehicle is by chance, such as a human's, is drawn by lane and rank, so it depends on
+        no other lane and not on the horizon.
+        """
+        return ranks(self.lane)
+
+    def between(self, start: float, end: float) -> Arrivals:
+        """The arrivals from `start` [s] to before `end`, with times counted from `start`."""
+        here = slice(*self.time.searchsorted((start, end)))
+        factors = None if self.speed_factor is None else self.speed_factor[here]
+        return Arrivals(self.time[here] - start, self.lane[here], self.manoeuvre[here], factors)
+
     def check(self, n: int) -> None:
         """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
         for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
@@ -93,7 +107,7 @@ class Arrivals:
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers or as text such as "4:3:2:1"; None if they are equal.
+    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)"; None if equal.
 
     Args:
         name: what messages call them.
@@ -108,8 +122,10 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if isinstance(value, str):
         if value == equal:
             return None
+        text = value.strip()
+        listed = text[1:-1] if text[:1] + text[-1:] in ("()", "[]") else text
         try:
-            value = tuple(map(float, value.split(":")))
+            value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
             raise InputError(
                 f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
@@ -118,6 +134,11 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
         raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
     return shares
+
+
+def shares_text(shares: Shares, equal: str) -> str:
+    """Shares as `read_shares` returns them, as text such as "4:3:2:1" or the word `equal`."""
+    return equal if shares is None else ":".join(f"{float(share):g}" for share in shares)
 
 
 @declared(kw_only=True)
@@ -164,127 +185,67 @@ class Demand:
     def draw(self, n: int, duration: float, seed: int) -> Arrivals:
         """Draw the arrivals on n lanes over `duration` seconds.
 
+        Each random number belongs to one lane and to one second or vehicle. So a longer duration
+        only adds arrivals, and a lane's arrivals do not depend on the rates of the others.
+
         Manoeuvres are drawn independently. (The authors drew them without replacement within a
         second, which ends the run when more vehicles come than there are manoeuvres; at 350
         veh/h/lane that affects 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
+        rates = np.array(self.rates(n)) / 3600.0
         rng = stream(seed, "arrivals")
-        times = [self._lane_times(rate / 3600.0, duration, rng) for rate in self.rates(n)]
-        lane = np.repeat(np.arange(n), [len(t) for t in times])
-        time = np.concatenate(times)
-        order = np.lexsort((lane, time))
-        manoeuvre = stream(seed, "manoeuvres").choice(np.arange(1, n), size=len(time), p=turns)
-        return Arrivals(time[order], lane[order], manoeuvre)
-
-    def _lane_times(self, rate: float, duration: float, rng: np.random.Generator) -> Floats:
-        """Arrival times on one lane with `rate` veh/s."""
-        if rate == 0.0:
-            return np.empty(0)
         if self.model == "poisson":
-            counts = rng.poisson(rate, size=math.ceil(duration))
-            seconds = np.repeat(np.arange(len(counts), dtype=float), counts)
-            return seconds[seconds < duration]
-        shift = self.min_headway if self.model == "shifted" else 0.0
-        times: list[Floats] = []
-        last = 0.0
-        while last < duration:
-            headways = shift + rng.exponential(1.0 / rate - shift, size=256)
-            times.append(last + np.cumsum(headways))
-            last = float(times[-1][-1])
-        drawn = np.concatenate(times)
-        return drawn[drawn < duration]
+            time, lane = _counted(rates, duration, rng)
+        else:
+            shift = self.min_headway if self.model == "shifted" else 0.0
+            time, lane = _spaced(rates, shift, duration, rng)
+        rank = ranks(lane)
+        draws = stream(seed, "manoeuvres").random((rank.max(initial=-1) + 1, n))
+        bounds = np.cumsum(turns)
+        manoeuvre = (bounds / bounds[-1]).searchsorted(draws[rank, lane], side="right") + 1
+        return Arrivals(time, lane, manoeuvre)
 
 
-def read_arrivals(path: str | os.PathLike[str], n: int | None = None) -> Arrivals:
-    """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
-
-    A column `speed_factor` may be there too.
-
-    Raises:
-        FileError: unreadable, a missing column, a broken line (named by its number), or a lane
-            or manoeuvre that does not exist with n arms.
-    """
-    instance("arrivals file", path, (str, os.PathLike))
-    if n is not None:
-        integer("number of arms", n, low=3, high=len(ARM_NAMES))
-    factors = []
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header = list(reader.fieldnames or ())
-            wrong = [c for c in COLUMNS if header.count(c) != 1]
-            if wrong:
-                raise FileError(
-                    f"{path}: column {', '.join(wrong)} missing or twice; "
-                    f"needed once each: {', '.join(COLUMNS)}"
-                )
-            rows = []
-            for row in reader:
-                rows.append(_parse_row(path, reader.line_num, row, n))
-                if FACTORS in header:
-                    factors.append(_parse_factor(path, reader.line_num, row[FACTORS]))
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read arrivals from {path}: {reason}") from error
-    time, lane, manoeuvre = zip(*rows, strict=True) if rows else ((), (), ())
-    return Arrivals(
-        np.array(time, float), np.array(lane, int), np.array(manoeuvre, int),
-        np.array(factors, float) if FACTORS in header else None,
-    )  # fmt: skip
+def _counted(rates: Floats, duration: float, rng: np.random.Generator) -> tuple[Floats, Ints]:
+    """Times and lanes of Poisson counts of every second, by inversion; `rates` [veh/s], (n,)."""
+    k = np.arange(MOST_IN_A_SECOND)
+    chances = np.exp(-rates)[:, None] * rates[:, None] ** k / np.cumprod(np.maximum(k, 1))
+    at_most = chances.cumsum(axis=1)  # chance of at most k vehicles in a second, (n, k)
+    times: list[Floats] = []
+    lanes: list[Ints] = []
+    for start in range(0, math.ceil(duration), BLOCK):
+        draws = rng.random((min(BLOCK, math.ceil(duration) - start), len(rates)))
+        second, lane = np.nonzero(draws >= at_most[:, 0])
+        counts = (draws[second, lane, None] >= at_most[lane]).sum(axis=1)
+        times.append(np.repeat(start + second, counts).astype(float))
+        lanes.append(np.repeat(lane, counts))
+    return np.concatenate(times), np.concatenate(lanes)
 
 
-def write_arrivals(arrivals: Arrivals, path: str | os.PathLike[str]) -> None:
-    """Write an arrival table in the form that `read_arrivals` reads; raises `FileError`."""
-    instance("arrivals file", path, (str, os.PathLike))
-    instance("arrivals", arrivals, Arrivals)
-    arrivals.check(len(ARM_NAMES))
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
-            writer.writerows(zip(arrivals.time.tolist(), lanes, arrivals.manoeuvre, strict=True))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot write arrivals to {path}: {reason}") from error
+def _spaced(
+    rates: Floats, shift: float, duration: float, rng: np.random.Generator
+) -> tuple[Floats, Ints]:
+    """Times and lanes with exponential headways beyond `shift` [s]; `rates` [veh/s], (n,)."""
+    with np.errstate(divide="ignore"):
+        mean = 1.0 / rates - shift  # infinite on a lane where nobody comes
+    blocks = [np.zeros((1, len(rates)))]
+    while blocks[-1][-1].min() < duration:
+        headways = shift + mean * rng.standard_exponential((HEADWAYS, len(rates)))
+        blocks.append(blocks[-1][-1] + headways.cumsum(axis=0))
+    times = np.concatenate(blocks[1:])
+    row, lane = np.nonzero(times < duration)
+    return times[row, lane], lane
 
 
-def _parse_row(
-    path: str | os.PathLike[str], line: int, row: dict[str, str], n: int | None
-) -> tuple[float, int, int]:
-    where = f"{path}, line {line}"
-    texts = [row.get(column) for column in COLUMNS]
-    if None in row or None in texts:
-        raise FileError(f"{where}: expected {len(COLUMNS)} values, {', '.join(COLUMNS)}")
-    time_text, lane_text, manoeuvre_text = (str(t).strip() for t in texts)
-    lanes = ARM_NAMES[: n or len(ARM_NAMES)]
-    try:
-        time = number("demand_time_s", float(time_text), low=0, high=MAX_TIME)
-    except ValueError:
-        raise FileError(
-            f"{where}: demand_time_s must be a number 0 … {MAX_TIME:g}, got {show(time_text)}"
-        ) from None
-    if len(lane_text) != 1 or lane_text not in lanes:
-        raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {show(lane_text)}")
-    try:
-        manoeuvre = integer("manoeuvre", int(manoeuvre_text), low=1, high=len(lanes) - 1)
-    except ValueError:
-        raise FileError(
-            f"{where}: manoeuvre must be 1 … {len(lanes) - 1}, got {show(manoeuvre_text)}"
-        ) from None
-    return time, lanes.index(lane_text), manoeuvre
-
-
-def _parse_factor(path: str | os.PathLike[str], line: int, text: str | None) -> float:
-    try:
-        return number(FACTORS, float(text or ""), low=LEAST_FACTOR, high=MOST_FACTOR)
-    except ValueError:
-        raise FileError(
-            f"{path}, line {line}: {FACTORS} must be a number {LEAST_FACTOR:g} … {MOST_FACTOR:g}, "
-            f"got {show(text)}"
-        ) from None
+def ranks(lane: Ints) -> Ints:
+    """Each vehicle's place among those of its lane, from 0, given the lanes in order of demand."""
+    order = np.argsort(lane, kind="stable")
+    ahead = np.searchsorted(lane[order], lane[order])
+    rank = np.empty(len(lane), int)
+    rank[order] = np.arange(len(lane)) - ahead
+    return rank
 
 
 def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, ...]:

@@ -155,6 +155,18 @@ def speed_towards(v: float, v_target: float, distance: float, b: float, dt: floa
     return math.sqrt(disc) - half
 
 
+@njit
+def stop_within(v: float, distance: float, b: float, dt: float) -> float:
+    """Highest acceleration in a ballistic step after which braking at b stops within `distance`.
+
+    It is at least -b if braking from now on stops within `distance` too.
+    Source: SUMO's `MSCFModel::maximumSafeStopSpeedBallistic` with a reaction time of one step.
+    """
+    if v * dt > 2.0 * distance:  # it has to stop within this step
+        return -v * v / (2.0 * max(distance, 1e-9))
+    return (speed_towards(v, 0.0, distance, b, dt) - v) / dt
+
+
 @njit_inline
 def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
     """Position and speed after one step of constant acceleration; a vehicle never reverses.

@@ -1,8 +1,9 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
 Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
-movements), `minisim.vehicle` (vehicle types), `minisim.parameters` and `minisim.errors` (recipes
-and their checks), `minisim.files` (writers), `minisim.streams` (random numbers), and
+movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.names` and
+`minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
+numbers), and
 `minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
 engine, the hosts or the results; `make lint` checks this. `baselines.prediction` alone also takes
 the engine's laws, so that it predicts by the one that drives the vehicles.
@@ -21,10 +22,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from minisim.errors import InputError, instance, number
+from minisim.errors import InputError, instance, number, printable
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
+from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
 from minisim.vehicle import MODELS, VehicleType
 
@@ -83,6 +85,8 @@ class Observed(NamedTuple):
         speed: [m/s].
         length: [m].
         demand_time: when it wanted to enter the road [s].
+        rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
+            rank: its id depends on the arrivals on other lanes.
     """
 
     id: int
@@ -92,6 +96,7 @@ class Observed(NamedTuple):
     speed: float
     length: float
     demand_time: float = 0.0
+    rank: int = 0
 
     @property
     def movement(self) -> Movement:
@@ -269,15 +274,15 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may be one of a summary's own."""
 
 
 @runtime_checkable
 class Kinds(Session, Protocol):
     """A session whose vehicles are of several kinds, by which summaries group them."""
 
-    def kind(self, vehicle: int) -> str:
-        """Kind of a vehicle, such as "human"."""
+    def kind(self, lane: int, rank: int) -> str:
+        """Kind of a vehicle, such as "human", by its lane and its place there."""
 
 
 @dataclass(frozen=True)
@@ -328,10 +333,22 @@ class Controller(Protocol):
 
     @property
     def name(self) -> str:
-        """Short name, as on the command line."""
+        """What rows, figures and messages call it."""
 
     def start(self, site: Site) -> Session:
         """Begin a run. Raises `InputError` for a site that it cannot serve."""
+
+
+def as_controller(what: str, value: object) -> Controller:
+    """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
+    if isinstance(value, Controller) and not isinstance(value, type):
+        printable(f"the name of {what}", value.name)
+        return value
+    lacks = [part for part in ("name", "start") if not hasattr(value, part)]
+    why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
+    named = isinstance(value, str | Mapping)
+    hint = "; make it by scenarios.controllers.controller_named" if named else ""
+    raise InputError(f"{what} is no controller: {why}{hint}")
 
 
 @dataclass(frozen=True)
@@ -341,12 +358,8 @@ class Unregulated:
     For tests of the host and for teaching. It collides as soon as there is cross traffic.
     """
 
+    name = Name("unregulated")
     covers = NOTHING
-
-    @property
-    def name(self) -> str:
-        """As on the command line."""
-        return "unregulated"
 
     def start(self, site: Site) -> Session:  # noqa: ARG002  (Controller's argument)
         """Open every lane, for good."""

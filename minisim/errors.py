@@ -8,9 +8,19 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable
+import os
+import re
+import traceback
+from collections.abc import Callable, Iterable, Mapping, Set
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
+
+#: What users call values of these classes.
+_WORDS: Mapping[type, str] = {
+    bool: "true or false", int: "a whole number", float: "a number", str: "a text",
+    type(None): "none",
+}  # fmt: skip
 
 
 class MinisimError(Exception):
@@ -87,12 +97,10 @@ def number(
         result = float(value)
     except OverflowError:
         raise InputError(f"{name} is too large: {show(value)}") from None
-    inside = low <= result <= high and above < result < below
-    if not math.isfinite(result) or not inside:
-        allowed = _range(low, high, above, below)
-        if result == high == below and "finite" not in allowed:  # infinite, with no upper bound
-            allowed += " and finite"
-        raise InputError(f"{name} must be {allowed}, got {show(value)}")
+    if not math.isfinite(result):
+        raise InputError(f"{name} must be a finite number, got {show(value)}")
+    if not (low <= result <= high and above < result < below):
+        raise InputError(f"{name} must be {_range(low, high, above, below)}, got {show(value)}")
     return result
 
 
@@ -111,10 +119,17 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
-    text = value if isinstance(value, str) else ""
+    raise InputError(
+        f"unknown {name} {show(value)}; allowed: {', '.join(options)}{nearest(value, options)}"
+    )
+
+
+def nearest(value: object, allowed: Iterable[str]) -> str:
+    """The question whether the nearest of `allowed` was meant, upper case or lower; else ""."""
+    options = {option.casefold(): option for option in allowed}
+    text = value.casefold() if isinstance(value, str) else ""
     close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    raise InputError(f"unknown {name} {show(value)}; allowed: {', '.join(options)}{hint}")
+    return f"; did you mean {options[close[0]]!r}?" if close else ""
 
 
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
@@ -124,14 +139,36 @@ def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
     """
     if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        wanted = " or ".join(k.__name__ for k in kinds)
-        article = "an" if wanted[0] in "AEIOaeio" else "a"
-        raise InputError(f"{name} must be {article} {wanted}, got {show(value)}")
+        wanted = " or ".join(map(kind_word, kinds))
+        raise InputError(f"{name} must be {wanted}, got {show(value)}")
 
 
-def items(name: str, value: object, of: str) -> list[Any]:
-    """Return the items of `value`, any sequence but a string, or raise; `of` says what they are."""
-    if not isinstance(value, str | bytes) and isinstance(value, Iterable):
+def kind_word(kind: type) -> str:
+    """What messages call a value of this class, as a user would type it."""
+    article = "an" if kind.__name__[0] in "AEIOaeio" else "a"
+    return _WORDS.get(kind, f"{article} {kind.__name__}")
+
+
+def printable(name: str, value: object, *, empty: bool = False) -> str:
+    """Return `value` if it is a text of one line that can be printed and stored, or raise.
+
+    Control characters and lone surrogates cannot; `empty` says whether "" is allowed.
+    """
+    if not isinstance(value, str):
+        raise InputError(f"{name} must be a text, got {show(value)}")
+    if not value.isprintable() or not (value or empty):
+        wanted = "of one line, without control characters" if value else "that is not empty"
+        raise InputError(f"{name} must be a text {wanted}, got {show(value)}")
+    return value
+
+
+def items(name: str, value: object, of: str, *, ordered: bool = True) -> list[Any]:
+    """Return the items of `value`, or raise; `of` says what they are.
+
+    Texts and mappings are refused, and so are sets if the items are `ordered`.
+    """
+    refused = str | bytes | Mapping | Set if ordered else str | bytes | Mapping
+    if isinstance(value, Iterable) and not isinstance(value, refused):
         try:
             return list(value)
         except TypeError:  # a zero-dimensional array claims to be iterable
@@ -147,12 +184,24 @@ def numbers(name: str, value: object) -> tuple[float, ...]:
 
 
 def show(value: object) -> str:
-    """`repr(value)`, cut to 200 characters."""
+    """`repr(value)` without addresses in memory, cut to 200 characters."""
     try:
-        text = repr(value)
+        text = re.sub(r" at 0x[0-9A-Fa-f]+", "", repr(value))
     except ValueError:  # Python refuses to print integers of thousands of digits
         return f"a {type(value).__name__} too large to print"
     return text if len(text) <= 200 else f"{text[:200]}…"
+
+
+def told(error: BaseException, folder: str | os.PathLike[str] = "/") -> str:
+    """An error of a caller's own code, preceded by the last line in the folder that led to it."""
+    if isinstance(error, SyntaxError):
+        return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
+    lines = [
+        f"{Path(frame.filename).name}, line {frame.lineno}: "
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).is_relative_to(folder)
+    ]
+    return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
 
 
 def _range(low: float, high: float, above: float, below: float) -> str:

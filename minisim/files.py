@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import stat
 import tempfile
 import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -23,11 +24,37 @@ if TYPE_CHECKING:
 #: What a caller may pass as a file.
 AnyPath = str | os.PathLike[str]
 
+#: Most bytes that are read from a file, unless its reader says otherwise.
+LARGEST: Final = 64 * 2**20
+
 #: Suffixes of the formats in which tables are written.
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
 
 #: Decimals in CSV: micrometres and microseconds, and 0.3 instead of 0.30000000000000004.
 CSV_DECIMALS: Final = 6
+
+
+def read_file(what: str, path: AnyPath, most: int = LARGEST) -> bytes:
+    """The content of an ordinary file or a pipe; a device may have no end.
+
+    Raises:
+        FileError: it cannot be read, is something else, or has more than `most` bytes (a pipe more
+            than `LARGEST`). Messages call the content `what`.
+    """
+    instance(f"{what} file", path, (str, os.PathLike))
+    try:
+        known = os.stat(path)
+        pipe = stat.S_ISFIFO(known.st_mode)
+        if not (pipe or stat.S_ISREG(known.st_mode) or stat.S_ISDIR(known.st_mode)):
+            raise ValueError("it is neither an ordinary file nor a pipe")
+        with open(path, "rb") as file:  # which refuses a folder
+            most = LARGEST if pipe else most
+            data = file.read(most + 1 if pipe else -1) if known.st_size <= most else None
+        if data is None or len(data) > most:
+            raise ValueError(f"it has more than {most >> 20} MiB")
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot read {what} from {os.fspath(path)}: {_reason(error)}") from error
+    return data
 
 
 @contextmanager

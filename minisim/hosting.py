@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from minisim.arrivals import Arrivals
@@ -24,6 +26,7 @@ from minisim.control import (
     Site,
     View,
     Wake,
+    as_controller,
 )
 from minisim.engine.collision import Collision
 from minisim.engine.state import NEVER, first_tick, time_of
@@ -31,11 +34,14 @@ from minisim.errors import (
     CollisionError,
     ControllerError,
     InputError,
+    MinisimError,
     choice,
     integer,
     number,
     show,
+    told,
 )
+from minisim.names import name_of
 from minisim.results.run import Run, ScenarioLike
 
 RECORDS = ("junction", "all")
@@ -61,7 +67,7 @@ class Alarm:
 
     def __init__(self, period: float | None, dt: float) -> None:
         self._dt = dt
-        self._every = NEVER if period is None else max(1, first_tick(period, dt))
+        self._every = NEVER if period is None else first_tick(period, dt)
         self._due = NEVER if period is None else 0
         self._asked = NEVER
 
@@ -96,21 +102,29 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
+    #: What the session had counted when the warm-up ended.
+    before: dict[str, float] = field(default_factory=dict)
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
 
         Raises:
-            ControllerError: the session answered with something that cannot be carried out.
+            ControllerError: the session raised an error of its own, which it names with file and
+                line, or answered with something that cannot be carried out.
         """
-        commands = list(self.session.decide(view))
         try:
+            answer = self.session.decide(view)
+            if not isinstance(answer, Iterable):
+                raise InputError(
+                    f"decide() must return commands, such as [Go(3)] or [], got {show(answer)}"
+                )
+            commands = list(answer)
+            if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
+                self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
-        except InputError as error:
-            raise ControllerError(
-                f"controller {self.controller.name!r} at {view.time:.1f} s: {error}"
-            ) from error
+        except Exception as error:
+            raise _blamed(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
 
     def collided(
@@ -118,13 +132,22 @@ class Hosted:
     ) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
         what = "; ".join(map(str, collisions))
-        where = f"scenario {self.scenario.name}, controller {self.controller.name}"
+        where = f"scenario {self.scenario.name}, controller {name_of(self.controller)}"
         return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(collisions), replay)
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
-        session = self.session
-        kinds = map(session.kind, range(len(self.arrivals))) if isinstance(session, Kinds) else ()
+        session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
+        try:
+            counts = dict(session.counts) if isinstance(session, Counting) else {}
+            counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
+            kinds = (
+                tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
+                if isinstance(session, Kinds)
+                else ()
+            )
+        except Exception as error:
+            raise _blamed(self.controller, error, session) from error
         return Run(
             scenario=self.scenario,
             controller=self.controller,
@@ -132,8 +155,9 @@ class Hosted:
             site=self.site,
             plan=self.plan,
             record=self.record,
-            counts=dict(session.counts) if isinstance(session, Counting) else {},
-            kinds=tuple(kinds),
+            record_window=self.record_window,
+            counts=counts,
+            kinds=kinds,
             **measured,
         )
 
@@ -153,7 +177,7 @@ def begin(
     Raises:
         InputError: an argument is not allowed (`reactions` are those to a collision), or the
             controller cannot serve the scenario.
-        ControllerError: the controller returned no session.
+        ControllerError: as `start`.
     """
     if record is not None:
         choice("record", record, RECORDS)
@@ -161,21 +185,62 @@ def begin(
     window = checked_window(record_window)
     if isinstance(scenario, type) or not all(hasattr(scenario, name) for name in NEEDED):
         raise InputError(f"scenario must be a Scenario such as four_way(), got {show(scenario)}")
-    if not isinstance(controller, Controller) or isinstance(controller, type):
-        raise InputError(f"controller must be a Controller such as Dim(), got {show(controller)}")
+    as_controller(show(controller), controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
     arrivals.check(site.intersection.n)
-    session = controller.start(site)
-    plan = getattr(session, "plan", None)
-    if not isinstance(plan, Plan) or not isinstance(session, Session):
-        raise ControllerError(
-            f"controller {controller.name!r}: start() must return a Session with a Plan, "
-            f"got {show(session)}"
-        )
     return Hosted(
-        scenario, controller, int(seed), record, window, on_collision, site, arrivals, session, plan
-    )
+        scenario, controller, int(seed), record, window, on_collision, site, arrivals,
+        *start(controller, site),
+    )  # fmt: skip
+
+
+def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
+    """Start a controller's session, and check that its plan fits the site.
+
+    Raises:
+        InputError: the controller cannot serve the site.
+        ControllerError: it raised another error, returned no session, or has a plan with a period
+            below the step or a distance beyond the approach lanes.
+    """
+    try:
+        session = controller.start(site)
+        plan = getattr(session, "plan", None)
+    except InputError as error:
+        raise InputError(f"{name_of(controller)}: {error}") from error
+    except MinisimError:
+        raise
+    except Exception as error:
+        raise _blamed(controller, error, controller) from error
+    try:
+        if not isinstance(plan, Plan) or not isinstance(session, Session):
+            raise InputError(f"start() must return a Session with a Plan, got {show(session)}")
+        if plan.period is not None:
+            number("period of the plan [s], in steps of the host,", plan.period, low=site.dt)
+        road = site.intersection.approach_length
+        room = road - site.vehicle.length
+        number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
+        marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
+        marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}
+        # The default sight is no wish, so a road may be shorter.
+        marks |= {"sight": plan.sight if plan.sight != Plan.sight else 0.0}
+        for name, distance in marks.items():
+            number(f"{name} [m] of the plan, on these roads,", distance, high=road)
+    except InputError as error:
+        raise _blamed(controller, error, controller) from error
+    return session, plan
+
+
+def _blamed(
+    controller: Controller, error: Exception, code: object, when: str = ""
+) -> ControllerError:
+    """What to raise for an error of a controller's own code: where it arose, and what it was."""
+    if isinstance(error, MinisimError) and not isinstance(error, InputError):
+        raise error
+    module = sys.modules.get(type(code).__module__)
+    folder = Path(getattr(module, "__file__", None) or "/").parent
+    why = error if isinstance(error, InputError) else told(error, folder)
+    return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")
 
 
 def checked_window(window: object) -> tuple[float, float]:

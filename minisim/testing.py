@@ -30,8 +30,18 @@ from minisim.control import (
     Site,
     View,
     Wake,
+    as_controller,
 )
-from minisim.errors import ControllerError, MinisimError, choice, instance, integer, number
+from minisim.errors import (
+    ControllerError,
+    InputError,
+    MinisimError,
+    choice,
+    instance,
+    integer,
+    number,
+    show,
+)
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import declared, part, real, reals, text, word
@@ -69,7 +79,7 @@ class SmallScenario:
     )
     demand_time: float = real("vehicles come until then", "s", default=300.0, above=0, high=1e6)
     drain: float = real("how much longer the run goes on", "s", default=0.0, low=0, high=1e6)
-    warmup: float = real("trips demanded before it do not count", "s", default=0.0, low=0)
+    warmup: float = real("nothing before it is measured", "s", default=0.0, low=0)
     vehicle: VehicleType = part("type of the vehicles", VehicleType, default_factory=VehicleType)
     speed_limit: float = real("of the roads", "m/s", default=14.0, above=0, high=100)
     arm_length: float = real("of a road, from the centre", "m", default=500.0)
@@ -158,12 +168,10 @@ def check_controller(
     """
     instance("arms", arms, Iterable)
     run = _simulate_in(host)
-    if isinstance(controller, type) or not isinstance(controller, Controller):
-        raise ContractError(f"{controller!r} is not a Controller: it needs a name and start(site)")
-    _require(
-        isinstance(controller.name, str) and controller.name != "",
-        controller, f"its name must be a text that is not empty, got {controller.name!r}",
-    )  # fmt: skip
+    try:
+        as_controller(show(controller), controller)
+    except InputError as error:
+        raise ContractError(str(error)) from None
     copy = _check_value(controller)
     before = repr(controller), hash(controller)
     for n in arms:

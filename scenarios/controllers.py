@@ -31,11 +31,11 @@ from baselines import (
     V2ICAsRun,
 )
 from dim import AsRunDim, Dim
-from minisim.control import Controller, Unregulated, cover_of
-from minisim.errors import InputError, choice, show
-from scenarios.loading import load_class
+from minisim.control import Controller, Unregulated, as_controller, cover_of
+from minisim.errors import InputError, nearest, show
+from minisim.spelling import Call, build, call_of, parse_arguments
+from scenarios.loading import controllers_in, has_source, is_maker, load_class
 from scenarios.profiles import AS_RUN, Profile, profile_named
-from scenarios.spelling import Call, build, call_of, parse_arguments
 
 
 class Look(NamedTuple):
@@ -84,11 +84,11 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
         Entry("dim", Dim, (
             Variant("", Look("DIM", "blue", "o", "-"), rival=True),
             Variant("gate=harmonious", Look("DIM, harmonious gate", "sky", "p", "-"), rival=True),
-            Variant("order=lanes", Look("DIM, lanes first", "green", "^", "--")),
-            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "s", "--")),
-            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "D", ":")),
+            Variant("order=lanes", Look("DIM, lanes first", "green", ">", "--")),
+            Variant("priorities=rotating", Look("DIM, rotating priority", "vermillion", "P", "--")),
+            Variant("priorities=waiting", Look("DIM, longest-waiting priority", "green", "*", ":")),
             Variant("order=lanes,priorities=waiting"),
-            Variant("monitor=on", Look("DIM with safety monitor", "purple", "v", "-.")),
+            Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
         Entry("fixed-time", FixedTime, (
             Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
@@ -128,7 +128,14 @@ RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 #: Spellings of the variants that never collide and that serve any number of arms.
 SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":")[0]].make).laws)
 
+#: How a class of a caller's own is written: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
+
+#: The same with a slip: a dot for the colon, no brackets, or one too few.
+_ALMOST = re.compile(r"([\w./-]+)[:.]([A-Z]\w*)(\W.*)?", re.DOTALL)
+
+#: What is allowed besides the known names.
+OWN = "a class of your own, such as mymodule:MyController(k=3)"
 
 
 def controller_named(
@@ -145,36 +152,86 @@ def controller_named(
             allowed, a class that cannot be loaded or made, or one that is not a controller.
     """
     as_run = profile_named(profile).name == AS_RUN.name
-    if isinstance(spec, str):
-        call, text = _read(spec), spec
-    elif isinstance(spec, Mapping):
-        table = call_of(spec)
-        read, text = _read(table.name), table.name
-        call = Call(read.name, read.places, {**read.named, **table.named})
-    else:
-        return check_controller(show(spec), spec)
+    if not isinstance(spec, str | Mapping):
+        return as_controller(show(spec), spec)
+    call = read_spec(spec)
     name = call.name
     if as_run and not call.named and name in CONTROLLERS:
         name = CONTROLLERS[name].as_run or name
-    return check_controller(text, build(name, maker_of(name), call))
+    return as_controller(call.name, build(name, maker_of(name), call))
 
 
-def check_controller(what: str, value: Any) -> Controller:
-    """Return `value` if it is a controller; otherwise raise `InputError` saying what it lacks."""
-    if isinstance(value, Controller) and not isinstance(value, type):
-        return value
-    lacks = [part for part in ("name", "start") if not hasattr(value, part)]
-    why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
-    raise InputError(f"{what} is no controller: {why}")
+def read_spec(spec: str | Mapping[str, Any]) -> Call:
+    """Split a controller's text or table into its name and arguments; raises `InputError`."""
+    if isinstance(spec, Mapping):
+        table = call_of(spec)
+        read = read_spec(table.name)
+        return Call(read.name, read.places, {**read.named, **table.named})
+    head, colon, rest = spec.partition(":")
+    known = head in CONTROLLERS or head in plugins()
+    written = _CLASS.fullmatch(spec)
+    if written is not None and (not known or rest[:1].isupper()):
+        module, kind, arguments = written.groups()
+        return parse_arguments(f"{module}:{kind}", arguments or "")
+    if not known:
+        raise _unknown(spec, head)
+    if not colon:
+        return Call(spec)
+    call = parse_arguments(head, rest)
+    if call.places or not call.named:
+        raise InputError(
+            f"parameters of {head} are written {head}:key=value,key=value, got {show(spec)}"
+        )
+    return call
+
+
+def _unknown(text: str, head: str) -> InputError:
+    """What is wrong with a text that names no controller, and what may be meant."""
+    known = [*CONTROLLERS, *plugins()]
+    name = re.split(r"[^\w-]", text, maxsplit=1)[0]
+    meant = name.casefold()
+    if meant in known and name != text:
+        arguments = _bare(text.removeprefix(name))
+        hints = [f"{meant}:{arguments}" if arguments else meant]
+    elif almost := _ALMOST.fullmatch(text):
+        module, kind, rest = almost.groups()
+        hints = [f"{module}:{kind}({_bare(rest)})" if rest else f"{module}:{kind}"]
+    elif text.rstrip(":") and has_source(text.rstrip(":")):
+        module = text.rstrip(":")
+        hints = [f"{module}:{kind}" for kind in controllers_in(module)]
+    else:
+        return InputError(
+            f"unknown controller {show(head)}; allowed: {', '.join(known)}, or {OWN}"
+            f"{nearest(head, known)}"
+        )
+    question = f"; did you mean {' or '.join(map(repr, hints))}?" if hints else ""
+    return InputError(
+        f"cannot read controller {show(text)}; it is written name, name:key=value,key=value or as "
+        f"{OWN}{question}"
+    )
+
+
+def _bare(arguments: str) -> str:
+    """Arguments without the signs around them."""
+    bare = arguments.lstrip(" :.,(").rstrip(" ,")
+    return bare[:-1] if bare.count(")") > bare.count("(") else bare
 
 
 def maker_of(name: str) -> Any:
     """The class (or plugin's function) for a name or `module:Class`; raises `InputError`."""
     if name in CONTROLLERS:
         return CONTROLLERS[name].make
-    if written := _CLASS.fullmatch(name):
-        return load_class(written[1], written[2])
-    plugin = plugins()[choice("controller", name, [*CONTROLLERS, *plugins()])]
+    if name in plugins():
+        make = _loaded(name, plugins()[name])
+    else:
+        module, _, kind = name.rpartition(":")
+        make = load_class(module, kind)
+    if isinstance(make, type) and not is_maker(make):
+        as_controller(name, make)  # says what it lacks
+    return make
+
+
+def _loaded(name: str, plugin: EntryPoint) -> Any:
     try:
         return plugin.load()
     except (Exception, SystemExit) as error:  # another author's code may raise anything
@@ -186,29 +243,25 @@ def maker_of(name: str) -> Any:
 
 @cache
 def plugins() -> Mapping[str, EntryPoint]:
-    """The controllers that installed packages register, by name; our own names take precedence."""
-    points = entry_points(group="minisim.controllers")
-    return {point.name: point for point in points if point.name not in CONTROLLERS}
+    """The controllers that installed packages register, by name; see `unused_plugins`."""
+    found: dict[str, EntryPoint] = {}
+    for point in entry_points(group="minisim.controllers"):
+        if point.name not in CONTROLLERS:
+            found.setdefault(point.name, point)
+    return found
+
+
+def unused_plugins() -> dict[str, str]:
+    """Registered controllers whose name was taken before -> why they are not used."""
+    return {
+        f"{point.name} of {package_of(point)}": f"not used: "
+        f"{package_of(plugins()[point.name]) if point.name in plugins() else 'minisim'} has a "
+        f"controller of that name"
+        for point in entry_points(group="minisim.controllers")
+        if point.name in CONTROLLERS or plugins()[point.name] != point
+    }
 
 
 def package_of(plugin: EntryPoint) -> str:
     """The package that registers a controller."""
     return plugin.dist.name if plugin.dist is not None else plugin.module
-
-
-def _read(text: str) -> Call:
-    """Split a controller's text into its name and arguments."""
-    head, colon, rest = text.partition(":")
-    written = _CLASS.fullmatch(text)
-    if written is not None and (head not in CONTROLLERS or rest[:1].isupper()):
-        module, kind, arguments = written.groups()
-        return parse_arguments(f"{module}:{kind}", arguments or "")
-    if not colon:
-        return Call(text)
-    choice("controller", head, [*CONTROLLERS, *plugins()])
-    call = parse_arguments(head, rest)
-    if call.places or not call.named:
-        raise InputError(
-            f"parameters of {head} are written {head}:key=value,key=value, got {show(text)}"
-        )
-    return call

@@ -51,6 +51,12 @@ class Options(TypedDict, total=False):
     recorded: Arrivals | None
 
 
+#: The mean inflow a lane unless it is told [veh/h].
+DENSITY = 350.0
+
+#: Keywords that recorded arrivals replace.
+DRAWN = ("density", "split", "turns", "model", "min_headway")
+
 _PARTS = (Intersection, Demand, Scenario)
 
 _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
@@ -71,19 +77,19 @@ def _shown(make: _Maker) -> _Maker:
 
 
 @_shown
-def three_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
+def three_way(density: float | None = None, **options: Unpack[Options]) -> Scenario:
     """The paper's Y junction: arms at 0°, 120° and 240°."""
     return _regular("three-way", 3, density, options)
 
 
 @_shown
-def four_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
+def four_way(density: float | None = None, **options: Unpack[Options]) -> Scenario:
     """The paper's 4-arm junction: a north, b east, c south, d west."""
     return _regular("four-way", 4, density, options)
 
 
 @_shown
-def five_way(density: float = 350.0, **options: Unpack[Options]) -> Scenario:
+def five_way(density: float | None = None, **options: Unpack[Options]) -> Scenario:
     """The paper's 5-arm junction, with the junction radius of the authors' network."""
     return _regular("five-way", 5, density, {"junction_radius": PUBLISHED_RADII[5], **options})
 
@@ -93,7 +99,7 @@ MAKERS: dict[int, Callable[..., Scenario]] = {3: three_way, 4: four_way, 5: five
 
 
 @_shown
-def regular(n: int, density: float = 350.0, **options: Unpack[Options]) -> Scenario:
+def regular(n: int, density: float | None = None, **options: Unpack[Options]) -> Scenario:
     """A junction of n arms at equal angles (3 ≤ n ≤ 12)."""
     count = integer("number of arms", n, low=3, high=12)
     return _regular(f"{count}-way", count, density, options)
@@ -101,7 +107,7 @@ def regular(n: int, density: float = 350.0, **options: Unpack[Options]) -> Scena
 
 @_shown
 def from_bearings(
-    bearings: Sequence[float], density: float = 350.0, **options: Unpack[Options]
+    bearings: Sequence[float], density: float | None = None, **options: Unpack[Options]
 ) -> Scenario:
     """A junction with arms at these bearings [degrees clockwise from north].
 
@@ -109,11 +115,18 @@ def from_bearings(
 
     Raises:
         InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
-            profile, impossible demand, horizon ≤ 0.
+            profile, impossible demand, a demand beside recorded arrivals, horizon ≤ 0.
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
-        choice("keyword of a scenario", key, tuple(Options.__annotations__))
+        choice("keyword of a scenario", key, ("density", *Options.__annotations__))
+    if density is not None:
+        given["density"] = density
+    clash = [key for key in DRAWN if key in given]
+    if given.get("recorded") is not None and clash:
+        raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
+    if "min_headway" in given and given.get("model") != "shifted":
+        raise InputError("min_headway goes with the model 'shifted'")
     given["profile"] = profile_named(given.get("profile", "paper"))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
@@ -121,7 +134,7 @@ def from_bearings(
     )
     return Scenario(
         intersection=Intersection(bearings=numbers("bearings", bearings), **geometry),
-        demand=Demand(density=density, **demand),
+        demand=Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
 
@@ -156,7 +169,7 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     )
 
 
-def _regular(name: str, n: int, density: float, options: Mapping[str, Any]) -> Scenario:
+def _regular(name: str, n: int, density: float | None, options: Mapping[str, Any]) -> Scenario:
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
         published = {"ways": published_ways(n), "junction_radius": PUBLISHED_RADII[n]}

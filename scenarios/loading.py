@@ -1,8 +1,8 @@
-"""A caller's own classes, named `module:Class`, from the working directory or installed.
+"""A caller's own classes and metrics: `module:Name`, from the working directory or installed.
 
 Python may not search the working directory, and a worker process never does. So the directory is
-on the search path while one of its modules is imported, and objects of the module's classes are
-pickled together with their folder.
+on the search path while one of its modules is imported, and objects of the module's classes and
+its metrics are pickled together with their folder.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ from __future__ import annotations
 import copyreg
 import importlib
 import io
+import os
 import pickle
 import sys
-import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
-from minisim.errors import InputError, choice
+from minisim.errors import InputError, choice, told
+from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
 _texts: dict[Path, bytes] = {}
@@ -32,28 +33,108 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    file = _file_of(module)
-    loaded = _imported(module) if file is None else _from_file(*file)
-    kind = getattr(loaded, name, None)
-    if isinstance(kind, type):
-        return kind
-    classes = [
-        key for key, value in vars(loaded).items()
-        if isinstance(value, type) and not key.startswith("_")
+    kind: type = _member(*_place(module), name, "class", _is_class, _controllers)
+    return kind
+
+
+def controllers_in(module: str) -> list[str]:
+    """The names of the controllers that a module defines; raises `InputError` as `load_class`."""
+    return _controllers(_module(*_place(module)))
+
+
+def has_source(module: str) -> bool:
+    """Whether this is the path of a file, or a module in the working directory."""
+    return os.path.isfile(module) or os.path.isfile(_source(Path.cwd(), module))
+
+
+def is_maker(kind: type) -> bool:
+    """Whether a class can make controllers, as far as it tells."""
+    return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
+
+
+def _is_class(value: object) -> bool:
+    return isinstance(value, type)
+
+
+def _controllers(module: ModuleType) -> list[str]:
+    """Those that the module or its parts define, not what it imports from elsewhere."""
+    return [
+        key for key, value in vars(module).items()
+        if isinstance(value, type) and is_maker(value) and not key.startswith("_")
+        and f"{value.__module__}.".startswith(f"{module.__name__}.")
     ]  # fmt: skip
-    if classes:
-        choice(f"class of {module}", name, classes)
-    raise InputError(f"{module} has no class {name!r}, and no other either")
 
 
-def _file_of(module: str) -> tuple[Path, str] | None:
-    """The folder and the module's name within it; None for an installed module."""
+def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
+    """The metrics asked for, ours by name; `module:name` is a caller's `Metric` or function.
+
+    Raises `InputError` as `asked_metrics` and `load_class` do.
+    """
+    asked = asked_metrics(_loaded(it) for it in listed(metrics))
+    return tuple(it.name if it.name in METRICS else it for it in asked)
+
+
+def _loaded(metric: Asked) -> Asked:
+    if not isinstance(metric, str) or ":" not in metric:
+        return metric
+    module, _, name = metric.rpartition(":")
+    return _metric(*_place(module), name)
+
+
+def _metric(folder: str, module: str, name: str) -> Metric:
+    """A metric by its place, in this process or in another one on the same machine."""
+    made = _member(folder, module, name, "metric", _is_metric, _metrics)
+    metric: Metric = made if isinstance(made, Metric) else metric_of(made)
+    object.__setattr__(metric, "place", (folder, module, name))
+    return metric
+
+
+def _is_metric(value: object) -> bool:
+    return isinstance(value, (Metric, FunctionType))
+
+
+def _metrics(module: ModuleType) -> list[str]:
+    return [key for key, it in vars(module).items() if _is_metric(it) and not key.startswith("_")]
+
+
+def _reduced(metric: Metric) -> Any:
+    place = getattr(metric, "place", None)
+    return object.__reduce_ex__(metric, 4) if place is None else (_metric, place)
+
+
+copyreg.pickle(Metric, _reduced)
+
+
+def _member(
+    folder: str,
+    module: str,
+    name: str,
+    what: str,
+    fits: Callable[[object], bool],
+    others: Callable[[ModuleType], list[str]],
+) -> Any:
+    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest of others."""
+    loaded = _module(folder, module)
+    value = getattr(loaded, name, None)
+    if fits(value):
+        return value
+    if names := others(loaded):
+        choice(f"{what} of {module}", name, names)
+    raise InputError(f"{module} has no {what} {name!r}, and no other either")
+
+
+def _module(folder: str, name: str) -> ModuleType:
+    return _from_file(Path(folder), name) if folder else _imported(name)
+
+
+def _place(module: str) -> tuple[str, str]:
+    """The folder of a module or of the path of its file, "" if installed, and its name."""
     if module.endswith(".py"):
         path = Path(module)
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise InputError(f"cannot read {module}: no such file")
-        return path.absolute().parent, path.stem
-    return (Path.cwd(), module) if _source(Path.cwd(), module).is_file() else None
+        return str(path.absolute().parent), path.stem
+    return str(Path.cwd()) if os.path.isfile(_source(Path.cwd(), module)) else "", module
 
 
 def _imported(module: str) -> ModuleType:
@@ -65,7 +146,7 @@ def _imported(module: str) -> ModuleType:
                 f"no module {module!r}: there is no {module.replace('.', '/')}.py in the working "
                 "directory, and none of that name is installed"
             ) from None
-        raise InputError(f"cannot import {module}: {_told(error)}") from error
+        raise InputError(f"cannot import {module}: {told(error)}") from error
 
 
 def _from_file(folder: Path, name: str) -> ModuleType:
@@ -83,7 +164,7 @@ def _from_file(folder: Path, name: str) -> ModuleType:
         try:
             module = importlib.reload(known) if known else importlib.import_module(name)
         except (Exception, SystemExit) as error:
-            raise InputError(f"cannot import {name}: {_told(error, folder)}") from error
+            raise InputError(f"cannot import {name}: {told(error, folder)}") from error
     _check_own(module, file)
     _texts[file] = text
     for kind in vars(module).values():
@@ -119,18 +200,6 @@ def _found_in(folder: Path) -> Iterator[None]:
     finally:
         sys.path[:] = before
         sys.dont_write_bytecode = written
-
-
-def _told(error: BaseException, folder: Path = Path("/")) -> str:
-    """What went wrong, preceded by the last line in the folder's files that led to it."""
-    if isinstance(error, SyntaxError):
-        return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
-    lines = [
-        f"{Path(frame.filename).name}, line {frame.lineno}: "
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(folder)
-    ]
-    return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
 
 
 class _Reduce:

@@ -1,7 +1,7 @@
 """The paper's runs: their set-up, replays of them, and the paper's numbers.
 
 The paper compares DIM with a fixed-time signal (`fts`), an adaptive one (`ats`) and V2I-C
-(`v2ic`). Some of its runs were not what their label says; `RAN` lists them.
+(`v2ic`). Some of its runs were not what their labels say; `RAN` lists them.
 """
 
 from __future__ import annotations
@@ -33,28 +33,29 @@ from scenarios.scenario import Scenario
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Mean inflows a lane of every published series [veh/h].
+#: Mean inflows per lane in every published series [veh/h].
 DENSITIES = (150, 200, 250, 300, 350)
 
 #: Splits of the inflow over the lanes, as in `reference.csv`.
 SPLITS = ("balanced", "4:3:2:1", "4:1:4:1")
 
-#: Mean inflow a lane [veh/h] -> green [s] of the published fixed-time runs: Webster's, as the
-#: paper's table rounds it. 5 and 7 s follow from the trips, where cycles last 28 and 36 s. 61.75 is
-#: in the network file, and 19.25 (the table prints 19.75) in that of the adaptive signal.
+#: Mean inflow per lane [veh/h] -> green [s] in the published fixed-time runs: Webster's, rounded as
+#: in the paper's table. The 5 and 7 s follow from the trips, whose cycles last 28 and 36 s. The
+#: 61.75 s is in the network file, and the 19.25 s (the table prints 19.75) is in that of the
+#: adaptive signal.
 GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.
 PHASES = (2, 1, 0, 3)
 
-#: The paper's names of the controllers, as in `reference.csv` -> ours.
+#: The paper's names for the controllers, as in `reference.csv` -> ours.
 SERIES: Mapping[str, str] = {
     "dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"
 }  # fmt: skip
 
 
 class Cell(NamedTuple):
-    """One published run: one of `SPLITS`, inflow a lane [veh/h], arms, and a key of `SERIES`."""
+    """A published run: one of `SPLITS`, inflow per lane [veh/h], arms, and a key of `SERIES`."""
 
     split: str
     density: int
@@ -66,7 +67,7 @@ class Cell(NamedTuple):
         return f"{prefix}{self.split} {self.density} veh/h, {self.arms} arms"
 
 
-#: Every published run of DIM. On 3 and 5 arms all have equal inflow.
+#: Every published run of DIM. On 3 and 5 arms, all lanes have equal inflow.
 GRID: tuple[Cell, ...] = (
     *(Cell("balanced", density, arms) for arms in PUBLISHED_ARMS for density in DENSITIES),
     *(Cell(split, density, 4) for split in SPLITS[1:] for density in DENSITIES),
@@ -86,9 +87,9 @@ class Ran(NamedTuple):
 
     Attributes:
         shares: split of the inflow over the arms, clockwise from north.
-        controller: its spelling, as of `scenarios.controllers`.
-        green: of a fixed-time signal, at every density [s].
-        profile: the one with its vehicle.
+        controller: its spelling, as in `scenarios.controllers`.
+        green: the green time of a fixed-time signal, the same at every density [s].
+        profile: the profile that has the vehicle of the run.
     """
 
     shares: str | None = None
@@ -98,8 +99,8 @@ class Ran(NamedTuple):
 
 
 #: Controller and split -> what ran, where the label is wrong. The unbalanced runs of the fixed-time
-#: signal had DIM's vehicle: their driver switches its ACC on, and their trips have a speed factor
-#: of 1.00 and the 0.16 s of waiting with which that vehicle starts.
+#: signal had DIM's vehicle: the program that ran them switches that vehicle's ACC on, and their
+#: trips have a speed factor of 1.00 and the 0.16 s of waiting that such a vehicle starts with.
 RAN: dict[tuple[str, str], Ran] = {
     ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
     ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
@@ -131,8 +132,8 @@ def scenario(
 
     Args:
         split, density, arms, controller: see `Cell`.
-        profile: None is that of the published run.
-        as_labelled: what the label says, not what ran (`RAN`).
+        profile: None for that of the published run.
+        as_labelled: whether to build what the label says instead of what ran (`RAN`).
 
     Raises:
         InputError: no such cell, or an unknown profile.
@@ -194,8 +195,8 @@ def controller_of(
     if cell.controller == "fts":
         return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
     if cell.controller == "ats":
-        signal = Actuated if ran.controller == "actuated" else Adaptive
-        return signal(order=PHASES)
+        actuated = ran.controller == "actuated"
+        return Actuated(order=PHASES, presence=False) if actuated else Adaptive(order=PHASES)
     if cell.controller == "dim" and cell.split == RENAMED:
         return AsRunDim(names=RENAMED_ARMS)
     return controller_named(ran.controller or LABELS[cell.controller][0], _profile(cell, ran))
@@ -218,7 +219,7 @@ def _reference() -> pd.DataFrame:
 
 
 def reference() -> pd.DataFrame:
-    """Every number that the paper plots or prints, one a row.
+    """Every number that the paper plots or prints, one per row.
 
     Columns: figure, controller, arms, split, density [veh/h], metric, lane ("all" or a letter),
     value [s], trips, last_arrival_s, source, note, comparable ("yes", or why not).
@@ -227,7 +228,7 @@ def reference() -> pd.DataFrame:
 
 
 def reference_rows(cell: Cell, metric: str, lane: str = "all") -> pd.DataFrame:
-    """The rows of `reference`, none or one, with a metric of a cell."""
+    """The row of `reference` for a metric of a cell, as a table of one row or none."""
     table = _reference()
     asked = {**cell._asdict(), "metric": metric, "lane": lane}
     return table[(table[list(asked)] == list(asked.values())).all(axis="columns")].copy()
@@ -244,6 +245,6 @@ def _cell(split: str, density: int, arms: int, controller: str) -> Cell:
     )
     if cell not in GRID and cell not in BASELINE_GRID:
         raise InputError(
-            f"the paper has no run of {cell}; 3 and 5 arms were balanced only, and DIM's"
+            f"the paper has no run of {cell}; on 3 and 5 arms it has only balanced runs of DIM"
         )
     return cell

@@ -8,10 +8,11 @@ from importlib import resources
 
 import numpy as np
 
-from minisim.arrivals import Arrivals, read_arrivals
+from minisim.arrivals import Arrivals
 from minisim.errors import choice
 from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Way
+from minisim.recorded import read_arrivals
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
 #: when the runs at 4:1:4:1 were made (in `my_network.net.xml` as of then, b+ comes from the south

@@ -8,23 +8,29 @@ The same recipe gives the same numbers, wherever it comes from.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dim import Dim, Mixed
-from minisim.control import Controller
+from minisim.control import Controller, as_controller
 from minisim.errors import InputError, show
+from minisim.hosting import REACTIONS
+from minisim.names import name_of
 from minisim.parameters import checked, declared, part, real, text, whole, word
-from minisim.results.metrics import Metric, named_metrics, recording
+from minisim.results.metrics import Metric, asked_metrics
 from minisim.results.run import Run
-from scenarios.controllers import check_controller
+from scenarios.controllers import controller_named
+from scenarios.loading import metrics_named
 from scenarios.scenario import Scenario
-
-#: What a collision does to a run; "teleport" is for SUMO only.
-ON_COLLISION = ("stop", "record", "teleport")
 
 #: Makes a run of a scenario, a controller and a seed, such as `minisim.simulate`.
 Host = Callable[..., Run]
+
+
+def _controller(title: str, value: Any) -> Any:
+    """Check `Recipe.controller`; what a text means depends on the profile."""
+    named = isinstance(value, str | Mapping)
+    return value if named else as_controller(f"{title} {show(value)}", value)
 
 
 @declared
@@ -37,29 +43,34 @@ class Recipe:
 
     scenario: Scenario = part("what is simulated", Scenario)
     controller: Controller = checked(
-        "decides who goes", lambda _, value: check_controller(show(value), value), "Controller"
-    )
+        "decides who goes; a text or table as for `controller_named` means the same",
+        _controller, "Controller",
+    )  # fmt: skip
     seed: int = whole("of the random streams", low=0, default=0)
     humans: float = real(
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
-    label: str = text("what rows call the controller; its own name where empty", default="")
+    label: str = text(
+        "what rows call the controller; its own name where empty", empty=True, default=""
+    )
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (in SUMO)",
-        ON_COLLISION, default="stop",
+        REACTIONS, default="stop",
     )  # fmt: skip
     metrics: tuple[str | Metric, ...] = checked(
         "columns besides the usual ones (`minisim.results.metrics`)",
-        lambda _, value: named_metrics(value),
-        "names and Metrics", default=(),
+        lambda _, value: metrics_named(value),
+        "names, module:name and Metrics", default=(),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
+        named = controller_named(self.controller, self.scenario.profile)
+        object.__setattr__(self, "controller", named)
         if self.humans and not isinstance(self.controller, Dim):
             raise InputError(
                 f"humans drive among vehicles of DIM (the controller dim), not with "
-                f"{self.controller.name!r}"
+                f"{name_of(self.controller)!r}"
             )
 
     @property
@@ -72,7 +83,7 @@ class Recipe:
     @property
     def name(self) -> str:
         """What rows call the controller."""
-        return self.label or self.driven.name
+        return self.label or name_of(self.driven)
 
     def run(self, host: Host | None = None, **options: Any) -> Run:
         """Simulate it, and record what its metrics need.
@@ -88,8 +99,8 @@ class Recipe:
         """
         from minisim.simulation import simulate
 
-        if options.get("record") is None and (record := recording(self.metrics)):
-            options["record"] = record
+        if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
+            options["record"] = options.get("record") or "junction"
         return (host or simulate)(
             self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
         )

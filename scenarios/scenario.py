@@ -7,6 +7,7 @@ from minisim.control import Site
 from minisim.errors import InputError, number
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
+from minisim.recorded import clock
 from scenarios.profiles import PAPER, Profile
 
 
@@ -22,8 +23,8 @@ class Scenario:
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
     warmup: float = real(
-        "trips demanded before it count in no mean and no number of trips", "s",
-        low=0, default=0.0,
+        "nothing before it is measured: no trip demanded, no close call, no count; only "
+        "collisions always count", "s", low=0, default=0.0,
     )  # fmt: skip
     recorded: Arrivals | None = part(
         "an arrival table to replay instead of drawing one", Arrivals, optional=True, default=None
@@ -37,6 +38,11 @@ class Scenario:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
         if self.recorded is not None:
             self.recorded.check(n)
+            if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
+                raise InputError(
+                    f"nobody comes within the horizon of {self.horizon:g} s: the first recorded "
+                    f"arrival is at {clock(first)}; `start` says where in the table a run begins"
+                )
 
     @property
     def profile_name(self) -> str:
@@ -74,5 +80,5 @@ class Scenario:
     def arrivals(self, seed: int) -> Arrivals:
         """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
-            return self.recorded
+            return self.recorded.between(0.0, self.horizon)
         return self.demand.draw(self.intersection.n, self.horizon, seed)

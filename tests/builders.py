@@ -20,9 +20,11 @@ from dim import Dim, NoisyPerception
 from dim.perception import See
 from minisim.arrivals import Arrivals
 from minisim.control import (
+    Close,
     Command,
     Controller,
     Observed,
+    Open,
     Plan,
     Session,
     Site,
@@ -33,9 +35,11 @@ from minisim.control import (
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
+from minisim.vehicle import VehicleType
 from scenarios import Scenario
+from scenarios.library import four_way
 from scenarios.paper import Cell, reference_rows
-from scenarios.profiles import AS_RUN
+from scenarios.profiles import AS_RUN, FAIR
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import identity_of
 
@@ -51,6 +55,49 @@ def drained(scenario: Scenario, seed: int, horizon: float) -> Scenario:
     """The scenario's own arrivals of one seed, with time until `horizon` to serve them all."""
     arrivals = scenario.arrivals(seed)
     return dataclasses.replace(scenario, recorded=arrivals, horizon=horizon)
+
+
+def queues(vehicle: VehicleType, limit: float = 14.0) -> Scenario:
+    """A scenario in which eight vehicles queue on each of two lanes, and two on each other one."""
+    profile = dataclasses.replace(FAIR, vehicle=vehicle, speed_limit=limit)
+    scenario = four_way(0, profile=profile)
+    road = dataclasses.replace(scenario.intersection, arm_length=100.0 + 8 * vehicle.length)
+    trips = [(0.0, lane, 2) for lane, count in enumerate((8, 8, 2, 2)) for _ in range(count)]
+    return replayed(dataclasses.replace(scenario, intersection=road), *trips, horizon=600.0)
+
+
+class Greens:
+    """A signal, and whenever a green ended, which vehicles that stood in it were left behind."""
+
+    name = "greens"
+
+    def __init__(self, signal: Controller) -> None:
+        self.signal = signal
+        self.left: list[set[int]] = []
+
+    def start(self, site: Site) -> Session:
+        """Begin a run that is watched."""
+        return _Watched(self.signal.start(site), self.left)
+
+
+class _Watched:
+    def __init__(self, session: Session, left: list[set[int]]) -> None:
+        self.plan, self._session, self._left = session.plan, session, left
+        self._green = -1
+        self._stood: set[int] = set()
+
+    def decide(self, view: View) -> list[Command]:
+        commands = list(self._session.decide(view))
+        lane = [v for v in view.vehicles if v.lane == self._green and v.distance >= 0.0]
+        self._stood |= {v.id for v in lane if v.speed <= 0.1}
+        for command in commands:
+            if isinstance(command, Close):
+                self._left.append(self._stood & {v.id for v in lane})
+            if isinstance(command, Open):
+                self._green, self._stood = command.lane, set()
+        if any(isinstance(command, Open) for command in commands):
+            self._stood = {v.id for v in view.vehicles if v.lane == self._green and v.speed <= 0.1}
+        return commands
 
 
 def digest(run: Run) -> str:
@@ -145,8 +192,8 @@ def killing(once: str) -> int:
 
 
 def seen(id: int, lane: int, manoeuvre: int, distance: float, speed: float = 0.0) -> Observed:
-    """One vehicle of 5 m."""
-    return Observed(id, lane, manoeuvre, distance, speed, 5.0)
+    """One vehicle of 5 m, whose rank is its id."""
+    return Observed(id, lane, manoeuvre, distance, speed, 5.0, rank=id)
 
 
 def car(id: int, movement: str, distance: float, speed: float = 0.0) -> Observed:

@@ -1,7 +1,10 @@
 """The actuated signal: a green lasts until there is a gap in the traffic over a detector.
 
 It follows SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
-has one successor; all constants are SUMO's defaults.
+has one successor; all constants are SUMO's defaults. SUMO's only loop has no length, so that a
+standing queue can have a gap there. A second detector mends that, which senses presence from the
+loop to the line: the Signal Timing Manual (FHWA-HOP-08-024, 2008, ch. 4) has one of some 40 ft at
+the stop line, which holds the green until the queue is served.
 """
 
 from __future__ import annotations
@@ -9,9 +12,10 @@ from __future__ import annotations
 import math
 
 from baselines.signals.heads import lane_order
-from baselines.signals.phases import PhaseSession, Verdict, check_greens
+from baselines.signals.phases import PhaseSession, Verdict, check_greens, shortest_detector
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real, switch
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -26,8 +30,9 @@ class Actuated:
     One phase per approach, in a fixed order; none is left out. Each lane has a loop before the
     junction. If the last vehicle left it less than `max_gap` ago, the green goes on for the rest
     of `detector_gap`, in which that vehicle reaches the line. The green is rounded up to a whole
-    second and never exceeds `max_green`. A vehicle that stands on the loop leaves no gap.
-    `min_green` serves the vehicles already past the loop when a green starts, which are not seen.
+    second and never exceeds `max_green`. A vehicle that stands on the loop leaves no gap. Between
+    loop and line, a vehicle prolongs the green too; without `presence`, `min_green` has to serve
+    those already there when a green starts.
 
     A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
     its way.
@@ -46,6 +51,10 @@ class Actuated:
     passing_time: float = real(
         "time of a waiting vehicle over the line", "s", low=0.1, high=60, default=1.9
     )
+    presence: bool = switch(
+        "whether vehicles between loop and line prolong the green; SUMO does not see them",
+        default=True,
+    )
     # The authors' network: `minDur`, `maxDur` and its amber.
     min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
     max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
@@ -58,7 +67,8 @@ class Actuated:
     def detector(self, site: Site) -> float:
         """How far the loops are before the junction entry [m]."""
         waiting = (self.min_green / self.passing_time + 0.5) * PLACE
-        return min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
+        loop = min(self.detector_gap * site.speed_limit, waiting, site.intersection.approach_length)
+        return max(loop, shortest_detector(site)) if self.presence else loop
 
     def start(self, site: Site) -> GapSession:
         """Begin a run; raises `InputError` unless `order` lists every lane once."""
@@ -71,18 +81,23 @@ class GapSession(PhaseSession):
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
         self._detector = signal.detector(site)
-        marks = (self._detector - site.vehicle.length,)
+        past = self._detector - site.vehicle.length  # front bumper of a vehicle off the loop
+        marks = (past, 0.0) if signal.presence else (past,)
+        # Presence counts as if the vehicle had left the loop and driven to the line at the limit.
+        self._ago = min(max(past, 0.0) / site.speed_limit, signal.max_gap - site.dt)
         super().__init__(site, self._detector, signal.min_green, signal.amber, marks, signal.order)
         self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Note vehicles that have left a loop since the last view, at most a step ago."""
+        """Note vehicles between loop and line, and any that left a loop at most a step ago."""
         free = self._detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
             if v.id not in self._passed:
                 self._left[v.lane] = view.time
+            elif self._signal.presence and v.distance >= 0.0:
+                self._left[v.lane] = max(self._left[v.lane], view.time - self._ago)
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:

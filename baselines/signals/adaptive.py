@@ -7,9 +7,16 @@ documentation cites Oertel & Wagner, TRB 2011).
 from __future__ import annotations
 
 from baselines.signals.heads import lane_order
-from baselines.signals.phases import PhaseSession, Verdict, check_greens, on_detector
+from baselines.signals.phases import (
+    PhaseSession,
+    Verdict,
+    check_detector,
+    check_greens,
+    on_detector,
+)
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
@@ -52,7 +59,8 @@ class Adaptive:
         check_greens(self.min_green, self.max_green)
 
     def start(self, site: Site) -> DelaySession:
-        """Begin a run; raises `InputError` unless `order` lists every lane once."""
+        """Begin a run; raises `InputError` for a bad `order` or a detector that is too short."""
+        check_detector(self.detector_range, site)
         return DelaySession(self, site)
 
 

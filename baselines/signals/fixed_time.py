@@ -9,13 +9,17 @@ from numbers import Real
 from typing import Any
 
 from baselines.signals.heads import Colour, Heads, full_order, lane_order, stopping_sight
-from baselines.signals.webster import SignalTiming, timing_of, webster
+from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webster
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
-from minisim.parameters import Name, checked, declared, real, switch
+from minisim.names import Name
+from minisim.parameters import checked, declared, real, refuse_idle, switch
 
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
+
+#: Parameters of Webster's formula that given greens replace.
+_WEBSTERS = ("lost_time", "equal_greens", "max_cycle")
 
 
 def _greens(title: str, value: Any) -> tuple[float, ...] | float:
@@ -29,33 +33,41 @@ class FixedTime:
     """A signal that gives each approach its green in turn, with Webster's green times.
 
     The cycle is the sum of all greens, ambers and all-reds and starts with the first lane's green.
-    With the defaults the ambers are Webster's lost times.
+    Webster's effective greens are longer than those shown by amber and all-red less `lost_time`.
     """
 
     name = Name("fixed-time")
 
     greens: tuple[float, ...] | float | None = checked(
         "green of each lane, or one number for all; none is Webster's, from the expected demand",
-        _greens, "numbers 0.5 … 3600", "s", optional=True, default=None,
+        _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
+        optional=True, default=None,
     )  # fmt: skip
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
     saturation_flow: float = real(
         "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
     )
-    lost_time: float = real(
-        "lost time of each phase, which only Webster's formula uses", "s",
-        low=0, high=60, default=2.0,
+    # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
+    # 2 s of amber that drivers still use.
+    lost_time: float | None = real(
+        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        low=0, high=120, optional=True, default=None,
     )  # fmt: skip
     equal_greens: bool = switch(
         "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
         default=False,
     )
     max_cycle: float = real(
-        "longest cycle, for a demand beyond Webster's formula (Y > 0.95)", "s",
-        above=0, high=3600, default=180.0,
+        "longest cycle, for a demand beyond Webster's formula (Y > 0.95); it must hold the lost "
+        f"times and {MIN_GREEN:g} s of green per lane", "s",
+        low=3 * MIN_GREEN, high=3600, default=180.0,
     )  # fmt: skip
     all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
     order: tuple[int, ...] | None = lane_order()
+
+    def __post_init__(self) -> None:
+        if self.greens is not None:
+            refuse_idle(self, "Webster's greens (greens=none)", *_WEBSTERS)
 
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
@@ -63,23 +75,28 @@ class FixedTime:
         Raises `InputError` if the number of greens is not the number of lanes, `max_cycle` is too
         short, or `order` does not list every lane once.
         """
-        n = site.intersection.n
+        n, change = site.intersection.n, self.amber + self.all_red
+        lost = change if self.lost_time is None else self.lost_time
+        longer = change - lost
         if self.greens is None:
             optimum = webster(
                 site.demand,
                 saturation_flow=self.saturation_flow,
-                lost_time_per_phase=self.lost_time,
+                lost_time_per_phase=lost,
                 equal_greens=self.equal_greens,
+                min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
             )
-            greens, capped = optimum.greens, optimum.capped
+            greens, capped = tuple(green - longer for green in optimum.greens), optimum.capped
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
             capped = False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens).cycle
-        return timing_of(greens, cycle, site.demand, self.saturation_flow, capped=capped)
+        return timing_of(
+            greens, cycle, site.demand, self.saturation_flow, longer=longer, capped=capped
+        )
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""

@@ -25,7 +25,8 @@ from minisim.control import (
     can_stop,
     stopping_distance,
 )
-from minisim.errors import InputError, integer, items
+from minisim.errors import InputError, choice, integer, items
+from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
@@ -103,11 +104,18 @@ def lane_order() -> Any:
     """The field of a signal that says in which order its lanes get their greens."""
 
     def check(title: str, value: Any) -> tuple[int, ...]:
-        return tuple(integer("lane in order", one, low=0) for one in items(title, value, "lanes"))
+        lanes = items(title, value, "lanes such as (c,b,a,d)")
+        letters = list(ARM_NAMES)
+        return tuple(
+            letters.index(choice("lane in order", one, letters))
+            if isinstance(one, str)
+            else integer("lane in order", one, low=0)
+            for one in lanes
+        )
 
     return checked(
-        "lanes in the order of their greens; none is a, b, c…", check, "lanes",
-        optional=True, default=None,
+        "lanes in the order of their greens, by letter or number (a is 0); none is a, b, c…",
+        check, "lanes such as (c,b,a,d)", optional=True, default=None,
     )  # fmt: skip
 
 
@@ -116,7 +124,9 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
     if order is None:
         return tuple(range(n))
     if sorted(order) != list(range(n)):
-        raise InputError(f"order must be the lanes 0 … {n - 1}, each once, got {order}")
+        raise InputError(
+            f"order must be the lanes a … {ARM_NAMES[n - 1]} (0 … {n - 1}), each once, got {order}"
+        )
     return order
 
 
@@ -132,7 +142,7 @@ def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
 
 
 def stopping_sight(site: Site) -> float:
-    """How far a view must reach so that every vehicle beyond it can still stop [m]."""
+    """How far a view must reach on the approach lanes so that what is beyond it can stop [m]."""
     fastest = site.speed_limit * (FASTEST_DRIVER if site.vehicle.speed_deviation else 1.0)
     needed = stopping_distance(fastest, site.vehicle.deceleration)
-    return needed + COMMIT_MARGIN + SIGHT_MARGIN
+    return min(needed + COMMIT_MARGIN + SIGHT_MARGIN, site.intersection.approach_length)

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 
-from baselines.signals.phases import PhaseSession, Verdict, on_detector
+from baselines.signals.phases import PhaseSession, Verdict, check_detector, on_detector
 from minisim.control import Site, View
-from minisim.parameters import Name, declared, real
+from minisim.names import Name
+from minisim.parameters import declared, real
 
 
 @declared
@@ -40,7 +41,8 @@ class LongestQueue:
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
 
     def start(self, site: Site) -> QueueSession:
-        """Begin a run."""
+        """Begin a run; raises `InputError` for a detector that is too short."""
+        check_detector(self.detector_range, site)
         return QueueSession(self, site)
 
 

@@ -13,13 +13,27 @@ from typing import NamedTuple
 
 from baselines.signals.heads import Colour, Heads, full_order, stopping_sight
 from minisim.control import Command, Observed, Plan, Site, View, Wake
-from minisim.errors import InputError
+from minisim.errors import InputError, number
 
 
 def check_greens(shortest: float, longest: float) -> None:
     """Raise `InputError` if the longest green is below the shortest [s]."""
     if longest < shortest:
         raise InputError(f"max_green must be at least min_green, {shortest:g} s, got {longest:g} s")
+
+
+def shortest_detector(site: Site) -> float:
+    """Length before the junction in which a standing queue always has a front bumper [m].
+
+    It holds a vehicle and a half with their gaps: when one has just left, the next is inside.
+    """
+    place = site.vehicle.length + site.vehicle.min_gap
+    return min(1.5 * place, site.intersection.approach_length)
+
+
+def check_detector(length: float, site: Site) -> None:
+    """Raise `InputError` if a queue could stand without a vehicle on such a detector [m]."""
+    number("detector_range [m]", length, low=shortest_detector(site))
 
 
 class Verdict(NamedTuple):
@@ -42,7 +56,9 @@ class PhaseSession:
         self, site: Site, detector_range: float, min_green: float, amber: float,
         marks: tuple[float, ...] = (), order: tuple[int, ...] | None = None,
     ) -> None:  # fmt: skip
-        sight = max(detector_range, stopping_sight(site))
+        road = site.intersection.approach_length
+        sight = min(max(detector_range, stopping_sight(site)), road)
+        marks = tuple(min(mark, road) for mark in marks)
         self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
         self._order = full_order(order, site.intersection.n)
         self._heads = Heads(site)

@@ -1,7 +1,9 @@
 """Cycle and green times of a fixed-time signal, and the delay to expect (Webster 1958).
 
 F. V. Webster, Traffic Signal Settings, Road Research Technical Paper 39, HMSO 1958. Flows are in
-veh/h, as in that book; times in seconds.
+veh/h, as in that book; times in seconds. A phase is its green, amber and all-red. Part of it is
+lost, while the queue starts and the junction clears; in the rest, the effective green, vehicles
+leave at the saturation flow.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ class SignalTiming:
     cycle: float  #: [s]
     greens: tuple[float, ...]  #: of each lane [s]
     flow_ratio: float  #: Webster's Y, the sum over the lanes of inflow over saturation flow
-    #: Degree of saturation x = qC/(sg) of each lane. Above 1 its queue grows while demand lasts.
+    #: Degree of saturation x = qC/(sg) of each lane, with its effective green g. Above 1 its queue
+    #: grows while demand lasts.
     saturation: tuple[float, ...]
     capped: bool = False  #: whether the optimum cycle was cut to a maximum (or does not exist)
 
@@ -40,7 +43,7 @@ def webster(
     min_green: float = MIN_GREEN,
     max_cycle: float = 180.0,
 ) -> SignalTiming:
-    """Webster's timing for one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
+    """Cycle and effective greens, one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
 
     If Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1).
     Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
@@ -57,7 +60,7 @@ def webster(
         number("rate [veh/h]", flow, low=0, high=1e5)
     n = len(flows)
     number("saturation_flow [veh/h]", saturation_flow, low=1, high=1e5)
-    lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=60)
+    lost = n * number("lost_time_per_phase [s]", lost_time_per_phase, low=0, high=120)
     instance("equal_greens", equal_greens, bool)
     number("min_green [s]", min_green, above=0, high=600)
     number("max_cycle [s]", max_cycle, low=lost + n * min_green, high=3600)
@@ -84,16 +87,22 @@ def timing_of(
     rates: Iterable[float],
     saturation_flow: float = 1500.0,
     *,
+    longer: float = 0.0,
     capped: bool = False,
 ) -> SignalTiming:
-    """Describe given greens and cycle [s] under the inflows `rates` [veh/h]."""
+    """Describe given greens and cycle [s] under the inflows `rates` [veh/h].
+
+    Effective greens are `longer` [s] than these; a lane that has none has an infinite saturation.
+    """
     greens, rates = tuple(greens), tuple(rates)
     return SignalTiming(
         cycle=cycle,
         greens=greens,
         flow_ratio=sum(rates) / saturation_flow,
         saturation=tuple(
-            rate * cycle / (saturation_flow * green)
+            rate * cycle / (saturation_flow * (green + longer))
+            if green + longer > 0.0
+            else math.inf
             for rate, green in zip(rates, greens, strict=True)
         ),
         capped=capped,
@@ -105,10 +114,10 @@ def webster_delay(
 ) -> float:
     """Mean delay of a vehicle on one lane in the long run [s].
 
-    d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with cycle C [s], green
-    g [s], λ = g/C, inflow `rate` q [veh/h in, veh/s here], saturation flow s [veh/h] and the degree
-    of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates the delay in a finite
-    run, where the queue has not had time to grow.
+    d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with cycle C [s],
+    effective green g [s], λ = g/C, inflow `rate` q [veh/h in, veh/s here], saturation flow s
+    [veh/h] and the degree of saturation x = qC/(sg); infinite for x ≥ 1. Near x = 1 it overstates
+    the delay in a finite run, where the queue has not had time to grow.
     """
     number("rate [veh/h]", rate, low=0, high=1e5)
     number("cycle [s]", cycle, above=0, high=1e5)

@@ -11,27 +11,22 @@ to stop goes first, and they accept gaps between vehicles that need not stop.
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 from typing import NamedTuple
 
-import numpy as np
-
 from minisim.control import Observed, Site
-from minisim.errors import integer
 from minisim.junction.conflicts import CLEARANCE
-from minisim.junction.movements import Bools
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
 from minisim.parameters import declared, real, reals, word
-from minisim.streams import stream
+from minisim.streams import Draws
 
 #: What others go by to tell a human's way. "motion": only what its place and heading show.
 #: "signals": also a blinking indicator. "silence": also that a vehicle without one goes straight
 #: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
-#: Bounds of a uniform draw whose normal quantile is taken.
-TAIL = 1e-9
+#: What a draw is for.
+_HUMAN, _CARELESS, _GAP = range(3)
 
 
 @declared(kw_only=True)
@@ -86,33 +81,25 @@ class Driver(NamedTuple):
 
 
 class Drivers:
-    """The drivers of one run. They depend only on seed, share and vehicle id.
+    """The drivers of one run, by lane and rank in it. They depend on seed and share only.
 
     A vehicle with a human driver at some share has one at every larger share.
     """
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
         self._share = share
-        self._stream = stream(seed, "humans")
-        deviation = math.sqrt(math.log1p(humans.deviation**2))
-        self._gaps = NormalDist(-deviation * deviation / 2.0, deviation) if deviation else None
-        self._drivers: list[Driver] = []
+        self._draws = Draws(seed, "humans")
+        self._deviation = math.sqrt(math.log1p(humans.deviation**2))
+        self._drivers: dict[tuple[int, int], Driver] = {}
 
-    def __getitem__(self, vehicle: int) -> Driver:
-        while vehicle >= len(self._drivers):
-            self._drivers += map(self._driver, *self._stream.random((256, 3)).T.tolist())
-        return self._drivers[vehicle]
-
-    def _driver(self, human: float, careless: float, gap: float) -> Driver:
-        factor = 1.0
-        if self._gaps is not None:
-            factor = math.exp(self._gaps.inv_cdf(min(max(gap, TAIL), 1.0 - TAIL)))
-        return Driver(human < self._share, careless, factor)
-
-    def human(self, count: int) -> Bools:
-        """Which of the first `count` vehicles have a human driver, shape (count,)."""
-        integer("number of vehicles", count, low=0)
-        return np.array([self[vehicle].human for vehicle in range(count)], dtype=bool)
+    def __getitem__(self, which: tuple[int, int]) -> Driver:
+        if which not in self._drivers:
+            draws, deviation = self._draws, self._deviation
+            human = draws.uniform(_HUMAN, *which) < self._share
+            normal = draws.normal(_GAP, *which) if deviation else 0.0
+            gap = math.exp(deviation * (normal - deviation / 2.0))
+            self._drivers[which] = Driver(human, draws.uniform(_CARELESS, *which), gap)
+        return self._drivers[which]
 
 
 class Readings:
@@ -140,7 +127,7 @@ class Readings:
         movement = self.index(vehicle)
         parts, inside = self._parting[movement], -vehicle.distance
         alike = [q for q in self._rows[vehicle.lane][1:] if inside <= parts[q]]
-        driver = self.drivers[vehicle.id]
+        driver = self.drivers[vehicle.lane, vehicle.rank]
         turn = self.turns[movement]
         if driver.human:
             shown = Turn.THROUGH if driver.careless < self._silent[turn] else turn

@@ -31,7 +31,7 @@ from dim.humans.drivers import TRUSTS, Drivers, Humans, Readings
 from dim.perception import ROUNDING, STANDING, UNKNOWN
 from minisim.control import Command, Go, Observed, Plan, Session, Site, View, Wake
 from minisim.junction.conflicts import clearing_distances
-from minisim.junction.movements import Bools, Movements
+from minisim.junction.movements import Movements
 from minisim.parameters import declared, part, real, word
 
 #: A driver stands at the line when its front is at most this far before it [m].
@@ -64,13 +64,6 @@ class Mixed:
         """Begin a run; raises `InputError` as `Dim.start` does."""
         return MixedSession(self, site) if self.share else self.dim.start(site)
 
-    def human(self, seed: int, count: int) -> Bools:
-        """Which of the first `count` vehicles of the run with this `seed` are human.
-
-        Vehicles are in the order of their demand times, as in a trip table; shape (count,).
-        """
-        return Drivers(self.humans, self.share, seed).human(count)
-
 
 class MixedSession:
     """One run: a session of DIM for some vehicles, and the humans."""
@@ -79,18 +72,18 @@ class MixedSession:
         drivers = self._drivers = Drivers(mixed.humans, mixed.share, site.seed)
         readings = Readings(mixed.humans, site, drivers)
         takes = _caution(mixed, site, readings)
-        self._dim = DimSession(mixed.dim, site, lambda id: not drivers[id].human, takes)
+        self._dim = DimSession(mixed.dim, site, lambda v: not drivers[v.lane, v.rank].human, takes)
         self._humans = _Humans(mixed, site, readings)
         plan = self._dim.plan
         self.plan: Plan = replace(
             plan,
             marks=tuple(dict.fromkeys((*plan.marks, 0.0))),  # at the entry another becomes first
-            sight=max(plan.sight, self._humans.sight),
+            sight=min(max(plan.sight, self._humans.sight), site.intersection.approach_length),
         )
 
-    def kind(self, vehicle: int) -> str:
+    def kind(self, lane: int, rank: int) -> str:
         """ "human" or "automated"."""
-        return "human" if self._drivers[vehicle].human else "automated"
+        return "human" if self._drivers[lane, rank].human else "automated"
 
     @property
     def counts(self) -> Mapping[str, float]:
@@ -116,7 +109,7 @@ def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, Vi
             ways = {
                 v.id: readings.possible(v, mixed.trust)
                 for v in view.vehicles
-                if v.distance <= start and drivers[v.id].human
+                if v.distance <= start and drivers[v.lane, v.rank].human
             }
             taken = tuple(_taken(seen, ways, drivers, start, movements))
             latest[:] = [seen, View(seen.time, taken)]
@@ -142,7 +135,7 @@ def _taken(
         first = vehicle.distance >= 0.0 and vehicle.lane != lane
         if first:
             lane = vehicle.lane
-        if vehicle.distance <= start and drivers[vehicle.id].human:
+        if vehicle.distance <= start and drivers[vehicle.lane, vehicle.rank].human:
             possible = ways.get(vehicle.id, ())
             manoeuvre = movements[possible[0]].manoeuvre if len(possible) == 1 else UNKNOWN
             vehicle = vehicle._replace(manoeuvre=manoeuvre)
@@ -176,8 +169,14 @@ class _Humans:
         for vehicle in view.vehicles:  # front to back
             if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
                 heads.setdefault(vehicle.lane, vehicle)
-        here = [v for v in heads.values() if drivers[v.id].human and v.distance <= self._yellow]
-        rolling = [v for v in heads.values() if v.speed > STANDING and not drivers[v.id].human]
+        here = [
+            v
+            for v in heads.values()
+            if drivers[v.lane, v.rank].human and v.distance <= self._yellow
+        ]
+        rolling = [
+            v for v in heads.values() if v.speed > STANDING and not drivers[v.lane, v.rank].human
+        ]
         before = self._standing
         self._standing = {
             v.id: before.get(v.id, now)
@@ -215,7 +214,10 @@ class _Humans:
     ) -> bool:
         """Whether no vehicle is in the way of a driver at the line, or comes too soon."""
         own = self._readings.index(vehicle)
-        gap = self._drivers[vehicle.id].gap * self._humans.critical_gaps[self._readings.turns[own]]
+        gap = (
+            self._drivers[vehicle.lane, vehicle.rank].gap
+            * self._humans.critical_gaps[self._readings.turns[own]]
+        )
         comes = [v for v in rolling if v.distance <= max(self._yellow, gap * v.speed)]
         clearing = self._clearing[own]
         trust = self._humans.trust

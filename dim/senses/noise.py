@@ -39,7 +39,10 @@ _POSITION, _SPEED = 8, 9
 
 @declared
 class NoisyPerception:
-    """How vehicles misperceive each other; by default they do not."""
+    """How vehicles misperceive each other; by default they do not.
+
+    Parameters of errors that never happen are allowed, so that a series may begin without errors.
+    """
 
     intent_error: float = real(
         "probability that a shown intent is misread", low=0, high=1, default=0.0
@@ -126,7 +129,8 @@ class _Senses:
         if recipe.occlusion or recipe.sensor_range is not None:
             vehicles = self._visible(seen, vehicles, ego)
         own = ego.id
-        sensed = tuple(ego if v.id == own else self._sense(v, own, moment) for v in vehicles)
+        observer = _ALL if recipe.shared else self._key(ego.lane, ego.rank)
+        sensed = tuple(ego if v.id == own else self._sense(v, observer, moment) for v in vehicles)
         if recipe.delay or recipe.position_noise:
             sensed = in_order(sensed, ego)
         return View(view.time, sensed)
@@ -161,19 +165,23 @@ class _Senses:
             if not (self._recipe.occlusion and self._bodies.hidden(eye, body, others)):
                 yield vehicle
 
-    def _sense(self, vehicle: Observed, ego: int, moment: int) -> Observed:
-        """One vehicle as the ego perceives it."""
+    def _key(self, lane: int, rank: int) -> int:
+        """A number for each vehicle, which depends on no other lane."""
+        return rank * len(self._lanes) + lane
+
+    def _sense(self, vehicle: Observed, observer: int, moment: int) -> Observed:
+        """One vehicle as an observer perceives it."""
         recipe, draws = self._recipe, self._draws
-        observer = _ALL if recipe.shared else ego
-        id, lane, manoeuvre, distance, speed, length, demand_time = vehicle
+        id, lane, manoeuvre, distance, speed, length, demand_time, rank = vehicle
+        key = self._key(lane, rank)
         if recipe.misreads and manoeuvre != UNKNOWN:
             when = _ALL if recipe.persistent else moment
-            manoeuvre = self._intent(lane, manoeuvre, id, observer, when)
+            manoeuvre = self._intent(lane, manoeuvre, key, observer, when)
         if recipe.position_noise:
-            distance += recipe.position_noise * draws.normal(_POSITION, id, observer, moment)
+            distance += recipe.position_noise * draws.normal(_POSITION, key, observer, moment)
         if recipe.speed_noise:
-            speed += recipe.speed_noise * draws.normal(_SPEED, id, observer, moment)
-        return Observed(id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time)
+            speed += recipe.speed_noise * draws.normal(_SPEED, key, observer, moment)
+        return Observed(id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time, rank)
 
     def _read(self, lane: int, manoeuvre: int, vehicle: int, observer: int, when: int) -> int:
         """What a manoeuvre is taken for, or `UNKNOWN`."""

@@ -19,12 +19,20 @@ from matplotlib.text import Text
 from PIL import Image
 
 from figures import style
-from figures.film.encode import animation_format, palette_of, write_gif, write_html, write_mp4
+from figures.film.encode import (
+    GIF_FPS,
+    animation_format,
+    palette_of,
+    write_gif,
+    write_html,
+    write_mp4,
+)
 from figures.film.frames import Frames
 from figures.junction import drawing
-from minisim.errors import number
+from minisim.errors import InputError, number
 from minisim.files import replacing
 from minisim.junction.paths import Floats
+from minisim.names import name_of
 from minisim.results.run import Run
 
 #: Picture size in inches, and its resolution: 720 × 880 pixels. Video needs even numbers.
@@ -32,7 +40,7 @@ WIDTH, HEIGHT, DPI = 7.2, 8.8, 100
 #: Inches of legend below the junction.
 FOOT = 0.8
 #: What the zones mean, for the legend.
-MEANINGS = {"red": "red: slow down", "yellow": "yellow: decide", "green": "green: buffer"}
+MEANINGS = {"red": ": slow", "yellow": ": decide", "green": ": buffer"}
 
 
 def write_animation(
@@ -42,15 +50,24 @@ def write_animation(
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
     The run must have been recorded with `record="all"` over the time shown. There are `fps` frames
-    per second, at most one per step; `progress` is called with the frames done and the total.
+    per second, at most one per step, and 50 in a GIF; `progress` is called with the frames done and
+    the total.
 
     Raises:
-        InputError: an unknown suffix, nothing recorded, or a number out of range.
+        InputError: an unknown suffix, a time that was not recorded, or a number out of range.
         MissingExtraError: .mp4 without ffmpeg.
         FileError: the file cannot be written.
     """
     kind = animation_format(path)
+    fps = min(fps, GIF_FPS) if kind == "gif" else fps
     times = frame_times(start, seconds, fps, run.site.dt)
+    first, last = run.record_window[0], min(run.record_window[1], run.columns.end)
+    half = run.site.dt / 2.0
+    if run.record and not (first - half <= times[0] and times[-1] <= last + half):
+        raise InputError(
+            f"the animation shows {times[0]:g} … {times[-1]:g} s, but the run was recorded from "
+            f"{first:g} to {last:g} s"
+        )
     picture = Picture(run, start)
 
     def frames() -> Iterator[Image.Image]:
@@ -82,7 +99,7 @@ class Picture:
 
     def __init__(self, run: Run, start: float = 0.0) -> None:
         self.run = run
-        self.title = f"{run.scenario.name} · {run.controller.name}"
+        self.title = f"{run.scenario.name} · {name_of(run.controller)}"
         self._film = Frames(run, start)
         self._figure = style.new_figure(WIDTH, HEIGHT, dpi=DPI)
         plan, intersection = run.plan, run.site.intersection
@@ -139,10 +156,12 @@ class Picture:
 
     def _write_still(self) -> None:
         scenario = self.run.scenario
+        demand = f"{scenario.density:.0f} veh/h/lane"
+        if getattr(scenario, "recorded", None) is not None:
+            demand = f"{len(self.run.columns.lane)} recorded arrivals"
         self._text(0.03, 8.5, 16, "left", bold=True).set_text(self.title)
         self._text(0.03, 8.18, 12, "left", colour=style.MUTED).set_text(
-            f"{scenario.density:.0f} veh/h/lane · profile {scenario.profile_name} · "
-            f"seed {self.run.seed}"
+            f"{demand} · profile {scenario.profile_name} · seed {self.run.seed}"
         )
         vehicles = [
             (style.RIGHT_OF_WAY, "has the right of way"),
@@ -151,8 +170,10 @@ class Picture:
         ]
         if self._film.human.any():
             vehicles.append((style.INK, "outline: human"))
-        names = dict.fromkeys(marking.name for marking in self.run.plan.markings)
-        zones = [(style.ZONES.get(name, style.SKY), MEANINGS.get(name, name)) for name in names]
+        zones = [
+            (style.ZONES.get(name, style.SKY), words + MEANINGS.get(name, ""))
+            for name, words in drawing.zone_words(self.run.plan).items()
+        ]
         middle = FOOT / 2.0
         self._key(middle + (0.17 if zones else 0.0), vehicles, pointed=True)
         self._key(middle - 0.17, zones, pointed=False)
@@ -204,7 +225,8 @@ class Picture:
         """Write the clock and counters into the ground only if they have changed: text is slow."""
         film = self._film
         clock = f"{int(time) // 60:02d}:{int(time) % 60:02d}"
-        counts = f"waiting {film.waiting(film.at(time))}   served {film.served(time)}"
+        seen = film.rows(film.at(time), self._reach)
+        counts = f"waiting {film.waiting(seen)}   served {film.served(time)}"
         if self.run.collisions:
             counts = f"collisions {film.collided(time)}   {counts}"
         if clock + counts == self._written:

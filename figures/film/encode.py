@@ -30,6 +30,9 @@ FORMATS = ("gif", "mp4", "html")
 
 Indices = npt.NDArray[np.uint8]
 
+#: Frames per second of a GIF at most: viewers show a delay below 0.02 s as 0.1 s.
+GIF_FPS = 50.0
+
 #: Colours of an indexed frame; one more index is transparent and means "as before".
 COLOURS = 127
 
@@ -57,19 +60,20 @@ def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -
     """Write a GIF that loops forever.
 
     Each frame holds only the rectangle that changed; pixels in it that did not are transparent
-    (GIF89a, §18 screen, §20 image, §23 control; the loop is Netscape's extension).
+    (GIF89a, §18 screen, §20 image, §23 control; the loop is Netscape's extension). Delays are whole
+    hundredths of a second, chosen so that no frame is late by more than half of one.
     """
     size_code = COLOURS.bit_length() - 1
-    milliseconds = max(20, round(100.0 / fps) * 10)
     shown: Indices | None = None
     with path.open("wb") as file:
         file.write(b"GIF89a" + struct.pack("<HHBBB", *palette.size, 0x80 | size_code, 0, 0))
         file.write(_colours(palette) + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
-        for frame in frames:
+        for k, frame in enumerate(frames):
+            delay = round(100.0 * (k + 1) / fps) - round(100.0 * k / fps)
             indices = np.asarray(_indexed(frame, palette))
             corner, part = _changed(indices, shown)
             blocks = GifImagePlugin.getdata(
-                fromarray(part, "P"), corner, duration=milliseconds, transparency=COLOURS,
+                fromarray(part, "P"), corner, duration=10 * delay, transparency=COLOURS,
                 disposal=1,
             )  # fmt: skip
             file.write(b"".join(blocks))

@@ -50,7 +50,8 @@ class Frames:
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
         self.ticks, first = np.unique(ticks, return_index=True)
         self.bounds = np.append(first, len(ticks))
-        gone = frame[self.s > clear].groupby("vehicle")["time_s"].min()
+        crashed = np.isin(frame["vehicle"], [v for c in run.collisions for v in c.vehicles])
+        gone = frame[(self.s > clear) & ~crashed].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
@@ -71,12 +72,12 @@ class Frames:
         inside = np.maximum(np.abs(self.x[now]), np.abs(self.y[now])) <= reach
         return np.asarray(rows[inside])
 
-    def waiting(self, now: slice) -> int:
-        """How many vehicles are standing."""
-        return int(self.still[now].sum())
+    def waiting(self, rows: Rows) -> int:
+        """How many of these vehicles are standing."""
+        return int(self.still[rows].sum())
 
     def served(self, time: float) -> int:
-        """How many vehicles have cleared the junction since the film began."""
+        """How many vehicles have cleared the junction since the film began, without a collision."""
         return int(np.searchsorted(self.cleared, time, side="right"))
 
     def collided(self, time: float) -> int:

@@ -14,7 +14,6 @@ from figures import style
 from figures.junction import drawing
 from minisim.control import Plan, Site
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Floats
 
 #: Metres of approach lane shown before the junction.
@@ -44,11 +43,11 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
 
 def _zone_legend(figure: Figure, plan: Plan) -> None:
     """The zones on the lanes, from the outside in."""
-    names = list(dict.fromkeys(m.name for m in plan.markings if m.end < APPROACH))
+    zones = drawing.zone_words(plan)
     figure.legend(
-        [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in names],
-        [f"{name} zone" for name in names], loc="center right", bbox_to_anchor=(0.98, 0.08),
-        ncols=max(len(names), 1), frameon=False, fontsize=9, labelcolor=style.INK,
+        [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in zones],
+        [*zones.values()], loc="center right", bbox_to_anchor=(0.98, 0.08),
+        ncols=max(len(zones), 1), frameon=False, fontsize=9, labelcolor=style.INK,
         borderaxespad=0.0, handlelength=1.4, columnspacing=1.4,
     )  # fmt: skip
 
@@ -90,9 +89,8 @@ def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection
             linewidth=7.0 if strong else 2.2, solid_capstyle="round", zorder=2 if strong else 1,
         )  # fmt: skip
     for movement in explanation.participants:
-        label = rf"$V^{{{ARM_NAMES[movement.origin]}}}_{{{movement.manoeuvre}}}$"
         goes = movement.origin in chosen
-        drawing.draw_node(axes, places[movement.origin], 0.2, label, 15, 0.005, goes=goes)
+        drawing.draw_node(axes, places[movement.origin], 0.2, str(movement), 14, 0.01, goes=goes)
     pairs = math.comb(len(explanation.participants), 2)
     tied = len(explanation.tied)
     cliques = "1 clique" if tied == 1 else f"{tied} cliques"

@@ -6,20 +6,22 @@ Coordinates are in metres, x east and y north, as in `minisim.junction.geometry`
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
-from matplotlib.path import Path as Outline
 
 from figures import style
-from minisim.control import Plan
+from minisim.control import Marking, Plan
 from minisim.junction.geometry import Arm, Intersection
 from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
 
+#: Length of an arrowhead [pt].
+HEAD = 8.0
 #: Number of points on the kerb between two arms.
 KERB_POINTS = 24
 
@@ -78,6 +80,17 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
         )  # fmt: skip
 
 
+def zone_words(plan: Plan) -> dict[str, str]:
+    """Zone -> its name and place for a legend, so that it is known without its colour."""
+    zones: dict[str, list[Marking]] = {}
+    for marking in plan.markings:
+        zones.setdefault(marking.name, []).append(marking)
+    return {
+        name: f"{name} {max(m.start for m in parts):g}–{min(m.end for m in parts):g} m"
+        for name, parts in zones.items()
+    }
+
+
 def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
     """Where vehicles without the right of way stop: one line per lane, shape (n, 2, 2) [m]."""
     at = plan.hold_distance
@@ -125,13 +138,17 @@ def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour:
 def draw_way(
     axes: Axes, path: Path, start: float, end: float, colour: str, *, strong: bool
 ) -> None:
-    """Draw a path from `start` to `end` as an arrow."""
-    points = path.position(np.linspace(start, end, 48))
+    """Draw a path from `start` to `end` as an arrow; a weak one is dashed, and above others."""
+    width = axes.bbox.width * 72.0 / axes.figure.dpi / np.ptp(axes.get_xlim())  # points per metre
+    neck = end - HEAD / width
+    look: dict[str, Any] = {"color": colour, "zorder": 5 if strong else 5.5}
+    axes.plot(
+        *path.position(np.linspace(start, neck, 48)).T, linewidth=2.6 if strong else 1.5,
+        linestyle="-" if strong else (0, (4, 2.5)), dash_capstyle="butt", **look,
+    )  # fmt: skip
     axes.add_patch(FancyArrowPatch(
-        path=Outline(points), arrowstyle="-|>,head_length=7,head_width=4", color=colour,
-        linewidth=2.6 if strong else 1.5, linestyle="-" if strong else (0, (4, 2.5)),
-        alpha=1.0 if strong else 0.8, shrinkA=0, shrinkB=0, capstyle="butt",
-        joinstyle="miter", zorder=5 if strong else 4,
+        *path.position(np.array([neck, end])), shrinkA=0, shrinkB=0, linewidth=0,
+        arrowstyle=f"-|>,head_length={HEAD},head_width={0.55 * HEAD}", **look,
     ))  # fmt: skip
 
 

@@ -49,12 +49,11 @@ def maps() -> Figure:
         _draw_map(axes, make())
         words = "Y junction" if arms == 3 else "junction"
         style.write(figure, 0.012 + 0.331 * k, 0.945, f"{arms}-way {words}", 12, bold=True)
-    x = 0.012
-    for name, colour in style.ZONES.items():
-        figure.add_artist(Rectangle((x, 0.04), 0.018, 0.035, facecolor=colour))
-        length = getattr(Dim().zones, name)
-        style.write(figure, x + 0.024, 0.057, f"{name} zone, {length:g} m", 9)
-        x += 0.13
+    x, plan = 0.012, Dim().start(four_way().site()).plan
+    for name, words in drawing.zone_words(plan).items():
+        figure.add_artist(Rectangle((x, 0.04), 0.018, 0.035, facecolor=style.ZONES[name]))
+        style.write(figure, x + 0.024, 0.057, words, 9)
+        x += 0.11
     width = four_way().intersection.lane_width
     words = f"blue: the ways out of lane a.  Lanes {width:g} m wide; roads 500 m long; bar 20 m."
     style.write(figure, x + 0.01, 0.057, words, 9)

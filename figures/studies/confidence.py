@@ -1,4 +1,4 @@
-"""Effects of misread intents, if vehicles believe only readings above some confidence."""
+"""Effects of misread intents when vehicles believe only readings above some confidence."""
 
 from __future__ import annotations
 
@@ -14,32 +14,33 @@ from scenarios.studies.shared.study import Results, with_total_delay
 
 
 def confidence_figure(results: Results) -> Figure:
-    """Collisions, false grants and delay over the threshold of confidence."""
+    """Collisions, false grants and delay, plotted against the confidence threshold."""
     rows = with_total_delay(results.good)
     figure, panels = plots.panels(
-        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.735,
+        11.5, 4.6, len(outcomes.OUTCOMES), sharey=False, left=0.062, right=0.988, top=0.79,
         bottom=0.155, wspace=0.22,
     )  # fmt: skip
     for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
-        for kind, look in outcomes.KIND_LOOKS.items():
+        for (kind, look), aside in zip(outcomes.KIND_LOOKS.items(), (-0.08, 0.08), strict=True):
             cells = [
                 outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
             ]
-            outcomes.draw(axes, range(len(THRESHOLDS)), cells, outcome, look)
+            places = [k + aside for k in range(len(THRESHOLDS))]
+            outcomes.draw(axes, places, cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
-        outcomes.dress(axes, outcome, outcome, "least confidence that is believed", ticks)
-    plots.heading(figure, f"Believing only what is sure: lanes first, {CLASSIFIER:.0%} of intents "
-                          "misread by all alike, lasting")  # fmt: skip
+        outcomes.dress(axes, outcome, outcome, "lowest confidence that is believed", ticks)
+    plots.heading(figure, f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of "
+                          "intents persistently misread by all alike")  # fmt: skip
     plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.93, 3)
     plots.footnote(figure, f"{outcomes.NOTE}  {missing_note(results)}")
     return figure
 
 
 SECTION = Section(
-    "Believing only sure readings",
+    "Believing only confident readings",
     (
         Item(
-            "confidence", "collisions, false grants and delay over the confidence that is believed",
+            "confidence", "collisions, false grants and delay by the lowest confidence believed",
             confidence_figure, ("confidence",),
         ),
     ),

@@ -68,8 +68,11 @@ def crossing_figure(results: Results) -> Figure:
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
     plots.heading(figure, "Demands at which DIM does worse than …")
     plots.looks_legend(figure, map(style.look, GATES), 0.925)
-    words = "pale bar: demands at which DIM does worse     marker and line: where that begins, with"
-    style.write(figure, plots.LEFT, 0.845, f"{words} its 95 % interval", 8.5)
+    words = (
+        "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
+        "its 95 % interval     hollow: at none or all of these demands in the mean"
+    )
+    style.write(figure, plots.LEFT, 0.845, words, 8.5)
     plots.footnote(figure, missing_note(results))
     return figure
 
@@ -136,14 +139,17 @@ def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
         axes.barh([y], end - start, left=start, height=0.24, color=look.colour, alpha=0.35,
                   zorder=2)  # fmt: skip
     elif not math.isfinite(crossing.low):
-        axes.text(high, y, "nowhere", ha="right", va="center", fontsize=8.5, color=style.MUTED)
-    if math.isfinite(crossing.low) or math.isfinite(crossing.high):
+        axes.text(high, y, "nowhere", ha="right", va="center", fontsize=8.5, color=look.colour)
+    bounded = math.isfinite(crossing.low) or math.isfinite(crossing.high)
+    if bounded:
         axes.plot(
             [shown(crossing.low), shown(crossing.high)], [y, y], color=look.colour, marker="|",
             markersize=8.0, markeredgewidth=1.6, linewidth=1.6, zorder=3,
         )  # fmt: skip
-    if math.isfinite(crossing.density):
-        axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4)
+    known = math.isfinite(crossing.density)
+    if known or bounded:
+        axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4,
+                  markerfacecolor=look.colour if known else style.PAPER)  # fmt: skip
 
 
 SECTION = Section(

@@ -27,15 +27,15 @@ def fairness_figure(results: Results) -> Figure:
     _draw_lanes(by_lane, rows[rows["density"] == compared])
     style.plot_axes(by_lane, f"By lane, {compared:g} veh/h/lane", "lane", "mean waiting [s]")
     for axes, metric, title, label in (
-        (worst, "worst_lane_s", "Worst lane", f"its mean waiting [s], {plots.scale_words(0.1)}"),
+        (worst, "worst_lane_s", "Worst lane", f"mean waiting [s], {plots.scale_words(0.1)}"),
         (spread, "gini", "Inequality between lanes", "Gini coefficient of the lanes' means"),
     ):
         plots.draw_means(axes, rows, metric, PRIORITIES)
         style.plot_axes(axes, title, plots.DENSITY_LABEL, label)
         plots.paper_densities(axes)
     plots.log_time(worst, 0.0, 500.0, linear=0.1)
-    spread.set_ylim(0.0, 0.8)
-    by_lane.set_ylim(bottom=0.0)
+    for axes, top in ((spread, 1.0), (by_lane, by_lane.get_ylim()[1])):
+        axes.set_ylim(-0.025 * top, top)  # markers at 0 are whole
     plots.heading(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
     plots.looks_legend(figure, map(style.look, PRIORITIES), 0.925)
     plots.marks_legend(figure, 0.865)

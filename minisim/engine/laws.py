@@ -19,6 +19,7 @@ from minisim.carfollowing import (
     safe_speed,
     speed_towards,
     stepwise_towards,
+    stop_within,
 )
 from minisim.engine.state import STOP_MARGIN, Law
 from minisim.jit import njit, njit_inline
@@ -40,6 +41,41 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
         return 1.0 / v_safe if v_safe > 0.0 else math.inf
     return gap_ratio(v, gap, v_leader, law.a, law.b, law.headway, law.min_gap)
+
+
+@njit_inline
+def room_behind(gap: float, v_leader: float, law: Law) -> float:
+    """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
+
+    The leader comes to rest no sooner than its brakes can stop it.
+    """
+    if law.semi_implicit:
+        return 2.0 * law.b_max * (gap - STILL + braking_distance(v_leader, law.b_max, law.dt))
+    return 2.0 * law.b_max * (gap - STILL) + v_leader * v_leader
+
+
+@njit_inline
+def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
+    """Whether a stop after a step to `v_new` might take more than this room; quick and cautious."""
+    top = v_new if v_new > v else v
+    return top * (top + 2.0 * law.b_max * law.dt) > room
+
+
+@njit
+def keep_room(v: float, room: float, law: Law) -> float:
+    """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
+
+    With it no vehicle runs into its leader, under any law and at any step: who could stop behind it
+    before the step still can after it, at worst by braking as hard as the leader. No law promises
+    that by itself: the IDM brakes late where the step is long or `acceleration` large, and Krauß's
+    law takes it that nobody brakes harder than b. In ordinary traffic the bound is idle.
+    Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
+    for both vehicles and a reaction time of one step.
+    """
+    distance = room / (2.0 * law.b_max)
+    if law.semi_implicit:
+        return (stepwise_towards(0.0, distance, law.b_max, law.dt) - v) / law.dt
+    return stop_within(v, distance, law.b_max, law.dt)
 
 
 @njit_inline

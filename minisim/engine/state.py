@@ -13,12 +13,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from minisim.arrivals import Arrivals
+from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
-from minisim.errors import InputError
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path
-from minisim.streams import stream
+from minisim.streams import Draws
 from minisim.vehicle import MODELS
 
 Floats = npt.NDArray[np.float64]
@@ -36,6 +35,7 @@ VEHICLE = np.dtype(
     [
         ("id", np.int64),  # row of the trip table
         ("lane", np.int64),
+        ("rank", np.int64),  # its place among the vehicles of its lane
         ("manoeuvre", np.int64),
         ("path", np.int64),  # index of the movement
         ("demand_tick", np.int64),
@@ -92,6 +92,7 @@ OBSERVED = np.dtype(
         ("speed", np.float64),
         ("length", np.float64),
         ("demand_time", np.float64),
+        ("rank", np.int64),
     ]
 )
 
@@ -199,11 +200,6 @@ def build_law(
     """Collect the scalars of a run."""
     vehicle = site.vehicle
     entry = site.intersection.approach_length
-    if plan.hold_distance > entry - vehicle.length:
-        raise InputError(
-            f"the hold line, {plan.hold_distance:g} m before the junction, is not on the approach "
-            f"lane of {entry:g} m"
-        )
     near = record == "junction"
     return Law(
         dt=site.dt,
@@ -255,11 +251,12 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     vehicles = np.zeros(len(order), VEHICLE)
     vehicles["id"] = order
     vehicles["lane"] = arrivals.lane[order]
+    vehicles["rank"] = arrivals.rank[order]
     vehicles["manoeuvre"] = arrivals.manoeuvre[order]
     vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
     factors = arrivals.speed_factor
-    vehicles["factor"] = (_speed_factors(site, len(order)) if factors is None else factors)[order]
+    vehicles["factor"] = _speed_factors(site, vehicles) if factors is None else factors[order]
     vehicles["ahead"] = -1
     vehicles["advice"] = np.inf
     vehicles["brake"] = np.inf
@@ -268,11 +265,13 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     return vehicles
 
 
-def _speed_factors(site: Site, count: int) -> Floats:
+def _speed_factors(site: Site, vehicles: Records) -> Floats:
     deviation = site.vehicle.speed_deviation
     if deviation == 0.0:
-        return np.ones(count)
-    return np.clip(stream(site.seed, "drivers").normal(1.0, deviation, count), 0.2, 2.0)
+        return np.ones(len(vehicles))
+    draws = Draws(site.seed, "drivers")
+    drawn = [draws.normal(*which) for which in vehicles[["lane", "rank"]].tolist()]
+    return np.clip(1.0 + deviation * np.array(drawn, float), LEAST_FACTOR, MOST_FACTOR)
 
 
 def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:

@@ -6,6 +6,9 @@ trips that ended before the horizon. The complete form is the mean over all dema
 unfinished trip counts with its waiting, loss and travel up to the horizon, and a vehicle that
 never got onto the road counts with its departure delay.
 
+Nothing before the end of the warm-up is measured: trips that were demanded, trajectories and
+counts. Only collisions always count, so that no run hides one.
+
 To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
     def stops(run):
@@ -16,34 +19,47 @@ To add a metric, add an entry to `TABLE`. Callers can pass metrics of their own:
 
 from __future__ import annotations
 
+import inspect
 import math
+import traceback
 from collections.abc import Callable, Iterable
 from numbers import Integral, Real
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from minisim.errors import InputError, choice, items, show
-from minisim.parameters import checked, declared, switch, text, word
-from minisim.results.trips import Floats, Trips
+from minisim.errors import InputError, MinisimError, choice, items, show
+from minisim.parameters import checked, declared, parameters, switch, text, word
+from minisim.results.trips import Floats, Trips, queue_growth
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
 #: Keys of summaries and columns of sweeps, which no metric may have as its name.
 RESERVED: Final = frozenset({
-    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "error", "growing",
-    "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre", "movements", "profile",
-    "scenario", "seed", "side", "split", "turns", "vehicle", "version", "warmup_s",
+    "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
+    "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
+    "movements", "pairs", "profile", "runs", "scenario", "seed", "side", "split", "too_short",
+    "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
+
+#: What trips can be grouped by -> the groups' key in a summary.
+GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
+
+#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
+SPREAD: Final = ("p50", "p95", "max")
+
+#: How columns begin and end that are made of metrics.
+BEGINNINGS: Final = ("complete_", *(f"{key}_" for key in GROUPS.values()))
+ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
 
 
 def _name(title: str, value: Any) -> Any:
-    if not isinstance(value, str) or not value.isidentifier() or value in RESERVED:
-        raise InputError(
-            f"{title} must be letters, digits and underscores, and no column that runs have, got "
-            f"{show(value)}"
-        )
+    if not isinstance(value, str) or not value.isidentifier():
+        raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
+    if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
+        raise InputError(f"{title} must be none that columns of runs have, got {value!r}")
     return value
 
 
@@ -57,8 +73,9 @@ def _function(title: str, value: Any) -> Any:
 class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
-    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`. A number that needs
-    only trips is also measured for each lane, movement and kind.
+    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`; neither has the
+    warm-up in it (`Run.counted`). A number that needs only trips is also measured for each lane,
+    movement and kind.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
@@ -67,7 +84,7 @@ class Metric:
         "number (None where there is none)",
         _function, "function", label="function of a metric",
     )  # fmt: skip
-    unit: str = text("such as s", default="")
+    unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
     needs: str = word(
         "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
@@ -76,10 +93,10 @@ class Metric:
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",
     )  # fmt: skip
-    title: str = text("for headings and axes; empty is its name", default="")
-    symbol: str = text("in equations", default="")
-    meaning: str = text("in one line", default="")
-    equation: str = text("with its source", default="")
+    title: str = text("for headings and axes; empty is its name", empty=True, default="")
+    symbol: str = text("in equations", empty=True, default="")
+    meaning: str = text("in one line", empty=True, default="")
+    equation: str = text("with its source", empty=True, default="")
     usual: bool = switch("whether every summary has it", default=False)
 
     @property
@@ -95,8 +112,6 @@ class Metric:
     def values(self, subject: Run | Trips, count: int) -> Floats:
         """One value per trip, shape (count,), NaN where there is none; otherwise `InputError`."""
         given = self._measured(subject)
-        if METRICS.get(self.name) is self:
-            return given  # type: ignore[no-any-return]  # ours are tested; each summary asks
         values = np.asarray(given)
         if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
             raise InputError(
@@ -124,29 +139,12 @@ class Metric:
         try:
             return self.of(subject)
         except Exception as error:  # a caller's function may raise anything
-            error.add_note(f"in metric {self.name!r}")
-            raise
-
-
-def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
-    """How many more vehicles were present in the last quarter of a run than in the second.
-
-    A vehicle is present from demand to arrival, so queues before the road count too. The numbers
-    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
-    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
-    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
-    the quarters divide the time after it.
-    """
-    length = (end - start) / 4.0
-    if length <= 0.0:  # the run was stopped during its warm-up
-        return 0.0
-
-    def present(quarter: int) -> float:
-        first = start + length * quarter
-        time = np.minimum(leave, first + length) - np.maximum(demand_time, first)
-        return float(np.maximum(time, 0.0).sum()) / length
-
-    return present(3) - present(1)
+            frames = traceback.extract_tb(error.__traceback__)[1:2]
+            place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
+            kind = "" if isinstance(error, MinisimError) else f" raised {type(error).__name__}"
+            raise InputError(
+                f"metric {self.name!r}{kind}: {error}{place if kind else ''}"
+            ) from error
 
 
 def _growth(trips: Trips) -> float:
@@ -264,38 +262,39 @@ MEANS: Final = tuple(metric.name for metric in USUAL if metric.per == "trip")
 #: Names of the metrics of `minisim.results.safety`.
 SAFETY: Final = tuple(metric.name for metric in TABLE if metric.needs == "trajectories")
 
-#: Both forms of every mean, as columns of a sweep: over the trips that ended, then over all.
-AVERAGED: Final = (*MEANS, *(f"complete_{name}" for name in MEANS))
-
-#: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
-SPREAD: Final = ("p50", "p95", "max")
+#: What stands for a metric: its name, a `Metric`, or a function (`metric_of`).
+Asked = str | Metric | Callable[[Any], Any]
 
 
-def asked_metrics(metrics: Iterable[str | Metric]) -> tuple[Metric, ...]:
+def metric_of(function: Callable[[Any], Any]) -> Metric:
+    """The metric of a function with a name, whose attributes may be fields, such as `unit`."""
+    known = {it.name for it in parameters(Metric)} & vars(function).keys()
+    return Metric(function.__name__, function, **{key: vars(function)[key] for key in known})
+
+
+def listed(metrics: str | Iterable[Asked]) -> list[Asked]:
+    """A sequence of metrics, or a text such as "trips, pets", as a list; else `InputError`."""
+    if isinstance(metrics, str):
+        return [name.strip() for name in metrics.split(",")]
+    return items("metrics", metrics, "names and Metrics")
+
+
+def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
     """The metrics asked for, once each.
 
-    Raises `InputError` for anything but a sequence, and for unknown or clashing names.
+    Raises `InputError` for anything but a sequence or a text, and for unknown or clashing names.
     """
     asked: dict[str, Metric] = {}
-    for metric in items("metrics", metrics, "names and Metrics"):
-        if not isinstance(metric, Metric):
+    for metric in listed(metrics):
+        if inspect.isfunction(metric):
+            metric = metric_of(metric)
+        elif not isinstance(metric, Metric):
             metric = METRICS[choice("metric", metric, METRICS)]
         if METRICS.get(metric.name, metric) is not metric:
             raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
         if asked.setdefault(metric.name, metric) != metric:
             raise InputError(f"two metrics are called {metric.name!r}")
     return tuple(asked.values())
-
-
-def named_metrics(metrics: Iterable[str | Metric]) -> tuple[str | Metric, ...]:
-    """`asked_metrics` with our own as names, which is how recipes for runs keep them."""
-    return tuple(m.name if m.name in METRICS else m for m in asked_metrics(metrics))
-
-
-def recording(metrics: Iterable[str | Metric]) -> str | None:
-    """What a run has to record for these metrics: "junction", or None for nothing."""
-    needs = {metric.needs for metric in asked_metrics(metrics)}
-    return "junction" if "trajectories" in needs else None
 
 
 def heading(column: str) -> str:

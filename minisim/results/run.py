@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -14,10 +15,11 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.control import Controller, Plan, Site
 from minisim.engine.collision import Collision
-from minisim.engine.state import Records
+from minisim.engine.state import Records, first_tick
 from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.metrics import Metric
+from minisim.names import name_of
+from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
 from minisim.results.trips import Trips
@@ -48,7 +50,7 @@ class ScenarioLike(Protocol):
 
     @property
     def warmup(self) -> float:
-        """Trips demanded before this time [s] do not count in any mean or number of trips."""
+        """Nothing before this time [s] is measured; only collisions always count."""
 
     @property
     def depart_speed(self) -> float | None:
@@ -78,11 +80,14 @@ class Run:
     site: Site  #: what the controller knew
     plan: Plan  #: what the controller asked for
     collisions: tuple[Collision, ...]  #: each pair of vehicles once
-    columns: Trips  #: all trips as arrays
+    columns: Trips  #: all trips as arrays, those of the warm-up too
     record: str | None  #: what was recorded of the trajectories: "junction", "all" or None
     trace: Records  #: the recording
     rows: Records  #: vehicle id and path of each row to which the trace refers
-    counts: Mapping[str, float] = field(default_factory=dict)  #: counts of the controller's session
+    #: What the controller's session has counted since the warm-up.
+    counts: Mapping[str, float] = field(default_factory=dict)
+    #: First and last time of the recording [s]; the run may have ended earlier.
+    record_window: tuple[float, float] = (0.0, math.inf)
     kinds: tuple[str, ...] = ()  #: kind of each vehicle by id; empty if all are of one kind
     #: What moved the vehicles, for the provenance: the `host` and perhaps its version.
     host: Mapping[str, str] = field(default_factory=lambda: {"host": "minisim"})
@@ -90,35 +95,36 @@ class Run:
 
     @cached_property
     def trips(self) -> pd.DataFrame:
-        """One row per trip in demand order, columns `minisim.results.summary.TRIP_COLUMNS`."""
-        return trip_table(self.columns, self.kinds)
+        """One row per trip that counts, in demand order; columns `summary.TRIP_COLUMNS`."""
+        return trip_table(self.counted.columns, self.counted.kinds)
 
     @cached_property
-    def counted_rows(self) -> slice:
-        """Indices of the trips that count: those demanded after the warm-up, up to the end."""
-        return self.columns.counted(self.scenario.warmup)
-
-    @cached_property
-    def counted(self) -> Trips:
-        """The trips that count in every mean and number of trips."""
-        rows, start = self.counted_rows, float(self.scenario.warmup)
-        if start == 0.0 and rows == slice(0, len(self.columns.lane)):
-            return self.columns
-        return self.columns.taken(rows)._replace(start=start)
+    def counted(self) -> Run:
+        """The run that metrics get: trips and trajectories from the warm-up on, up to the end."""
+        start = float(self.scenario.warmup)
+        rows = self.columns.counted(start)
+        if self.columns.start == start and rows == slice(0, len(self.columns.lane)):
+            return self
+        return replace(
+            self,
+            columns=self.columns.taken(rows)._replace(start=start),
+            kinds=self.kinds[rows],
+            trace=self.trace[self.trace["tick"] >= first_tick(start, self.site.dt)],
+        )
 
     @cached_property
     def safety(self) -> Mapping[str, float | int | None]:
         """The closest calls in and near the junction; see `minisim.results.safety`."""
         from minisim.results.safety import near_junction, safety_summary
 
-        return safety_summary(near_junction(self.trajectories, self.site), self.site)
+        return safety_summary(near_junction(self.counted.trajectories, self.site), self.site)
 
     def summary(
-        self, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
+        self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()
     ) -> dict[str, Any]:
         """What was run, and the numbers; see `minisim.results.summary.summarise`."""
         return {
-            "controller": self.controller.name,
+            "controller": name_of(self.controller),
             "scenario": self.scenario.name,
             "profile": self.scenario.profile_name,
             "density": self.scenario.density,
@@ -168,7 +174,7 @@ class Run:
 
     @cached_property
     def trajectories(self) -> pd.DataFrame:
-        """One row per vehicle and step (`TRAJECTORY_COLUMNS`); `InputError` if not recorded."""
+        """One row per vehicle and step, the warm-up's too; `InputError` if not recorded."""
         import pandas as pd
 
         if self.record is None:

@@ -1,7 +1,7 @@
 """A run on disk: one zip file of JSON and Parquet, without pickle.
 
 The file holds `run.json`, `trips.parquet`, `trace.parquet` and `rows.parquet`. It is written whole
-or not at all, and zip's checksums reveal damage.
+or not at all. Zip's comment at its end is a digest of all before it, which reveals damage.
 
 Objects of our own classes (`PACKAGES`) are written as class and fields, and come back as they
 were. Other scenarios and controllers come back as stand-ins with their name and text. Reading a
@@ -10,6 +10,7 @@ file imports only our own modules.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import io
@@ -19,28 +20,27 @@ import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Final, NoReturn
 
 import numpy as np
 import pandas as pd
 
-from minisim.control import Plan, Site
 from minisim.errors import FileError, InputError, MissingExtraError, instance, show
-from minisim.files import replacing
+from minisim.files import read_file, replacing
 from minisim.results.run import Run
 from minisim.results.trips import TRIP_ARRAYS, Trips
 
 #: The type of file, and the layout that this version writes.
 MARK: Final = "minisim run"
-LAYOUT: Final = 1
+LAYOUT: Final = 2
 
 #: Packages whose classes are written as class and fields.
 PACKAGES: Final = ("minisim", "dim", "baselines", "scenarios")
 
 #: The fields of a run that hold plain values.
 _VALUES: Final = (
-    "seed", "site", "plan", "collisions", "record", "counts", "host", "environment",
+    "seed", "site", "plan", "collisions", "record", "record_window", "counts", "host",
+    "environment",
 )  # fmt: skip
 
 
@@ -99,22 +99,21 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
     trips = {name: getattr(run.columns, name) for name in TRIP_ARRAYS}
     if run.kinds:
         trips["kind"] = run.kinds
-    with replacing(path) as part, zipfile.ZipFile(part, "w") as file:
-        file.writestr("run.json", json.dumps(head, indent=1))
-        for name, table in (("trips", trips), ("trace", run.trace), ("rows", run.rows)):
-            file.writestr(f"{name}.parquet", _parquet(table))
+    whole = io.BytesIO()
+    with replacing(path) as part:
+        with zipfile.ZipFile(whole, "w") as file:
+            file.writestr("run.json", json.dumps(head, indent=1))
+            for name, table in (("trips", trips), ("trace", run.trace), ("rows", run.rows)):
+                file.writestr(f"{name}.parquet", _parquet(table))
+            file.comment = _digest(b"")
+        part.write_bytes(_signed(whole.getvalue()))
 
 
 def load(path: str | os.PathLike[str]) -> Run:
     """Read a run; see `Run.load`."""
-    instance("saved run", path, (str, os.PathLike))
     _need_pyarrow()
+    data = read_file("saved run", path, 2**32)
     place = os.fspath(path)
-    try:
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read {place}: {reason}") from error
     if not data.startswith(b"PK"):
         raise FileError(f"{place} is not a saved run of minisim")
     try:
@@ -127,11 +126,15 @@ def load(path: str | os.PathLike[str]) -> Run:
                     f"{place} has layout {show(head['layout'])}, this version of minisim reads "
                     f"layout {LAYOUT}"
                 )
+            if data != _signed(data):
+                raise FileError(f"{place} is damaged: it is not what was saved")
             return _run(head, file)
     except FileError:
         raise
+    except InputError as error:
+        raise FileError(f"{place} cannot be read by this version of minisim: {error}") from error
     except Exception as error:  # damage can show up anywhere
-        raise FileError(f"{place} is damaged: {type(error).__name__}: {error}") from error
+        raise FileError(f"{place} is damaged and cannot be read") from error
 
 
 def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
@@ -140,8 +143,6 @@ def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
         for name in ("trips", "trace", "rows")
     )
     values = {name: made(head[name]) for name in ("scenario", "controller", *_VALUES)}
-    instance("site", values["site"], Site)
-    instance("plan", values["plan"], Plan)
     columns: dict[str, Any] = {name: trips[name].to_numpy() for name in TRIP_ARRAYS}
     return Run(
         **values,
@@ -240,6 +241,16 @@ def _written_or(value: Any, stand_in: type[_StandIn]) -> Any:
 def _need_pyarrow() -> None:
     if importlib.util.find_spec("pyarrow") is None:
         raise MissingExtraError("saved runs need pyarrow: pip install 'minisim[parquet]'")
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.sha256(data).hexdigest().encode()
+
+
+def _signed(data: bytes) -> bytes:
+    """The file with the right digest in the place of its own."""
+    rest = data[: -len(_digest(b""))]
+    return rest + _digest(rest)
 
 
 def _parquet(columns: Any) -> bytes:

@@ -47,10 +47,16 @@ def _what(summary: Mapping[str, Any]) -> str:
     scenario, controller, profile = (
         _short(summary[name]) for name in ("scenario", "controller", "profile")
     )
+    return f"{scenario}, {controller}: {conditions({**summary, 'profile': profile})}"
+
+
+def conditions(summary: Mapping[str, Any]) -> str:
+    """Under which conditions a controller ran."""
+    warmup = f" (warm-up {summary['warmup_s']:g} s)" if summary["warmup_s"] else ""
     host = "" if summary["host"] == "minisim" else f", host {summary['host']}"
     return (
-        f"{scenario}, {controller}: {summary['density']:g} veh/h/lane, profile {profile}, "
-        f"seed {summary['seed']}, {summary['horizon_s']:g} s{host}"
+        f"{summary['density']:g} veh/h/lane, profile {summary['profile']}, "
+        f"seed {summary['seed']}, {summary['horizon_s']:g} s{warmup}{host}"
     )
 
 

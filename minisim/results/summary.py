@@ -10,7 +10,16 @@ import numpy as np
 
 from minisim.errors import InputError, choice, items
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.metrics import MEANS, METRICS, SPREAD, USUAL, Metric, asked_metrics
+from minisim.results.metrics import (
+    GROUPS,
+    MEANS,
+    METRICS,
+    SPREAD,
+    USUAL,
+    Asked,
+    Metric,
+    asked_metrics,
+)
 from minisim.results.trips import Floats, Ints, Trips
 
 if TYPE_CHECKING:
@@ -24,17 +33,14 @@ TRIP_COLUMNS: Final = (
     "vehicle", "demand_time_s", "depart_s", "arrival_s", "lane", "manoeuvre", "exit_lane", *MEANS,
 )  # fmt: skip
 
-#: What trips can be grouped by -> the groups' key in a summary.
-GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
-
 
 def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
-    """All trips as a DataFrame with `TRIP_COLUMNS`; missing values are NaN."""
+    """Trips as a DataFrame with `TRIP_COLUMNS`; missing values are NaN."""
     import pandas as pd
 
     names = np.array(list(ARM_NAMES))
     columns = {
-        "vehicle": np.arange(len(trips.demand_time)),
+        "vehicle": trips.vehicle,
         **({"kind": np.array(kinds)} if kinds else {}),
         "demand_time_s": trips.demand_time,
         "depart_s": trips.depart,
@@ -51,7 +57,7 @@ def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
 
 
 def summarise(
-    run: Run, metrics: Iterable[str | Metric] = (), by: Iterable[str] = ()
+    run: Run, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()
 ) -> dict[str, Any]:
     """The usual numbers of a run, and the metrics asked for.
 
@@ -60,22 +66,24 @@ def summarise(
     (`kinds`).
 
     Args:
-        run: what to measure. Trips demanded during its scenario's warm-up do not count.
-        metrics: names of `minisim.results.metrics.METRICS`, or `Metric`s. Each mean asked for
-            also gets its median, 95th percentile and maximum (`SPREAD`, numpy's linear method).
+        run: what to measure, without the warm-up of its scenario (`Run.counted`).
+        metrics: names of `minisim.results.metrics.METRICS`, `Metric`s or functions
+            (`minisim.results.metrics.metric_of`). Each mean asked for also gets its median, 95th
+            percentile and maximum (`SPREAD`, numpy's linear method).
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories when none
-    were recorded, or a metric whose function returns the wrong type or shape.
+    were recorded, a metric whose function raises anything or returns the wrong type or shape, or a
+    count of the controller's that has the name of another number.
     """
+    run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
-    _check_recorded(run, asked)
     table = (*USUAL, *(metric for metric in asked if not metric.usual))
     measured = _Measured(run, table, asked)
-    top = measured.of(np.arange(len(run.counted.lane)))
+    top = measured.of(np.arange(len(run.columns.lane)))
     complete = top.pop("complete")
-    return {
+    summary = {
         **top,
         **{
             key: {name: measured.of(rows) for name, rows in _groups(run, key).items()}
@@ -83,15 +91,18 @@ def summarise(
         },
         "complete": complete,
         **{m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"},
-        **run.counts,
     }
+    for name in summary.keys() & run.counts.keys():
+        if name not in METRICS or METRICS[name].needs != "counts":
+            raise InputError(f"{name!r} is also what the controller calls a count of its own")
+    return {**summary, **run.counts}
 
 
 class _Measured:
     """The metrics of a run, measured once and then summarised for any set of its trips."""
 
     def __init__(self, run: Run, table: tuple[Metric, ...], asked: tuple[Metric, ...]) -> None:
-        self._trips = run.counted
+        self._trips = run.columns
         self._spread = {metric.name for metric in asked}
         self._values = [(m, _trip_values(run, m)) for m in table if m.per == "trip"]
         # The two numbers that every group has are computed in `of`.
@@ -117,10 +128,8 @@ class _Measured:
 
 
 def _trip_values(run: Run, metric: Metric) -> Floats:
-    """The metric's value for each trip that counts."""
-    if metric.needs == "trips":
-        return metric.values(run.counted, len(run.counted.lane))
-    return metric.values(run, len(run.columns.lane))[run.counted_rows]
+    """The metric's value for each trip."""
+    return metric.values(run.columns if metric.needs == "trips" else run, len(run.columns.lane))
 
 
 def _mean(values: list[float]) -> float | None:
@@ -139,8 +148,8 @@ def _spread(name: str, values: list[float]) -> dict[str, float | None]:
 
 
 def _groups(run: Run, key: str) -> dict[str, Ints]:
-    """Name of each group -> indices of its trips, among those that count."""
-    trips, movements = run.counted, run.site.intersection.movements
+    """Name of each group -> indices of its trips."""
+    trips, movements = run.columns, run.site.intersection.movements
     names: Iterable[str]
     if key == "lanes":
         names, group = ARM_NAMES[: movements.n], trips.lane
@@ -148,14 +157,5 @@ def _groups(run: Run, key: str) -> dict[str, Ints]:
         names, group = movements.names, movements.index_of[trips.lane, trips.manoeuvre]
     else:
         kinds, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
-        names, group = kinds.tolist(), group[run.counted_rows]
+        names = kinds.tolist()
     return {name: (group == k).nonzero()[0] for k, name in enumerate(names)}
-
-
-def _check_recorded(run: Run, asked: Iterable[Metric]) -> None:
-    for metric in asked:
-        if metric.needs == "trajectories" and run.record is None:
-            raise InputError(
-                f"metric {metric.name!r} needs trajectories: simulate with record='junction' or "
-                "record='all'"
-            )

@@ -18,12 +18,13 @@ Ints = npt.NDArray[np.int64]
 
 
 class Trips(NamedTuple):
-    """All trips of a run as columns in demand order, shape (k,) each; times in seconds.
+    """Trips of a run as columns in demand order, shape (k,) each; times in seconds.
 
     For a trip that has not ended, `waiting_time`, `travel_time`, `time_loss` and `depart_delay`
-    hold what has accumulated up to `end`. Means are over the trips demanded from `start` on.
+    hold what has accumulated up to `end`. `start` is the end of a warm-up that has been left out.
     """
 
+    vehicle: Ints
     demand_time: Floats
     depart: Floats
     arrival: Floats
@@ -45,9 +46,8 @@ class Trips(NamedTuple):
         return self._replace(**columns)
 
     def counted(self, start: float) -> slice:
-        """Indices of the trips demanded from `start` [s] up to the end."""
-        first = int(self.demand_time.searchsorted(start))
-        return slice(first, int(self.demand_time.searchsorted(self.end, "right")))
+        """Indices of the trips demanded from `start` [s] to before the end."""
+        return slice(*self.demand_time.searchsorted((start, self.end)).tolist())
 
 
 #: The columns among the fields of `Trips`.
@@ -66,6 +66,7 @@ def collect_trips(
     travel = np.where(arrived, arrival, end) - depart
     return Trips(
         end=end,
+        vehicle=rows["id"].astype(np.int64),
         demand_time=demand_time,
         depart=depart,
         arrival=arrival,
@@ -79,3 +80,24 @@ def collect_trips(
         departed=departed,
         arrived=arrived,
     )
+
+
+def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
+    """How many more vehicles were present in the last quarter of a run than in the second.
+
+    A vehicle is present from demand to arrival, so queues before the road count too. The numbers
+    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
+    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
+    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
+    the quarters divide the time after it.
+    """
+    length = (end - start) / 4.0
+    if length <= 0.0:  # the run was stopped during its warm-up
+        return 0.0
+
+    def present(quarter: int) -> float:
+        first = start + length * quarter
+        time = np.minimum(leave, first + length) - np.maximum(demand_time, first)
+        return float(np.maximum(time, 0.0).sum()) / length
+
+    return present(3) - present(1)

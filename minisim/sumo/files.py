@@ -131,6 +131,7 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
     travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)
     return Trips(
         end=end,
+        vehicle=np.arange(len(arrivals)),
         demand_time=arrivals.time,
         depart=np.where(departed, depart, np.nan),
         arrival=np.where(arrived, arrival, np.nan),

@@ -47,8 +47,8 @@ class Car:
 
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
-        "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "row", "s",
-        "section", "seen", "v",
+        "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
+        "s", "section", "seen", "v",
     )  # fmt: skip
 
     def __init__(self, row: int, record: Records, law: Law) -> None:
@@ -56,6 +56,7 @@ class Car:
         self.id = int(record["id"])
         self.name = str(self.id)
         self.lane = int(record["lane"])
+        self.rank = int(record["rank"])
         self.path = int(record["path"])
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt

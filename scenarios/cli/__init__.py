@@ -7,14 +7,17 @@ needs when it runs, so that `minisim --help` is quick.
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import shlex
+import signal
 import sys
+import traceback
 from collections.abc import Sequence
 
 import typer
 
-from minisim.errors import CollisionError, MinisimError
+from minisim.errors import CollisionError, InputError, MinisimError
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.terminal import drop_output, prepare_streams
 from scenarios.termination import Terminated, terminable
@@ -41,15 +44,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input gives one line on stderr and code 2. A collision that stops a run, or a stdout that
-    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback.
+    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback,
+    unless the environment variable MINISIM_TRACEBACK is set.
     """
     prepare_streams()
+    if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        _check_once(given)
         with terminable():
             code = app(given or ["--help"], prog_name="minisim", standalone_mode=False)
         sys.stdout.flush()
     except MinisimError as error:
+        if os.environ.get("MINISIM_TRACEBACK"):
+            traceback.print_exception(error)
         told = "; ".join([str(error), *getattr(error, "__notes__", ())])
         return _fail(told, 1 if isinstance(error, CollisionError) else 2)
     except _USAGE_ERROR as error:
@@ -67,12 +76,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except OSError as error:
         if error.filename is not None:
-            raise
+            return _fail(f"cannot use {error.filename}: {error.strerror}")
         drop_output()
         return _fail(f"cannot write to stdout: {error.strerror or error}", 1)
     if code == 130:
         typer.echo("minisim: interrupted", err=True)
     return code if isinstance(code, int) else 0
+
+
+def _check_once(given: Sequence[str]) -> None:
+    """Raise `InputError` for an option that is given twice and would count only once."""
+    words = [word.partition("=")[0] if word[:2] == "--" else word[:2] for word in given]
+    command = typer.main.get_command(app)
+    for option in getattr(command, "commands", {}).get(given[0] if given else "", command).params:
+        used = [word for word in words if word in option.opts]
+        if len(used) > 1 and option.param_type_name == "option" and not option.multiple:
+            raise InputError(f"{used[-1]} is given twice; minisim {given[0]} takes one")
 
 
 def _fail(message: str, code: int = 2) -> int:

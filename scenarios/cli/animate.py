@@ -17,7 +17,7 @@ from scenarios.cli.shared.terminal import bar
 @app.command(
     epilog="[bold]Examples[/bold]\n\n"
     "minisim animate four-way -c dim -d 350 -o dim.gif\n\n"
-    "minisim animate five-way -c fixed-time -d 300 --start 600 --seconds 120 -o signal.html"
+    "minisim animate five-way -c fixed-time -d 300 --from 600 --seconds 120 -o signal.html"
 )
 def animate(
     scenario: options.ScenarioName,
@@ -28,9 +28,13 @@ def animate(
     ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
-    start: Annotated[float, typer.Option(metavar="S", help="Simulated time to begin at.")] = 300.0,
+    begin: Annotated[
+        float, typer.Option("--from", metavar="S", help="Simulated time to begin at.")
+    ] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
-    fps: Annotated[float, typer.Option(help="Frames a second; at most one a step.")] = 10.0,
+    fps: Annotated[
+        float, typer.Option(help="Frames per second; at most one per step, and 50 in a .gif.")
+    ] = 10.0,
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
@@ -38,9 +42,11 @@ def animate(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
+    horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
+    start: options.Start = None,
 ) -> None:  # fmt: skip
-    """Write an animation: which vehicles wait, have the right of way, and cross."""
+    """Write an animation of a run: which vehicles wait, have the right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
@@ -51,17 +57,18 @@ def animate(
     check_apart({"--arrivals": arrivals, "--out": out})
     animation_format(out)
     check_file(out)
-    number("--start [s]", start, low=0, high=9e6)
-    number("--seconds", seconds, above=0, high=3600)
-    frame_times(start, seconds, fps, profile_named(profile).dt)
+    number("--from [s]", begin, low=0, below=horizon)
+    number("--seconds", seconds, above=0, high=min(3600.0, horizon - begin))
+    frame_times(begin, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
-        scenario, bearings, arrivals, density=density, split=split, turns=turns,
-        profile=profile, side=side, horizon=start + seconds,
+        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans, on_collision="record"
     )
-    result = recipe.run(simulate, record="all", record_window=(start, start + seconds))
+    end = begin + seconds
+    result = recipe.run(simulate, until=end, record="all", record_window=(begin, end))
     with bar("drawing") as progress:
-        write_animation(result, out, start=start, seconds=seconds, fps=fps, progress=progress)
+        write_animation(result, out, start=begin, seconds=seconds, fps=fps, progress=progress)
     typer.echo(f"wrote {out}")

@@ -89,6 +89,9 @@ def crossval(
     from scenarios.library import scenario_named
     from scenarios.sweep.file import check_can_run
 
+    options.check_distinct({
+        "SCENARIO": scenarios, "--controller": controller, "--density": density, "--split": split,
+    })  # fmt: skip
     if horizon is None:
         horizon = 300.0 if quick else 3600.0
     if replay:

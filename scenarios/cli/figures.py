@@ -66,6 +66,8 @@ def figures(
     items = [item for item in items if item.name not in left]
     with nullcontext() if store is None else Store(store, create=False) as source:
         folder = make_folder(out)
+        if source is not None and source.outdated:
+            typer.echo(f"minisim: {source.outdated}", err=True)
         archive = Archive(find_in(source), effort)
         with bar("drawing") as progress:
             for done, item in enumerate(items, start=1):

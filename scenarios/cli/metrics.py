@@ -14,7 +14,8 @@ SAID = ("name", "unit", "title", "symbol", "per", "needs", "meaning", "equation"
 
 @app.command(
     epilog="Means are over the trips that ended before the horizon, as SUMO and the paper count "
-    "them; complete means also count the others, up to the horizon.\n\n"
+    "them; complete means also count the others, up to the horizon. Nothing before the end of "
+    "--warmup is measured; only collisions always count. mymodule:name is a metric of your own.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim metrics --json\n\n"
     "minisim run four-way --metrics waiting_time_s,max_drac_mps2 --by movement"

@@ -29,7 +29,7 @@ MAX_ARMS = 4
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
     "minisim protocol four-way --commit paper --counterexample two.csv\n\n"
-    "minisim animate four-way -c dim:commit=paper --arrivals two.csv --start 40 --seconds 15 "
+    "minisim animate four-way -c dim:commit=paper --arrivals two.csv --from 40 --seconds 15 "
     "-o two.gif"
 )
 def protocol(
@@ -110,7 +110,7 @@ def protocol(
 
 def _write_counterexample(what: Scenario, search: Exploration, file: Path) -> None:
     from dim import Dim
-    from minisim.arrivals import write_arrivals
+    from minisim.recorded import write_arrivals
     from scenarios.counterexample import colliding_arrivals
 
     rules = search.protocol

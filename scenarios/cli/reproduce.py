@@ -56,6 +56,7 @@ def reproduce(
     from scenarios.studies.shared.reproduction import reproduce as make
     from scenarios.sweep.store import Store
 
+    options.check_distinct({"--only": only})
     effort = Effort.of(quick=quick, seeds=seeds)
     names = [study_named(name).name for name in only or NAMES]
     workers = options.processes(jobs)
@@ -71,6 +72,8 @@ def reproduce(
             took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
             failed = f", {len(done.failed)} failed" if done.failed else ""
             typer.echo(f"{name}: {took}{failed}", err=True)
+        if rows.outdated:
+            typer.echo(f"minisim: {rows.outdated}", err=True)
         with bar("drawing") as progress:
             files = write_report(
                 Archive(find_in(rows), effort), made, workers, folder, progress, parts=names

@@ -37,16 +37,17 @@ def run(
     side: options.Side = "left",
     bearings: options.Bearings = None,
     seed: options.Seed = 0,
-    horizon: Annotated[float, option("Simulated time; 3600 unless told.", "S")] = 3600.0,
-    warmup: Annotated[float, option("Earlier trips do not count.", "S")] = 0.0,
+    horizon: options.Horizon = 3600.0,
+    warmup: Annotated[float, option("Measure nothing before it.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
     metrics: Annotated[
-        str | None, option("Measure these; minisim metrics lists them.", "A,B")
+        str | None, option("Of minisim metrics, or mymodule:name.", "A,B")
     ] = None,
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
+    start: options.Start = None,
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
@@ -58,11 +59,12 @@ def run(
 ) -> None:  # fmt: skip
     """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
     from minisim.files import check_apart, check_file, check_table
-    from minisim.results.metrics import SAFETY, asked_metrics
-    from minisim.results.summary import GROUPS
+    from minisim.results.metrics import GROUPS, SAFETY, asked_metrics
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
     from scenarios.controllers import controller_named
+    from scenarios.loading import metrics_named
     from scenarios.recipe import Recipe
+    from scenarios.sweep.rows import identity_of
 
     check_apart({
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
@@ -74,7 +76,9 @@ def run(
     for xml in (fcd, sumo_fcd):
         if xml is not None:
             check_file(xml, ".xml")
-    asked = asked_metrics([] if metrics is None else [name.strip() for name in metrics.split(",")])
+    asked = asked_metrics(() if metrics is None else metrics_named(metrics))
+    if no_safety and (unsafe := [it.name for it in asked if it.name in SAFETY]):
+        raise InputError(f"--metrics asks for {', '.join(unsafe)}, which --no-safety leaves out")
     choice("--by", by, GROUPS)
     if choice("host", host, ("minisim", "sumo")) == "minisim":
         only_sumo = {
@@ -85,7 +89,7 @@ def run(
             need = "needs" if len(refused) == 1 else "need"
             raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
-        scenario, bearings, arrivals, density=density, split=split, turns=turns,
+        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
@@ -99,6 +103,10 @@ def run(
     try:
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
+        if as_json:
+            touched = [collision._asdict() for collision in error.collisions]
+            facts = identity_of(recipe) | {"collisions": len(touched), "touched": touched}
+            show_json({**facts, "error": str(error)})
         unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
         error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +14,7 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar, show
+from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.termination import Terminated
 
@@ -24,16 +26,14 @@ if TYPE_CHECKING:
     from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
-#: Key of a file -> the default that `scenarios.sweep.file` gives it.
-DEFAULTS = {
-    "scenario": "four-way", "controller": "dim", "density": 350, "humans": 0, "profile": "paper",
-    "side": "left", "split": "balanced", "turns": "uniform", "model": "poisson",
-    "min_headway": 1.5, "seeds": 10, "horizon": 3600, "warmup": 0, "on_collision": "stop",
-}  # fmt: skip
-#: A junction of your own as written in a file, and how the help text escapes brackets.
-CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
+#: What a file may leave out, and how the help text escapes brackets.
+KEYS = {**AXES, **SINGLE}
+LEFT_OUT = ", ".join(
+    f"{key} {value if isinstance(value, str) else f'{value:g}'}"
+    for key, value in KEYS.items()
+    if value not in (None, ())
+)
 PLAIN = str.maketrans({"[": r"\["})
-LEFT_OUT = ", ".join(f"{key} {value}" for key, value in DEFAULTS.items())
 
 #: Studies that are lists of experiments.
 STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
@@ -44,9 +44,8 @@ STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
     '  scenario = \\["four-way", "five-way"]\n\n'
     '  controller = \\["dim", "fixed-time"]\n\n'
     "  density = \\[150, 250, 350]\n\n"
-    "and also humans, profile, side, split, turns, model, min_headway, arrivals, seeds, horizon, "
-    "warmup, on_collision, metrics (minisim metrics lists them); what it leaves out is "
-    f"{LEFT_OUT}. Your own junction is written\n\n"
+    f"and also any other of {', '.join(KEYS)} (minisim metrics lists metrics; mymodule:name is "
+    f"yours). What it leaves out is {LEFT_OUT}. Your own junction is written\n\n"
     f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
     "one that is stored is not made again, whether a file, a study or [bold]minisim "
@@ -115,9 +114,12 @@ def sweep(
         Store(out) as store,
     ):
         rows = _run(experiments, executor, workers, store, out)
+        outdated = store.outdated
     averaged = cells(rows)
-    show(sweep_table(averaged), sweep_notes(rows, averaged, experiments))
+    show(sweep_table(averaged, experiments), sweep_notes(rows, averaged, experiments))
     typer.echo(f"  {len(rows)} runs in {out}")
+    if outdated:
+        typer.echo(f"  {outdated}")
     if export is not None:
         write_table(rows, export)
         typer.echo(f"  wrote {export}")
@@ -130,7 +132,11 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
     from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = ("paper", *STUDIES)
-    if what in studies or not (Path(what).suffix or Path(what).exists()):
+    if what in SEARCHES:
+        raise InputError(
+            f"{what} chooses runs by the results of earlier ones: minisim reproduce --only {what}"
+        )
+    if what in studies or not (Path(what).suffix or os.path.exists(what)):
         study = study_named("text" if what == "paper" else choice("study", what, studies))
         runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
         recipes = [recipe for _, recipe in runs]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from minisim.arrivals import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
 from scenarios.controllers import controller_named
@@ -75,8 +76,7 @@ class Case:
         """The demand's split, such as "4:3:2:1"; for a published run, the one in its label."""
         if self.published is not None:
             return self.published.split
-        shares = self.scenario.demand.split
-        return "balanced" if shares is None else ":".join(f"{share:g}" for share in shares)
+        return shares_text(self.scenario.demand.split, BALANCED)
 
     @property
     def density(self) -> float:
@@ -134,6 +134,7 @@ def replayed_cases(
     own vehicle and controller; with any other vehicle, it has that profile's controller. Raises
     `InputError` for an unknown name, or if no published run matches.
     """
+    splits = [shares_text(read_shares("split", split, BALANCED), BALANCED) for split in splits]
     for split in splits:
         choice("split of a published run", split, SPLITS)
     arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]

@@ -111,12 +111,13 @@ def _run(task: tuple[Case, str, int, Path | None]) -> _Outcome:
         if kept := _read(file):
             return kept
     run = recipe.run(_host(host))
-    outcome = _Outcome(run.counted, len(run.collisions), run.host.get("sumo", ""))
+    trips = run.counted.columns
+    outcome = _Outcome(trips, len(run.collisions), run.host.get("sumo", ""))
     if file is not None:
         make_folder(file.parent)
         with replacing(file) as part:
             np.savez_compressed(
-                part, collisions=outcome.collisions, sumo=outcome.sumo, **run.counted._asdict()
+                part, collisions=outcome.collisions, sumo=outcome.sumo, **trips._asdict()
             )
     return outcome
 

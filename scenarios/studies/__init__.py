@@ -1,8 +1,8 @@
-"""Questions and their answers, one module a study: its runs, and what it computes from them.
+"""Questions and their answers. Each study is one module: its runs, and what it computes from them.
 
 A module exports its `STUDY`; the module of the same name in `figures.studies` draws it. What
-several studies need is in `shared`. Add a new study to `NAMES`: lists, help texts and the report
-follow it.
+several studies need is in `shared`. Add a new study to `NAMES`; lists, help
+texts and the report then include it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NAMES = (
     "text", "as-run", "fair", "gate", "capacity", "fairness", "humans", "perception", "confidence",
 )  # fmt: skip
 
-#: Studies that choose runs by the results of earlier ones, and so have no list of them.
+#: Studies that choose runs by the results of earlier ones, so their runs cannot be listed before.
 SEARCHES = ("capacity",)
 
 

@@ -1,4 +1,4 @@
-"""The paper's grid as its published runs were made."""
+"""The paper's grid, run the way the published runs were made."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PublishedPoint(NamedTuple):
 
 STUDY = Study(
     "as-run",
-    "What do the rules and vehicles behind the published numbers give?",
+    "Which numbers do the rules and vehicles behind the published ones give?",
     tuple(
         PublishedPoint(SERIES[cell.controller], cell.arms, cell.split, float(cell.density))
         for cell in (*GRID, *BASELINE_GRID)

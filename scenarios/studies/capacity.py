@@ -1,9 +1,9 @@
 """Capacity: the largest demand that is served without a growing queue, by bisection.
 
-A run serves its demand when the number of vehicles on the road or before it grows by less than
-`TOLERANCE` of the arrivals meanwhile. Each seed has its own bisection, so that capacities have a
-mean and an interval. Near capacity a queue wanders: single hours of a signal give its capacity
-with a standard deviation of 4 %, and the tolerance adds its 2 %.
+A run serves its demand if the number of vehicles on the road or waiting to enter it grows by less
+than `TOLERANCE` times the arrivals in that time. Each seed has its own bisection, so capacities
+have a mean and an interval. Near capacity, a queue wanders: the capacity of a signal found from
+single hours has a standard deviation of 4 %, and the tolerance adds another 2 %.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from scenarios.studies.shared.study import Find, Results, Study
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Growth of the queue that still counts as served, as a share of the arrivals meanwhile.
+#: Growth of the queue that still counts as served, as a share of the arrivals in that time.
 TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
 class CapacityStudy(Study):
-    """Bisects demand at every point, with each seed of the search; a point's own is not used."""
+    """Bisects demand at every point, once per seed; the point's own demand is not used."""
 
     points: tuple[ControllerPoint, ...]
 
     def collect(self, effort: Effort, find: Find) -> Results:
-        """One list for `find` each round; a point with a missing or failed run is given up."""
+        """Call `find` once per round. A point with a missing or failed run is given up."""
         search = effort.search
         brackets = {
             (point, seed): (0, search.steps)
@@ -81,8 +81,8 @@ class Capacity(NamedTuple):
 
     series: str  # the controller
     arms: int  # of the junction
-    #: Of each seed, the highest demand served and the lowest that was not [veh/h/lane]; 0 where
-    #: none was served, infinite where all were.
+    #: For each seed, the highest demand that was served and the lowest that was not [veh/h/lane];
+    #: 0 if none was served, infinite if all were.
     brackets: tuple[tuple[float, float], ...]
 
     @property
@@ -130,7 +130,7 @@ def grows(row: Mapping[Any, Any]) -> bool:
 
 
 def capacities(results: Results) -> list[Capacity]:
-    """The capacity of every point whose search ran to its end."""
+    """The capacity of every point whose search is complete."""
     search = results.effort.search
     rows = results.good
     known = []

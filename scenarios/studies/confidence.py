@@ -1,4 +1,4 @@
-"""Misread intents, if vehicles believe only readings above some confidence."""
+"""Misread intents when vehicles believe only readings above some confidence."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from dim.senses.noise import CLASSIFIER
 from scenarios.studies.shared.intent_errors import FEW, IntentErrorPoint
 from scenarios.studies.shared.study import Study
 
-#: Thresholds of confidence; at 0, every reading is believed.
+#: Confidence thresholds; at 0, every reading is believed.
 THRESHOLDS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
 
 STUDY = Study(
     "confidence",
-    "What does it cost to believe only readings that are sure?",
-    # By lanes, since unknown intents block a junction where the largest clique goes first.
+    "What does it cost to believe only confident readings?",
+    # Lanes first, since unknown intents block a junction where the largest clique goes first.
     tuple(
         IntentErrorPoint("dim:order=lanes", kind, CLASSIFIER, confidence=threshold)
         for kind, threshold in product(KINDS, THRESHOLDS)

@@ -1,4 +1,4 @@
-"""Every controller on equal terms, and the demands at which DIM does worse than another."""
+"""Every controller on equal terms, and the demands at which DIM does worse than a rival."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OTHERS = tuple(name for name in RIVALS if name not in GATES)
 DENSITIES = (50, 100, 150, 200, 250, 300, 350, 400, 500, 600, 700, 800)
 
 #: What "worse" may mean: measure -> column of `with_total_delay`. These are the complete forms,
-#: which include vehicles still on the road; the others flatter a controller that serves few.
+#: which include vehicles still on the road; other forms flatter a controller that serves few.
 MEASURES = {
     "waiting time": "complete_waiting_time_s",
     "time loss": "complete_time_loss_s",
@@ -34,23 +34,23 @@ MEASURES = {
 
 STUDY = Study(
     "fair",
-    "Which controller is best with one vehicle and speed limit for all?",
+    "Which controller is best when all have the same vehicles and speed limit?",
     fair_grid(RIVALS, (4,), DENSITIES),
 )
 
 
 class Crossing(NamedTuple):
-    """The demand from which on one controller does worse than another."""
+    """The demand above which one controller does worse than another."""
 
     #: The lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is positive
     #: at the lowest demand tried, +inf if it never is.
     density: float
-    low: float  # low and high: its interval, open (±inf) if the demands tried do not bound it
+    low: float  # low … high: its interval; ±inf if the demands tried do not bound it
     high: float
-    #: Where the mean difference falls back to 0 or less, +inf if it does not. Beyond the capacity
-    #: of both, neither wins.
+    #: Where the mean difference falls back to 0 or less; +inf if it does not. Above the capacities
+    #: of both controllers, neither wins.
     until: float
-    tried: tuple[float, float]  # lowest and highest demand of both; nothing is known beyond
+    tried: tuple[float, float]  # lowest and highest demand tried with both
 
     def __str__(self) -> str:
         bounded = math.isfinite(self.low) or math.isfinite(self.high)
@@ -83,7 +83,7 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
     confidence set by inversion of the test, Fieller 1954).
 
     Args:
-        differences: two or more demands [veh/h/lane] -> one difference a seed, at least two.
+        differences: two or more demands [veh/h/lane] -> one difference per seed, at least two.
     """
     densities = sorted(numbers("demands", list(differences)))
     if len(densities) < 2:
@@ -101,7 +101,7 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
 
 
 def tried(crossings: Iterable[Crossing]) -> tuple[float, float]:
-    """The lowest and the highest demand that was tried for any."""
+    """The lowest and the highest demand tried for any of the crossings."""
     lows, highs = zip(*(crossing.tried for crossing in crossings), strict=True)
     return min(lows), max(highs)
 
@@ -109,16 +109,17 @@ def tried(crossings: Iterable[Crossing]) -> tuple[float, float]:
 def paired_differences(
     rows: pd.DataFrame, ours: str, theirs: str, metric: str
 ) -> dict[float, list[float]]:
-    """Differences of a column between two series, ours minus theirs: density -> one a common seed.
+    """Differences of a column between two series, ours minus theirs: density -> one per
+    common seed.
 
-    `InputError` if two runs of one seed had other arrivals.
+    `InputError` if two runs with the same seed had different arrivals.
     """
     by_density = pairs(rows, metric, "series", (ours, theirs), ["density"])
     return {float(density): values for (density,), values in by_density.items() if len(values) > 1}
 
 
 def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
-    """From which demand on DIM does worse: (measure, gate, rival) -> crossing.
+    """The demand above which DIM does worse: (measure, gate, rival) -> crossing.
 
     Pairs without two demands in common are left out.
     """

@@ -1,4 +1,4 @@
-"""How evenly a rule of priority spreads waiting over the lanes."""
+"""How evenly a priority rule spreads waiting over the lanes."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from scenarios.studies.shared.study import Study
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Rules of priority that need no communication.
+#: Priority rules that need no communication.
 PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 STUDY = Study(
     "fairness",
-    "Which lanes wait under which rule of priority?",
+    "Which lanes wait under which priority rule?",
     fair_grid(PRIORITIES, (4,), DENSITIES),
 )
 
@@ -33,8 +33,8 @@ LANE_WAIT = "lanes_{}_complete_waiting_time_s"
 def gini(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
     """Gini's coefficient Σᵢⱼ wᵢwⱼ|xᵢ − xⱼ| / (2 Σwᵢ Σwᵢxᵢ) (Gini 1912, mean difference form).
 
-    It is 0 if all are equal or all are 0, and 1 − 1/n if one of n has everything.
-    Weights are > 0 in sum, such as the trips behind each mean, and equal by default. `InputError`
+    It is 0 if all values are equal, and 1 − 1/n if one of n has everything. Weights, such as the
+    trips behind each mean, have a sum > 0; they are equal by default. `InputError`
     for no value, a negative one, or weights that do not match.
     """
     xs = numbers("values", values)

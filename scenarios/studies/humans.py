@@ -33,9 +33,9 @@ STUDY = Study(
 
 
 def delays(rows: pd.DataFrame, group: str) -> pd.Series[float]:
-    """Time loss and departure delay [s] of "human" or "automated" vehicles, one value a row.
+    """Time loss and departure delay [s] of "human" or "automated" vehicles, one value per row.
 
-    NaN where there is no such vehicle.
+    NaN if there is no such vehicle.
     """
     import pandas as pd
 

@@ -1,6 +1,7 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell holds the runs that differ only in their seed.
+A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed are
+draws like others: their cell has their mean density.
 """
 
 from __future__ import annotations
@@ -10,8 +11,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Final
 
 from minisim.errors import InputError, choice
-from minisim.results.metrics import AVERAGED, Metric
-from minisim.results.summary import GROUPS
+from minisim.results.metrics import BEGINNINGS, Metric
 from scenarios.statistics import FILLING, mean_interval, prediction_interval
 from scenarios.sweep.rows import grows
 
@@ -20,26 +20,15 @@ if TYPE_CHECKING:
 
 #: Columns that name a cell.
 CELL: Final = (
-    "scenario",
-    "arms",
-    "side",
-    "profile",
-    "split",
-    "turns",
-    "density",
-    "horizon_s",
-    "warmup_s",
+    "scenario", "arms", "side", "profile", "split", "turns", "density", "horizon_s", "warmup_s",
     "controller",
-)
+)  # fmt: skip
 
 #: Summed over the runs of a cell.
 SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are not metrics.
-OTHERS: Final = ("seed", "growing", "arrivals", "cpu_s", "version", "error")
-
-#: Prefixes of the columns for groups of trips.
-GROUPED: Final = tuple(f"{key}_" for key in GROUPS.values())
+OTHERS: Final = ("recipe", "seed", "growing", "arrivals", "cpu_s", "version", "error")
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
@@ -52,11 +41,14 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
         run (`…_pi95`), NaN where unknown; `growing`, whether the queues of all runs together kept
         growing; `too_short`, whether the runs are too short to tell; `cpu_s`, mean processor time
         of a run.
+
+    Raises:
+        InputError: rows of one cell that differ in more than their seed, or have the same one.
     """
     import pandas as pd
 
     made = []
-    for names, group in rows.groupby(list(CELL), sort=False):
+    for names, group in _checked(rows).groupby(list(CELL), sort=False):
         good = group[group["error"].isna()]
         cell: dict[str, object] = dict(zip(CELL, names, strict=True))
         cell |= {"runs": len(good), "failed": len(group) - len(good)}
@@ -66,15 +58,37 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(made)
 
 
-def averaged(rows: pd.DataFrame) -> tuple[str, ...]:
+def _checked(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows whose cells hold runs that differ in their seed alone; raises `InputError`."""
+    rows = rows.reset_index(drop=True)
+    named = [column for column in CELL if column != "density"]
+    for _, draws in rows[rows["split"] == "recorded"].groupby(named):
+        if draws["density"].nunique() > 1 and draws["seed"].is_unique:
+            rows.loc[draws.index, "density"] = round(draws["density"].mean(), 6)
+    for _, group in rows.groupby(list(CELL), sort=False):
+        first = group.iloc[0]
+        what = f"{first['controller']} on {first['scenario']} at {first['density']:g} veh/h/lane"
+        if "recipe" in group and group["recipe"].nunique() > 1:
+            raise InputError(
+                f"different controllers or scenarios are called {what}; give each its own label or "
+                "name"
+            )
+        if not group["seed"].is_unique:
+            twice = group["seed"][group["seed"].duplicated()].iloc[0]
+            raise InputError(f"{what} has several runs of seed {twice}; keep one of them")
+    return rows
+
+
+def averaged(rows: pd.DataFrame) -> list[str]:
     """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
-    known = {*CELL, *SUMS, *OTHERS, *AVERAGED, "host"}
-    more = [
+    known = {*CELL, *SUMS, *OTHERS, "host"}
+    return [
         column
         for column in rows.columns
-        if column not in known and not column.startswith(GROUPED) and _is_numeric(rows[column])
+        if column not in known
+        and not column.startswith(BEGINNINGS[1:])  # of groups of trips
+        and _is_numeric(rows[column])
     ]
-    return (*AVERAGED, *more)
 
 
 def _is_numeric(column: pd.Series[Any]) -> bool:
@@ -91,10 +105,12 @@ def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: st
         first controller's value less the second's) and `difference_ci95`.
 
     Raises:
-        InputError: an unknown metric or controller, or two runs of one seed whose arrivals differ.
+        InputError: an unknown metric or controller, two runs of one seed whose arrivals differ, or
+            rows that `cells` refuses.
     """
     import pandas as pd
 
+    rows = _checked(rows)
     metric = metric.name if isinstance(metric, Metric) else metric
     choice("metric", metric, averaged(rows))
     for name in (first, second):
@@ -128,10 +144,13 @@ def pairs(
         by: columns that name a cell.
 
     Raises:
-        InputError: two runs of one seed whose arrivals differ.
+        InputError: two runs of one seed whose arrivals differ, or two of one controller and seed.
     """
     good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
     one, other = (good[good[column] == name] for name in names)
+    for name, runs in zip(names, (one, other), strict=True):
+        if runs.duplicated([*by, "seed"]).any():
+            raise InputError(f"{name} has several runs of one seed; {', '.join(by)} are the same")
     both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
     if (both["arrivals"] != both["arrivals_other"]).any():
         raise InputError(f"{' and '.join(names)} did not meet the same arrivals")

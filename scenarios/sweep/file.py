@@ -6,6 +6,8 @@
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
     # humans = [0, 0.2]                 # with controllers of DIM only
+    # arrivals = "count.csv"            # a table to replay, instead of density, split and turns,
+    # start = "07:00"                   # which begins at a time of day
 
     [[experiment]]                      # the lines above hold here too
     scenario = "four-way"
@@ -30,12 +32,25 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from minisim.arrivals import read_arrivals
-from minisim.errors import FileError, InputError, MinisimError, choice, instance, integer, show
+from minisim.arrivals import MAX_TIME
+from minisim.errors import (
+    FileError,
+    InputError,
+    MinisimError,
+    choice,
+    instance,
+    integer,
+    number,
+    show,
+)
+from minisim.files import read_file
 from minisim.hosting import ON_COLLISION
-from minisim.results.metrics import named_metrics
+from minisim.hosting import start as started
+from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
-from scenarios.library import scenario_named
+from scenarios.defaults import AXES, CUSTOM, SINGLE
+from scenarios.library import DRAWN, scenario_named
+from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
@@ -44,34 +59,8 @@ from scenarios.sweep.rows import identity_of
 #: More are surely a typing error.
 MAX_RUNS = 1_000_000
 
-#: Key that may have a list -> its default. Every combination is run.
-AXES: dict[str, Any] = {
-    "scenario": "four-way",
-    "side": "left",
-    "profile": "paper",
-    "model": "poisson",
-    "split": "balanced",
-    "turns": "uniform",
-    "density": 350.0,
-    "arrivals": None,
-    "controller": "dim",
-    "humans": 0.0,
-    "seeds": 10,
-}
-#: Key with one value for a block -> its default.
-SINGLE: dict[str, Any] = {
-    "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
-    "metrics": (),
-}  # fmt: skip
-
-#: Keys that recorded arrivals replace.
-DRAWN = ("density", "split", "turns", "model", "min_headway")
-
 #: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of either form.
 SHARES = ("split", "turns")
-
-#: An example of a custom junction.
-CUSTOM = '{ name = "custom", bearings = [0, 80, 190, 260] }'
 
 #: Keys of a scenario's table.
 JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_length")
@@ -87,9 +76,7 @@ def read_experiments(
         InputError: an unknown key (with the nearest one), a value that is not allowed, or a
             combination that cannot be run; the message names file, block and key.
     """
-    instance("experiment file", path, (str, os.PathLike))
-    place = os.fspath(path)
-    table = _load(path)
+    table, place = _load(path), os.fspath(path)
     blocks = table.pop("experiment", [{}])
     given = {"seeds": seeds, "horizon": horizon}
     overrides = {key: value for key, value in given.items() if value is not None}
@@ -97,6 +84,9 @@ def read_experiments(
         _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
         if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
             raise InputError("experiments are written [[experiment]], with two brackets")
+        for key in table:
+            if all(key in block for block in blocks):
+                raise InputError(f"{key} above the blocks is never used: each has its own")
     recipes: dict[str, Recipe] = {}
     for count, block in enumerate(blocks, start=1):
         with _at(f"{place}: [[experiment]] {count}" if len(blocks) > 1 else place):
@@ -106,7 +96,10 @@ def read_experiments(
                     "the file does not say what to run; name a scenario, a controller and a "
                     "density, or any other of " + ", ".join((*AXES, *SINGLE))
                 )
-            for recipe in _recipes({**table, **block, **overrides}, Path(path).parent):
+            said = {**table, **block}
+            _seeds(said.get("seeds", 1))  # what the command line replaces is checked all the same
+            number("horizon [s]", said.get("horizon", 1.0), above=0, high=MAX_TIME)
+            for recipe in _recipes({**said, **overrides}, Path(path).parent):
                 recipes.setdefault(key_of(recipe), recipe)
     with _at(place):
         _check_names(recipes.values())
@@ -123,7 +116,7 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
     for recipe in first.values():
         scenario = recipe.scenario
         try:
-            recipe.driven.start(scenario.site(recipe.seed))
+            started(recipe.driven, scenario.site(recipe.seed))
         except MinisimError as error:
             raise InputError(
                 f"{recipe.name} cannot serve {scenario.name} at {scenario.density:g} veh/h/lane, "
@@ -133,13 +126,9 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
 
 def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
-        with open(path, "rb") as file:
-            return tomllib.load(file)
-    except tomllib.TOMLDecodeError as error:
+        return tomllib.loads(read_file("experiments", path).decode())
+    except (ValueError, RecursionError) as error:
         raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
-    except (OSError, ValueError, RecursionError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"cannot read experiments from {os.fspath(path)}: {reason}") from error
 
 
 def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
@@ -149,13 +138,15 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         if clash:
             raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
+    if "min_headway" in block and "shifted" not in axes["model"]:
+        raise InputError("min_headway goes with the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
     count = prod(map(len, axes.values()))
     if count > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
     reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
-    metrics = named_metrics(single.pop("metrics"))
+    metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
         scenario = _scenario({**dict(zip(axes, values, strict=True)), **single}, folder)
@@ -169,7 +160,11 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
-    recorded = chosen.pop("arrivals")
+    recorded, start = chosen.pop("arrivals"), chosen.pop("start")
+    if recorded is None and start is not None:
+        raise InputError("start goes with arrivals: it is a time in the table")
+    if chosen["model"] != "shifted":
+        del chosen["min_headway"]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
         _check_keys("key of a scenario", junction, JUNCTION)
@@ -179,7 +174,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        made = replace(made, recorded=read_arrivals(folder / recorded, made.intersection.n))
+        table = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
+        made = replace(made, recorded=table)
     return replace(made, name=label or made.name)
 
 

@@ -8,10 +8,10 @@ import json
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from numbers import Integral, Real
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,18 @@ def description_of(recipe: Recipe) -> str:
 def key_of(recipe: Recipe) -> str:
     """The key of a recipe in a store; raises `InputError` as `canonical`."""
     return digest_of(description_of(recipe))
+
+
+def content_of(recipe: Recipe) -> str | None:
+    """A digest of what runs, whatever it is called; None if it cannot be described.
+
+    Equal for runs that differ in nothing but their seed and, if so, their recorded arrivals.
+    """
+    scenario = replace(recipe.scenario, recorded=None)
+    try:
+        return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]
+    except InputError:
+        return None
 
 
 def digest_of(description: str) -> str:
@@ -75,12 +87,12 @@ def canonical(value: object) -> Any:
             **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
         }
     if inspect.isfunction(value):
+        code = _code(value)
         return {
             "function": f"{value.__module__}.{value.__qualname__}",
-            "line": value.__code__.co_firstlineno,  # tells two lambdas apart
             "defaults": canonical([value.__defaults__, value.__kwdefaults__]),
             "encloses": canonical([cell.cell_contents for cell in value.__closure__ or ()]),
-            **_code(value),
+            **(code if "version" in code else {"rule": _rule(value), **code}),
         }
     if isinstance(value, tuple | list):
         return [canonical(item) for item in value]
@@ -90,9 +102,31 @@ def canonical(value: object) -> Any:
     if isinstance(value, set | frozenset):
         return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
     raise InputError(
-        f"{show(value)} cannot be stored: recipes are made of dataclasses, numbers, texts, "
-        "functions, arrays and collections of them"
+        f"{show(value)} cannot be stored: {type(value).__qualname__} is no dataclass, so its "
+        "parameters are not known; make it a frozen dataclass, whose fields are numbers, texts, "
+        "functions, arrays, other dataclasses, and collections of them"
     )
+
+
+def _rule(function: FunctionType) -> str:
+    """A digest of a function's instructions, its constants and the plain globals that it reads.
+
+    It tells apart two functions of one name in one file, such as lambdas.
+    """
+
+    def told(code: CodeType) -> list[Any]:
+        known = {name: function.__globals__.get(name) for name in code.co_names}
+        return [
+            code.co_code, code.co_names, [constant(value) for value in code.co_consts],
+            {name: it for name, it in known.items() if isinstance(it, bool | int | float | str)},
+        ]  # fmt: skip
+
+    def constant(value: object) -> Any:
+        if isinstance(value, CodeType):
+            return told(value)
+        return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+    return digest_of(repr(told(function.__code__)))
 
 
 @cache
@@ -103,7 +137,8 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     in its session, so the whole file counts, but not what it imports.
 
     Raises:
-        InputError: neither a version nor a file, as in an interactive session.
+        InputError: neither a version nor a file, as in an interactive session; or a class without a
+            version that a function has made, perhaps with values that are in no field.
     """
     modules = sorted({
         parent.__module__
@@ -115,6 +150,12 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
     version = getattr(kind, "version", None)
     if isinstance(version, str | int):
         return {"version": canonical(version)}
+    if isinstance(kind, type) and "<locals>" in kind.__qualname__:
+        raise InputError(
+            f"{kind.__qualname__} cannot be stored: a function makes this class, and may give it "
+            "values that are in none of its fields; move it to the top of its module, or give it a "
+            "`version` that says what it was made with"
+        )
     try:
         texts = "".join(inspect.getsource(sys.modules[name]) for name in modules)
     except (OSError, TypeError, KeyError) as error:

@@ -23,6 +23,7 @@ from functools import partial
 from itertools import islice
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
+from multiprocessing.resource_tracker import ensure_running
 from queue import SimpleQueue
 from typing import TypeVar
 
@@ -213,7 +214,8 @@ def _results(
                     yield refused
             yield k, result
     finally:
-        for future in running.values():
+        # Our own processes end with their runs; their pool fails over a run that is cancelled.
+        for future in () if isinstance(executor, _Processes) else running.values():
             future.cancel()
 
 
@@ -229,6 +231,7 @@ def _uninterrupted() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
+    ensure_running()  # or the first process would start it, and that ends the delay
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

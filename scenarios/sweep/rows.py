@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from minisim.arrivals import BALANCED, UNIFORM, shares_text
 from minisim.errors import MinisimError
 from minisim.junction.movements import ARM_NAMES
+from minisim.results.run import environment
 from minisim.results.trips import Trips
-from minisim.version import __version__
 from scenarios.recipe import Recipe
 from scenarios.statistics import growing
 from scenarios.sweep.keys import RESULTS, results_version
@@ -43,8 +44,8 @@ def identity_of(recipe: Recipe) -> Row:
         "side": intersection.side,
         "profile": scenario.profile.name,
         "density": scenario.density,
-        "split": "recorded" if recorded else _shares(demand.split, "balanced"),
-        "turns": "recorded" if recorded else _shares(demand.turns, "uniform"),
+        "split": "recorded" if recorded else shares_text(demand.split, BALANCED),
+        "turns": "recorded" if recorded else shares_text(demand.turns, UNIFORM),
         "seed": recipe.seed,
         "horizon_s": scenario.horizon,
         "warmup_s": scenario.warmup,
@@ -96,13 +97,7 @@ def _fingerprint(trips: Trips) -> str:
 
 
 def _provenance() -> dict[str, str]:
-    return {
-        "minisim": __version__,
-        "results": str(RESULTS),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "machine": platform.machine(),
-    }
+    return {**environment(), "results": str(RESULTS), "machine": platform.machine()}
 
 
 def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -111,7 +106,3 @@ def _flat(summary: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
             yield from _flat(value, f"{prefix}{key}_")
         else:
             yield f"{prefix}{key}", value
-
-
-def _shares(shares: Any, equal: str) -> str:
-    return equal if shares is None else ":".join(f"{share:g}" for share in shares)

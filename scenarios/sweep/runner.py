@@ -12,9 +12,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minisim.errors import ExecutorError, InputError, instance, integer, show
-from minisim.results.metrics import Metric, asked_metrics
+from minisim.results.metrics import Asked
+from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
-from scenarios.sweep.keys import key_of
+from scenarios.sweep.keys import content_of, key_of
 from scenarios.sweep.pool import given, handed, pooled
 from scenarios.sweep.rows import Row, failed, outcome_of
 from scenarios.sweep.store import Store
@@ -35,7 +36,7 @@ def sweep(
     *,
     jobs: int | None = None,
     store: Store | None = None,
-    metrics: Iterable[str | Metric] = (),
+    metrics: str | Iterable[Asked] = (),
 ) -> pd.DataFrame:
     """Run all recipes and return one row each, in their order.
 
@@ -51,15 +52,16 @@ def sweep(
         progress: called in this process with the number of finished runs and that of all.
         jobs: processes of the pool, one a core by default; 1 runs in this process.
         store: rows go there as they come, and rows that it has are not computed again.
-        metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`, or
-            `Metric`s of your own. Several processes need its function in a module that they can
-            import.
+        metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`,
+            `Metric`s or functions of your own, or `module:name` of these. Several processes need
+            the function in a module that they can import.
 
     Returns:
         What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
         ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
         (`scenarios.statistics.growing`, with its limits), `arrivals` (equal for common arrivals),
-        `cpu_s`, `version`, and `error`: why a run failed, missing where it did not.
+        `cpu_s`, `version`, `error`: why a run failed, missing where it did not, and `recipe`
+        (`scenarios.sweep.keys.content_of`).
 
     Raises:
         InputError: something other than a `Recipe` or a `Store`, or a controller or metric that
@@ -70,7 +72,7 @@ def sweep(
     """
     import pandas as pd
 
-    added = asked_metrics(metrics)
+    added = metrics_named(metrics)
     todo = _checked(recipes)
     if added:
         todo = [replace(recipe, metrics=(*recipe.metrics, *added)) for recipe in todo]
@@ -120,6 +122,7 @@ def finished(
                 lost += 1
                 continue
             outcome = failed(todo[k], result) if isinstance(result, BaseException) else result
+            outcome.row["recipe"] = content_of(todo[k])
             if store is not None:
                 store.put(todo[k], outcome)
             yield k, outcome.row
@@ -158,7 +161,8 @@ def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
     its row says why.
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
-        scenario = replace(recipe.scenario, horizon=recipe.scenario.profile.dt, warmup=0.0)
+        dt = recipe.scenario.profile.dt
+        scenario = replace(recipe.scenario, horizon=dt, warmup=0.0, recorded=None)
         try:
             tried = handed(pool, outcome_of, replace(recipe, scenario=scenario))
         except BrokenExecutor:

@@ -122,16 +122,25 @@ class Store:
             return {key: self._row(row) for key, row in rows if key in wanted}
 
     def __len__(self) -> int:
-        with self._guarded("read"):
-            (count,) = self._database.execute("SELECT count(*) FROM runs").fetchone()
-        return int(count)
+        return self._count("")
+
+    @property
+    def outdated(self) -> str:
+        """How many rows of other versions of the results there are, in words; empty if none."""
+        if not (count := self._count(f" WHERE version != '{results_version()}'")):
+            return ""
+        rows = "1 row" if count == 1 else f"{count} rows"
+        return f"{self.path} also keeps {rows} of another version of minisim, not used here"
 
     def frame(self) -> pd.DataFrame:
-        """All rows with the columns of `sweep`, sorted by `ORDER`."""
+        """All rows but outdated ones, with the columns of `sweep`, sorted by `ORDER`."""
         import pandas as pd
 
         with self._guarded("read"):
-            rows = [self._row(row) for (row,) in self._database.execute("SELECT row FROM runs")]
+            found = self._database.execute(
+                "SELECT row FROM runs WHERE version = ?", (results_version(),)
+            )
+            rows = [self._row(row) for (row,) in found]
         frame = pd.DataFrame(rows)
         return frame.sort_values(list(ORDER), ignore_index=True) if rows else frame
 
@@ -158,6 +167,11 @@ class Store:
         self._database.execute("PRAGMA journal_mode = WAL")
         self._database.execute("PRAGMA synchronous = FULL")
         self._database.execute(f"PRAGMA busy_timeout = {round(1000 * PATIENCE)}")
+
+    def _count(self, which: str) -> int:
+        with self._guarded("read"):
+            (count,) = self._database.execute(f"SELECT count(*) FROM runs{which}").fetchone()
+        return int(count)
 
     def _row(self, text: str) -> Row:
         try:

@@ -24,6 +24,7 @@ from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES, Movement
 from minisim.testing import check_controller, small_scenario
 from scenarios import four_way
+from scenarios.cli import main
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import description_of, key_of
 from tests import ROOT
@@ -212,10 +213,18 @@ def test_one_at_a_time_is_what_it_does(module: ModuleType) -> None:
     assert counts.max() == 1
 
 
-def test_its_metric_is_measured() -> None:
+def test_its_metric_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     made: dict[str, Any] = {}
     exec(example("Add a metric"), made)
     run = minisim.simulate(four_way(300, horizon=120.0), Dim(), 1)
     complete = run.summary(metrics=[made["delay"]])["complete"]
     expected = float((run.columns.time_loss + run.columns.depart_delay).mean())
     assert complete["delay_s"] == pytest.approx(expected)
+    (tmp_path / "guide_metric.py").write_text(example("Add a metric"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    run_it = "run four-way -d 300 --horizon 120 -s 1 --json --metrics guide_metric:delay"
+    assert main(run_it.split()) == 0
+    assert json.loads(capsys.readouterr().out)["complete"]["delay_s"] == complete["delay_s"]
+    del sys.modules["guide_metric"]

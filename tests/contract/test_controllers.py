@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
 import pytest
 
 import minisim
@@ -36,6 +37,7 @@ from minisim.errors import InputError
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
 from minisim.vehicle import VehicleType
+from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
 from tests.builders import as_run
 
@@ -106,6 +108,21 @@ def test_the_published_rules_keep_the_contract_but_for_collisions(controller: Co
         return minisim.simulate(as_run(scenario), controller, seed, **options)
 
     check_controller(controller, horizon=120.0, collision_free=False, host=run)
+
+
+def before(run: Run, time: float) -> pd.DataFrame:
+    """The trips that were over by then."""
+    return run.trips[run.trips["arrival_s"] < time]
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
+def test_what_happens_does_not_depend_on_the_horizon(controller: Controller) -> None:
+    short, long = (
+        minisim.simulate(four_way(300, profile="fair", arm_length=200.0, horizon=t), controller, 3)
+        for t in (120.0, 180.0)
+    )
+    assert len(before(short, 120.0)) > 10
+    pd.testing.assert_frame_equal(before(short, 120.0), before(long, 120.0))
 
 
 def test_the_contract_without_safety() -> None:

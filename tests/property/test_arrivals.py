@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minisim.arrivals import Arrivals, Demand, read_arrivals, write_arrivals
+from minisim.arrivals import Arrivals, Demand
 from minisim.errors import FileError
+from minisim.recorded import read_arrivals, write_arrivals
 from minisim.streams import stream
 from scenarios.strategies import demands, floats
 
@@ -64,12 +67,48 @@ def test_drawn_tables_are_sorted_within_the_duration_and_fit_the_geometry(
     assert all(rates[lane] > 0 for lane in set(table.lane.tolist()))
 
 
-@given(demands(N), st.integers(0, 2**32))
-def test_a_longer_run_begins_with_the_same_arrivals(demand: Demand, seed: int) -> None:
-    """Only lane a: the other lanes draw after it from the same stream."""
-    short, long = (demand.draw(N, t, seed) for t in (100.0, 200.0))
-    first = long.time[(long.lane == 0) & (long.time < 100.0)]
-    np.testing.assert_array_equal(short.time[short.lane == 0], first)
+def rows(table: Arrivals) -> list[tuple[float, int, int]]:
+    """Each vehicle's demand time, lane and manoeuvre."""
+    columns = table.time.tolist(), table.lane.tolist(), table.manoeuvre.tolist()
+    return list(zip(*columns, strict=True))
+
+
+@given(demands(N), st.integers(0, 2**32), floats(1.0, 5000.0), floats(0.0, 5000.0))
+def test_a_longer_duration_only_adds_arrivals(
+    demand: Demand, seed: int, duration: float, more: float
+) -> None:
+    short, long = (rows(demand.draw(N, t, seed)) for t in (duration, duration + more))
+    assert long[: len(short)] == short
+    assert all(time >= duration for time, *_ in long[len(short) :])
+
+
+@given(demands(N, 300.0), st.integers(0, 2**32), st.integers(0, N - 1), floats(0.1, 2.0))
+def test_the_rate_of_a_lane_changes_no_other(
+    demand: Demand, seed: int, lane: int, factor: float
+) -> None:
+    """With the other rates as they are: as numbers, not as shares of another total."""
+    split = [factor if k == lane else 1.0 for k in range(N)]
+    density = 200.0 * sum(split) / N
+    one = replace(demand, density=200.0, split=None).draw(N, 1000.0, seed)
+    other = replace(demand, density=density, split=split).draw(N, 1000.0, seed)
+    for k in set(range(N)) - {lane}:
+        mine, theirs = ([row for row in rows(it) if row[1] == k] for it in (one, other))
+        np.testing.assert_allclose(mine, theirs, rtol=1e-9)  # rates differ by rounding
+
+
+@given(demands(N, 300.0), st.integers(0, 2**32), floats(1.0, 3.0))
+def test_more_inflow_only_adds_poisson_arrivals(demand: Demand, seed: int, factor: float) -> None:
+    fewer = replace(demand, model="poisson")
+    more = replace(fewer, density=demand.density * factor)
+    at = [Counter(zip(d.time, d.lane, strict=True)) for d in
+          (it.draw(N, 600.0, seed) for it in (fewer, more))]  # fmt: skip
+    assert at[0] <= at[1]
+
+
+@given(tables())
+def test_ranks_count_the_vehicles_of_each_lane(table: Arrivals) -> None:
+    for lane in range(N):
+        assert table.rank[table.lane == lane].tolist() == list(range(sum(table.lane == lane)))
 
 
 @given(st.integers(0, 2**128), st.integers(0, 2**128))

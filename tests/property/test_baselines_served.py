@@ -38,7 +38,7 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     ),
     "adaptive": st.builds(
         Adaptive,
-        detector_range=floats(5.0, 200.0),
+        detector_range=floats(15.0, 200.0),
         min_time_loss=floats(0.0, 5.0),
         extend_max_green=st.booleans(),
         **GREENS,
@@ -48,10 +48,11 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
         max_gap=floats(0.0, 10.0),
         detector_gap=floats(0.1, 20.0),
         passing_time=floats(0.1, 5.0),
+        presence=st.booleans(),
         **GREENS,
     ),
     "longest-queue": st.builds(
-        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(5.0, 200.0), amber=AMBERS
+        LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
     ),
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),

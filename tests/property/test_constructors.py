@@ -18,11 +18,12 @@ import scenarios
 from baselines import webster, webster_delay
 from dim import HarmonyMatrix, explain
 from minisim import simulate
-from minisim.arrivals import Arrivals, Demand, read_arrivals
+from minisim.arrivals import Arrivals, Demand
 from minisim.control import Marking, Site, Unregulated
 from minisim.errors import MinisimError
 from minisim.junction.geometry import Intersection
 from minisim.parameters import parameters
+from minisim.recorded import read_arrivals
 from minisim.streams import stream
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named

@@ -62,7 +62,7 @@ def refused(it: Parameter) -> list[Any]:
     if it.words:
         return [object(), "no such word", 1]
     if it.allowed == "true | false":
-        return [object(), 1, "true"]
+        return [object(), 1, "yes"]
     said = RANGE.fullmatch(it.allowed)
     if said is None:
         return [object()]
@@ -91,6 +91,34 @@ def test_what_is_ruled_out_is_refused_by_name(name: str) -> None:
         assert title in message
         assert "\n" not in message
         assert len(message) < 400
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_misspelt_parameter_gets_the_nearest_name(name: str) -> None:
+    kind, (field, _, _) = ALL[name]
+    with pytest.raises(InputError, match=f"unknown {kind.__name__} parameter.*; did you mean "):
+        kind(**{f"{field}x": 1})
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_what_has_no_order_is_no_sequence(name: str) -> None:
+    """Or anything else: no parameter is a set, and only recipes and texts may be tables."""
+    _, (field, it, _) = ALL[name]
+    tables = it.kinds or name == "Recipe.controller"
+    for value in ({0, 1, 2, 3}, frozenset(), {}.keys(), *(() if tables else ({}, {0: 1, 1: 0}))):
+        with pytest.raises(InputError):
+            it.check(it.title(field), value)
+
+
+@pytest.mark.parametrize("name", [name for name, (_, it) in ALL.items() if "text" in it[1].allowed])
+@pytest.mark.parametrize("value", ["a\0", "a\nb", "\x1b[31m", "\ud800", "\u202e"])
+def test_texts_can_be_printed(name: str, value: str) -> None:
+    _, (field, it, default) = ALL[name]
+    with pytest.raises(InputError, match="must be a text of one line, without control characters"):
+        it.check(it.title(field), value)
+    if default != "":
+        with pytest.raises(InputError, match="must be a text that is not empty"):
+            it.check(it.title(field), "")
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -22,9 +22,8 @@ import pytest
 from hypothesis import given
 
 import minisim
-from baselines import V2IC, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
+from baselines import V2IC, Actuated, Adaptive, AllWayStop, FixedTime, LongestQueue, Reservation
 from dim import Dim, Mixed, NoisyPerception
-from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
     Brake,
@@ -50,7 +49,7 @@ from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
-from tests.builders import Fixed, Scripted, hardest_braking, replayed, share
+from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
 
 FAIR_FOUR = four_way(100, profile="fair")
 
@@ -94,6 +93,23 @@ CONTROLLERS: tuple[Controller, ...] = (
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
 def test_controllers_keep_their_contract_in_sumo(controller: Controller) -> None:
     check_controller(controller, arms=(4,), horizon=60.0, host="sumo")
+
+
+def test_the_horizon_is_exclusive() -> None:
+    scenario = replayed(FAIR_FOUR, *((t, 0, 2) for t in (0.0, 90.0, 90.0, 91.0)), horizon=90.0)
+    summary = simulate(scenario, Unregulated()).summary()
+    assert (summary["trips"], summary["unfinished"]) == (1, 0)
+
+
+def test_what_happens_does_not_depend_on_the_horizon() -> None:
+    profile = replace(FAIR, vehicle=replace(FAIR.vehicle, speed_deviation=0.1))
+    road = four_way(300, profile=profile, arm_length=200.0)
+    short, long = (
+        simulate(replace(road, horizon=t), Mixed(share=0.5), 3).trips for t in (80.0, 110.0)
+    )
+    over = short["arrival_s"] < 80.0
+    assert over.sum() > 5
+    assert short[over].equals(long[: len(short)][over])
 
 
 @pytest.mark.slow
@@ -464,7 +480,7 @@ def boom() -> None:
 @pytest.mark.parametrize(
     ("act", "error", "message"),
     [
-        (boom, ZeroDivisionError, "boom"),
+        (boom, ControllerError, "'saboteur' at 10.0 s: .*ZeroDivisionError: boom"),
         (lambda: (Go(7),), ControllerError, r"'saboteur' at 10.0 s: vehicle must be .* 0 … 0"),
         (lambda: (Open(4),), ControllerError, r"at 10.0 s: lane must be .* 0 … 3"),
         (lambda: (Wake(10.0),), ControllerError, "wake-up time 10 s is not after 10 s"),
@@ -660,22 +676,31 @@ def test_wrong_options_are_one_line(
     assert (captured.out, captured.err.count("\n")) == ("", 1)
 
 
+#: Second, lane and manoeuvre of each vehicle.
+SCENES = (
+    "1b3 2c3 5d1 10c3 10c1 19a2 20c2 22c3 24d3 27c1 30c3 34b3 35b1 38a1 39a3 40a3 40c1 43a3 47d3 "
+    "49d2 52d1 53d1 56b3 58d2 68b3 71c3 74a2 75b1 79b1 81b1 83a2 83c3 95b3 95c1 100c2 103a2 104b1 "
+    "107c2 108b2 109d3 110b3 114c1 117a2 128b3 137c1 144c2 145b2 146c2 148a1 148d2 156c2 158b3 "
+    "158b3 158d1 159d3 160c2 161c1 164c1 167d3 168c1 168d1 171c3 172d2 175b1 179b1 181c3 181d3 "
+    "187a2",
+    "4a2 8d1 18a3 30d3 33b2 39b2 67a3 74a1 75c2 77a3 84d1 85c3 87d2 88b1 92d1 102a1 103d3 108c3 "
+    "114c2 121b2 125c1 143a3 154b2 162a3 162a2 164d3 165b3 167c1 169b2 174c1 186d2 203d1",
+)
+
+
 @pytest.mark.parametrize(
-    ("density", "seed", "horizon", "merging"), [(300.0, 202, 190.0, 49), (150.0, 201, 850.0, 126)]
+    ("scene", "horizon", "merging"), [(SCENES[0], 190.0, 49), (SCENES[1], 205.0, 24)]
 )
 def test_a_crossed_vehicle_still_follows_into_its_exit(
-    density: float, seed: int, horizon: float, merging: int
+    scene: str, horizon: float, merging: int
 ) -> None:
     """While one vehicle crosses, SUMO ignores all in the junction, even the one to merge behind.
 
     Each of these vehicles holds a reservation right behind another into the same exit, while a
     third drives across. It did not see the other in time and ran into it, or in front of a fourth.
     """
-    full = four_way(density, profile="fair")
-    arrivals = full.arrivals(seed)
-    early = arrivals.time < horizon
-    recorded = Arrivals(arrivals.time[early], arrivals.lane[early], arrivals.manoeuvre[early])
-    scenario = replace(full, horizon=horizon, recorded=recorded)
+    trips = [(float(it[:-2]), "abcd".index(it[-2]), int(it[-1])) for it in scene.split()]
+    scenario = replayed(four_way(profile="fair"), *trips, horizon=horizon)
     window = (horizon - 30.0, horizon)
     ours, theirs = both(scenario, Reservation(), record="all", record_window=window)
     assert theirs.collisions == ()
@@ -684,3 +709,11 @@ def test_a_crossed_vehicle_still_follows_into_its_exit(
         for run in (ours, theirs)
     ]
     assert max(slowest) < 1.0
+
+
+@pytest.mark.parametrize("signal", [Actuated(), Adaptive()])
+def test_no_green_ends_in_sumo_while_its_queue_stands(signal: Controller) -> None:
+    watched = Greens(signal)
+    simulate(queues(VehicleType(length=6.0)), watched)
+    assert watched.left
+    assert not any(watched.left)

@@ -41,7 +41,7 @@ from tests.builders import replayed
 OURS: dict[str, Controller] = {
     "fixed-time": FixedTime(),
     "adaptive": Adaptive(),
-    "actuated": Actuated(),
+    "actuated": Actuated(presence=False),
     "all-way-stop": AllWayStop(),
 }
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)

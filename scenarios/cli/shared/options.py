@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -43,6 +44,7 @@ ProfileName = Annotated[
 Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
 Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Of the random arrivals; 0 unless told.", "N", "--seed", "-s")]
+Horizon = Annotated[float, option("Simulated time; 3600 unless told.", "S")]
 Order = Annotated[
     str,
     typer.Option(
@@ -69,28 +71,47 @@ Arrivals = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
+Start = Annotated[
+    str | None,
+    option("Begin at this time in the table.", "07:00", rich_help_panel=FILES),
+]
+
 
 def processes(jobs: int | None) -> int:
     """The number of processes that --jobs asks for; one per core if it is not given."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
+def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
+    """Raise `InputError` for a value that an option has twice; None is an option not given."""
+    for option_name, values in given.items():
+        for k, value in enumerate(values or ()):
+            if value in (values or ())[:k]:
+                raise InputError(f"{option_name} {value} is given twice")
+
+
 def build_scenario(
-    name: str, bearings: str | None, arrivals: Path | None = None, **options: Any
+    name: str,
+    bearings: str | None,
+    arrivals: Path | None = None,
+    start: str | None = None,
+    **options: Any,
 ) -> Scenario:
     """The scenario that the options describe; None stands for an option that was not given."""
-    from minisim.arrivals import read_arrivals
+    from minisim.recorded import read_arrivals
     from scenarios.library import scenario_named
 
     given = {key: value for key, value in options.items() if value is not None}
     clash = [f"--{key}" for key in ("density", "split", "turns") if key in given]
     if arrivals is not None and clash:
         raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
+    if arrivals is None and start is not None:
+        raise InputError("--start goes with --arrivals: it is a time in the table")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made
     n = made.intersection.n
-    recorded = read_arrivals(arrivals, n)
+    recorded = read_arrivals(arrivals, n, start or 0.0)
     if len(recorded) >= ENOUGH:
         # A table from a junction with fewer arms is refused: its manoeuvres would mean other exits.
         arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)

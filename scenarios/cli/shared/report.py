@@ -9,9 +9,10 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from minisim.results.metrics import METRICS, SPREAD, Metric, heading
-from minisim.results.summary import GROUPS
+from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
+from minisim.results.show import conditions
 from scenarios.statistics import FILLING, Interval
+from scenarios.sweep.cells import SUMS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +29,9 @@ CELL_COLUMNS = (
     "waiting_time_s", "complete_waiting_time_s", "travel_time_s", "complete_depart_delay_s",
 )  # fmt: skip
 
+#: What else may tell cells of a sweep apart.
+APART = ("side", "turns", "horizon_s", "warmup_s")
+
 
 def run_parts(
     summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
@@ -38,32 +42,29 @@ def run_parts(
     """
     yield Text.assemble(
         (f"{summary['scenario']}, {summary['controller']}", "bold"),
-        f": {summary['density']:g} veh/h/lane, profile {summary['profile']}, "
-        f"seed {summary['seed']}, {summary['horizon_s']:g} s",
-        f" after a warm-up of {summary['warmup_s']:g} s" if summary["warmup_s"] else "",
-        "" if summary["host"] == "minisim" else f", host {summary['host']}",
+        f": {conditions(summary)}",
     )
     yield _run_table(summary, metrics, by)
     yield _safety(summary)
     if counts:
-        yield Text(
-            f"  crossings {counts['crossings']:g}   false grants {counts['false_grants']:g}   "
-            f"disagreement {counts['disagreement_s']:.1f} s   "
-            f"deadlock {counts['deadlock_s']:.1f} s"
-        )
+        yield Text("  " + "   ".join(_counted(name, value) for name, value in counts.items()))
     for metric in metrics:
-        if metric.per == "run" and not metric.grouped:
-            value = summary[metric.name]
-            shown = "–" if value is None else f"{value:g} {metric.unit}".rstrip()
-            yield Text.assemble(f"  {metric.title or metric.name} ", (shown, "bold"))
+        if metric.grouped or metric.name in {"collisions", *CLOSEST, *counts}:
+            continue
+        value = summary[metric.name]
+        why = " (counted only where perception errs)" if metric.needs == "counts" else ""
+        shown = f"–{why}" if value is None else f"{value:g} {metric.unit}".rstrip()
+        yield Text.assemble(f"  {metric.title or metric.name} ", (shown, "bold"))
+
+
+def _counted(name: str, value: float) -> str:
+    metric = METRICS.get(name)
+    return f"{metric.title} {value:g} {metric.unit}".rstrip() if metric else f"{name} {value:g}"
 
 
 def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -> Table:
-    """Means by group and in total, for the requested metrics or else the usual ones.
-
-    Requested metrics also have their percentiles.
-    """
-    columns = _run_columns(metrics)
+    """Means by group and in total, for the requested metrics or else the usual ones."""
+    columns = _columns(metrics, RUN_COLUMNS)
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column(by)
     for title in ("served", "unfinished", *columns.values()):
@@ -79,15 +80,18 @@ def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -
     return table
 
 
-def _run_columns(metrics: Sequence[Metric]) -> dict[str, str]:
-    """Column of a group of trips -> heading."""
+def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
+    """Column of a group of trips -> heading, of metrics with their percentiles or the usual ones.
+
+    Tables have a column for unfinished trips anyway.
+    """
     columns = {}
     for metric in metrics:
-        if metric.grouped and metric.name not in ("trips", "unfinished"):
+        if metric.grouped and metric.name != "unfinished":
             columns[metric.name] = metric.heading
         if metric.per == "trip":
             columns |= {f"{metric.name}_{what}": what for what in SPREAD}
-    return columns or {name: METRICS[name].heading for name in RUN_COLUMNS}
+    return columns or {name: heading(name) for name in usual}
 
 
 def _safety(summary: Mapping[str, Any]) -> Text:
@@ -113,16 +117,25 @@ def gallery_table(items: Iterable[Item]) -> Table:
     return table
 
 
-def sweep_table(cells: pd.DataFrame) -> Table:
-    """One line per cell: means over seeds with 95 % confidence intervals."""
+def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
+    """One line per cell: means over seeds with 95 % confidence intervals.
+
+    The columns are the usual ones or the metrics that the experiments ask for, and whatever tells
+    cells apart.
+    """
+    asked = {it.name: it for recipe in experiments for it in asked_metrics(recipe.metrics)}
+    columns = _columns(asked.values(), CELL_COLUMNS)
+    columns |= {it.name: it.heading for it in asked.values() if not it.grouped}
+    columns.pop("collisions", None)
+    apart = [name for name in APART if cells[name].nunique() > 1]
     table = Table(box=box.SIMPLE_HEAD)
-    for title in ("scenario", "profile", "split", "veh/h/lane", "controller"):
+    for title in ("scenario", "profile", "split", *apart, "veh/h/lane", "controller"):
         table.add_column(title, no_wrap=True)
-    headings = map(heading, CELL_COLUMNS)
-    for title in ("runs", *headings, "unfinished", "collisions", ""):
+    for title in ("runs", *columns.values(), "unfinished", "collisions", ""):
         table.add_column(title, justify="right", no_wrap=True)
     for cell in cells.to_dict("records"):
-        named = (cell["scenario"], cell["profile"], cell["split"], f"{cell['density']:g}")
+        parts = (cell[name] for name in ("scenario", "profile", "split", *apart, "density"))
+        named = [part if isinstance(part, str) else f"{part:g}" for part in parts]
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
         if cell["runs"]:
             collisions = int(cell["collisions"])
@@ -131,7 +144,7 @@ def sweep_table(cells: pd.DataFrame) -> Table:
                 *named,
                 cell["controller"],
                 f"{cell['runs']}{failed}",
-                *(_interval(cell, metric) for metric in CELL_COLUMNS),
+                *(_interval(cell, column) for column in columns),
                 f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
                 Text(str(collisions), style="bold red" if collisions else ""),
                 Text(unsettled, style="yellow"),
@@ -184,6 +197,8 @@ def _interval(cell: Mapping[Hashable, Any], metric: str) -> str:
     mean = cell.get(metric)
     if mean is None or mean != mean:
         return "–"
+    if metric in SUMS:
+        return str(mean)
     return str(Interval(mean, cell[f"{metric}_ci95"], cell["runs"]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -13,17 +14,19 @@ if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 
-def simulate(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:
-    """Run with a progress bar, in parts; this does not change the result."""
+def simulate(
+    scenario: Scenario, controller: Any, seed: int, until: float = math.inf, **options: Any
+) -> Run:
+    """Run with a progress bar, in parts; this does not change the result. `until` ends it early."""
     from minisim.simulation import Simulation
 
     simulation = Simulation(scenario, controller, seed=seed, **options)
-    parts = 100
+    parts, end = 100, min(until, scenario.horizon)
     with bar("simulating") as progress:
         for part in range(1, parts + 1):
-            simulation.advance(scenario.horizon * part / parts)
+            simulation.advance(end * part / parts)
             progress(part, parts)
-    return simulation.run()
+    return simulation.result()
 
 
 def simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: Any) -> Run:

@@ -23,7 +23,7 @@ class MissingRunsError(MinisimError):
 
 
 def find_in(store: Store | None) -> Find:
-    """Looks up runs in a store; failed and outdated runs do not count."""
+    """Look up runs in a store; failed and outdated runs do not count."""
 
     def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         if store is None:
@@ -45,7 +45,7 @@ class Archive:
         )
 
     def need(self, *names: str) -> tuple[Results, ...]:
-        """The results of these studies; `MissingRunsError` if none has a run, with the remedy."""
+        """The results of these studies; `MissingRunsError` if none has a run."""
         results = tuple(map(self.study, names))
         if names and all(each.good.empty for each in results):
             raise MissingRunsError(
@@ -77,11 +77,11 @@ def missing_note(*results: Results, wanted: Callable[[Point], bool] = lambda _: 
 
 
 def _extent(runs: Sequence[Runs]) -> str:
-    """The seeds a case; if runs are missing, how many of them there are too."""
+    """The seeds per case, and how many runs there are if some are missing."""
     seeds = sorted({count.wanted for count in runs})
     span = f"{seeds[0]} to {seeds[-1]} seeds" if len(seeds) > 1 else f"{seeds[0]} seeds"
     made, wanted = (sum(counts) for counts in zip(*runs, strict=True))
-    return span if made == wanted else f"{made} of {wanted} runs ({span} a case)"
+    return span if made == wanted else f"{made} of {wanted} runs ({span} per case)"
 
 
 def _listed(texts: Sequence[str], shown: int) -> str:

@@ -17,7 +17,7 @@ def _power_of_two(title: str, value: Any) -> int:
 
 @declared(kw_only=True)
 class Search:
-    """How to search for a limit: by bisection, with `seeds` · log₂(`steps`) runs a point."""
+    """How to search for a limit: by bisection, with `seeds` · log₂(`steps`) runs per point."""
 
     step: float = real("demands are multiples of it", "veh/h", above=0, default=10.0)
     steps: int = checked(
@@ -36,29 +36,29 @@ class Search:
 class Effort:
     """How much is simulated for each study."""
 
-    seeds: int = whole("runs a point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
+    seeds: int = whole("runs per point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
     densities: tuple[float, ...] | None = reals(
-        "only points with these demands, in studies that have such; none is all",
+        "only points with these demands, in studies that have any; none keeps all",
         "veh/h/lane", optional=True, label="densities", default=None,
     )  # fmt: skip
     search: Search = part("for studies that search", Search, default_factory=Search)
 
     @classmethod
     def of(cls, *, quick: bool = False, seeds: int | None = None) -> Effort:
-        """The full effort, or a smoke test at two demands; `seeds` replaces the number of seeds."""
+        """The full effort, or a smoke test at two demands. `seeds` replaces the number of seeds."""
         if not quick:
             return cls() if seeds is None else cls(seeds=seeds)
         return cls(
             seeds=2 if seeds is None else seeds, horizon=150.0, densities=(150.0, 350.0),
-            # Rough, and with runs too short to mean anything.
+            # Coarse, and its runs are too short to mean anything.
             search=Search(step=200.0, steps=4, seeds=2, horizon=150.0),
         )  # fmt: skip
 
     @property
     def warning(self) -> str:
         """A warning before the numbers of a smoke test; empty otherwise."""
-        return "" if self.densities is None else "Smoke test, which means nothing: "
+        return "" if self.densities is None else "A smoke test: its numbers mean nothing. "
 
     def command(self, *names: str) -> str:
         """The command line that makes the runs of these studies."""

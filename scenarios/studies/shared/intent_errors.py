@@ -1,4 +1,4 @@
-"""Points at which vehicles misread each other's intent, and rates of the rare events there."""
+"""Points at which vehicles misread each other's intent, and the rates of rare events there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dim import NoisyPerception
 from dim.senses.noise import UNSIGNALLED
-from minisim.parameters import spelled
+from minisim.names import spelled
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
 from scenarios.recipe import Recipe
@@ -30,8 +30,8 @@ MANNERS = {
 }
 #: The rules alone, with a safety monitor, and with the highest-priority lane first.
 MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
-#: Most seeds: vehicles that misread look around every 0.1 s, which costs 3 s of CPU a simulated
-#: hour, and more with a monitor.
+#: The most seeds. Vehicles that misread look around every 0.1 s, which costs 3 s of CPU per
+#: simulated hour, and more with a monitor.
 FEW = dict.fromkeys(MISREADERS, 5)
 
 
@@ -46,7 +46,7 @@ class IntentErrorPoint(NamedTuple):
     unsignalled: bool = False  # whether vehicles turn without a signal, at the published rates
     confidence: float = 0.0  # the least at which a reading is believed; 0 believes all
     arms: int = 4  # of the junction
-    density: float = DENSITY  # mean inflow a lane [veh/h]
+    density: float = DENSITY  # mean inflow per lane [veh/h]
 
     @property
     def perception(self) -> NoisyPerception:

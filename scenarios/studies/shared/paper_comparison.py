@@ -35,10 +35,9 @@ def published() -> pd.DataFrame:
 def compare(rows: pd.DataFrame) -> pd.DataFrame:
     """Every published value beside the rows of a study of the paper's grid: columns `COMPARED`.
 
-    `low` and `high` bound the 95 % prediction interval for one more run of ours, cut at 0 since no
-    time is below. `inside` says whether the paper's value lies in it; it is missing if there is one
-    value or all are equal, which makes no interval. Without a run, `seeds` is 0 and the rest is
-    missing.
+    `low` and `high` bound the 95 % prediction interval for one more run of ours, cut at 0,
+    since no time is negative. `inside` says whether the paper's value lies in it. It is missing if
+    there is only one value or all are equal. Without a run, `seeds` is 0 and the rest is missing.
     """
     import pandas as pd
 
@@ -54,7 +53,7 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _order(row: Mapping[Any, Any]) -> tuple[object, ...]:
-    """As a reader looks for it: arms, inflow, controller, all lanes before each, metric."""
+    """In the order in which readers look: arms, inflow, controller, all lanes, lane, metric."""
     lane = "" if row["lane"] == "all" else row["lane"]
     places = SPLITS.index(row["split"]), list(SERIES.values()).index(row["series"])
     return row["arms"], *places, lane, row["metric"], row["density"]
@@ -76,7 +75,7 @@ def _ours(cell: pd.DataFrame | None, column: str, paper: float) -> dict[str, obj
 
 
 class Score(NamedTuple):
-    """How many of the paper's values lie in our 95 % prediction intervals, of those with one."""
+    """How many of the paper's values lie in our 95 % prediction intervals, where there is one."""
 
     inside: int
     judged: int
@@ -95,8 +94,8 @@ def score(compared: pd.DataFrame, *, comparable: bool = True) -> Score:
 class Discrepancy(NamedTuple):
     """A known cause of a difference between the paper and us."""
 
-    number: int  # in the list of discrepancies (docs)
-    study: str  # this and the next five: where it holds; empty holds anywhere
+    number: int  # in the documented list of discrepancies
+    study: str  # this and the next five: where it holds; empty means anywhere
     series: str
     arms: str
     split: str
@@ -135,6 +134,6 @@ def labels() -> Mapping[str, str]:
 
 
 def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:
-    """The known causes of a difference in a row of `compare`; `study` is of the paper's grid."""
+    """The known causes of a difference in a row of `compare`, for a study of the paper's grid."""
     choice("study of the paper's grid", study, ("text", "as-run"))
     return tuple(known for known in discrepancies() if known.holds(study, row))

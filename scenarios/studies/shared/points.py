@@ -1,4 +1,4 @@
-"""Points of figures: everything of a run but its seed and horizon."""
+"""Points of figures: everything about a run except its seed and horizon."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scenarios.recipe import Recipe
 
 
 class Point(Protocol):
-    """One point of a figure. A named tuple of plain values, which become columns."""
+    """One point of a figure: a named tuple of plain values, which become columns."""
 
     @property
     def series(self) -> str:
@@ -25,7 +25,7 @@ class Point(Protocol):
 
     @property
     def density(self) -> float:
-        """Mean inflow a lane [veh/h]."""
+        """Mean inflow per lane [veh/h]."""
 
     @property
     def where(self) -> str:
@@ -42,11 +42,11 @@ class ControllerPoint(NamedTuple):
     """A controller at a demand."""
 
     profile: str  # by name
-    series: str  # the controller that a reader thinks of, such as "dim"
+    series: str  # the controller as readers know it, such as "dim"
     controller: str  # the variant of it that the study needs, as on the command line
     arms: int  # of the junction
-    split: str  # of the inflow over the lanes, "balanced" or such as "4:3:2:1"
-    density: float  # mean inflow a lane [veh/h]
+    split: str  # of the inflow over the lanes, "balanced" or shares such as "4:3:2:1"
+    density: float  # mean inflow per lane [veh/h]
     humans: float = 0.0  # share of human drivers
 
     def recipe(self, seed: int, horizon: float = 3600.0) -> Recipe:

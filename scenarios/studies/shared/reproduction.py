@@ -1,4 +1,4 @@
-"""Runs a study and keeps its rows in a store."""
+"""Run a study and keep its rows in a store."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Made:
 
     name: str  # of the study
     runs: int  # all of its runs
-    hours: float  # that they simulate
+    hours: float  # simulated by them
     computed: int  # runs that were not in the store before
     wall_s: float  # time that the call took
     cpu_s: float  # processor time of all runs, whenever they were made
@@ -31,9 +31,9 @@ class Made:
 def reproduce(
     name: str, effort: Effort, store: Store, jobs: int, progress: Callable[[int, int], None]
 ) -> Made:
-    """Run a study in `jobs` processes. Rows go to the store; what it has is not run again.
+    """Run a study in `jobs` processes. The store keeps the rows, and its runs are not made again.
 
-    `progress` is called with the runs done and the most that there can be. Raises `FileError`.
+    `progress` is called with the number of runs done and the most there can be. Raises `FileError`.
     """
     study = study_named(name)
     total = study.most_runs(effort)

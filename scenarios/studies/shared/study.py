@@ -1,4 +1,4 @@
-"""A study: points that answer a question, and the rows of their runs."""
+"""A study: points that answer a question, and the results of their runs."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class Study:
     points: tuple[Point, ...]  # each once
     #: Series -> most seeds, if more would cost too much.
     few: Mapping[str, int] = field(default_factory=dict)
-    #: Whether its figures show collisions; the report does not list them then.
+    #: Whether its figures show collisions; if so, the report does not list them.
     about_collisions: bool = False
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, points: Sequence[Point] = ()
     ) -> list[tuple[Point, Recipe]]:
-        """The seeds 1 … `seeds` of `points`, or of all, point by point."""
+        """The runs with seeds 1 … `seeds` of `points`, or of all points, point by point."""
         return [
             (point, point.recipe(seed, horizon))
             for point in points or self.points
@@ -44,13 +44,13 @@ class Study:
         ]
 
     def chosen(self, effort: Effort) -> tuple[Point, ...]:
-        """The points with the effort's demands; all if there is none."""
+        """The points with the effort's demands; all points if none has one of them."""
         wanted = effort.densities
         some = tuple(p for p in self.points if wanted is None or p.density in wanted)
         return some or self.points
 
     def collect(self, effort: Effort, find: Find) -> Results:
-        """Ask `find` for the rows of all runs; it runs them or looks them up.
+        """Ask `find` for the rows of all runs; it makes the runs or looks them up.
 
         A study that chooses runs by the results of earlier ones asks several times.
         """
@@ -80,14 +80,14 @@ class Results:
 
     study: Study
     effort: Effort  # how much of it was asked for
-    rows: pd.DataFrame  # one a run that was made: the columns of a sweep and those of its point
+    rows: pd.DataFrame  # one per run made: the columns of a sweep and those of its point
     runs: Mapping[Point, Runs]  # of each point, in order
 
     @classmethod
     def of(
         cls, study: Study, effort: Effort, asked: Sequence[tuple[Point, Mapping[str, Any] | None]]
     ) -> Results:
-        """From each point asked for and the row of its run, in order."""
+        """The results, given each point asked for and the row of its run, in order."""
         import pandas as pd
 
         rows = [{**row, **point._asdict()} for point, row in asked if row is not None]
@@ -113,8 +113,8 @@ class Results:
 def with_total_delay(rows: pd.DataFrame) -> pd.DataFrame:
     """Add `total_delay_s`: mean time loss on the road plus mean departure delay, both complete.
 
-    SUMO's total delay is the same, but for trips that have ended. This one includes the vehicles
-    that have not arrived, and those that have not even departed.
+    SUMO's total delay counts only trips that have ended. This one includes vehicles that have not
+    arrived, and those that have not even departed.
     """
     lost, late = (
         rows[column].astype(float) for column in ("complete_time_loss_s", "complete_depart_delay_s")

@@ -77,7 +77,7 @@ def test_the_papers_example() -> None:
     assert explanation.cliques == explanation.tied
     assert text(explanation.right_of_way) == "a1 b2"
     assert explanation.reason == (
-        "3 cliques tie at the largest size, 2; a1 b2 holds the highest-priority lanes of them "
+        "3 cliques tie at the largest size, 2; a1 b2 holds the highest-priority lanes among them "
         "(priority a b c d)."
     )
 
@@ -191,7 +191,7 @@ def test_a_table_of_many_arms_is_filled_on_demand_only() -> None:
 @pytest.mark.parametrize(
     ("movements", "message"),
     [
-        (["a1", "a2"], "one participant a lane: lane a has a1 and a2"),
+        (["a1", "a2"], "one participant per lane: lane a has a1 and a2"),
         (["b1", "b1"], "lane b has b1 and b1"),
         (["e1"], "no movement 'e1'"),
         (["a4"], "no movement 'a4'"),

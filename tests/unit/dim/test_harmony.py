@@ -122,7 +122,11 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
     [
         (4, four()[:-1], "12 × 12, got 11 × 12"),
         (4, [row[:-1] for row in four()], "12 × 12, got 12 × 11"),
-        (4, [*four()[:-1], [0, 1]], r"^a harmony matrix is square: its rows differ in length$"),
+        (
+            4,
+            [*four()[:-1], [0, 1]],
+            r"^a harmony matrix must be square, but its rows differ in length$",
+        ),
         (4, 1, "12 × 12, got 1"),
         (3, four(), "3 arms is 6 × 6, got 12 × 12"),
         (5, four(), "20 × 20"),
@@ -131,7 +135,11 @@ def broken(row: int, column: int, value: float, *, mirrored: bool = False) -> li
         (4, broken(0, 4, -1.0, mirrored=True), "a1 with b2 is -1"),
         (4, broken(0, 4, 0.5, mirrored=True), "a1 with b2 is 0.5"),
         (4, broken(0, 4, np.nan, mirrored=True), "a1 with b2 is nan"),
-        (4, broken(0, 4, 0.0), "a1 with b2 is 0 but the other way round 1: it must be symmetric"),
+        (
+            4,
+            broken(0, 4, 0.0),
+            "a1 with b2 is 0 but 1 the other way round: the matrix must be symmetric",
+        ),
         (4, broken(3, 5, 1.0, mirrored=True), "b1 with b3 is 1, but they share a lane"),
         (4, broken(7, 7, 1.0), "c2 with c2 is 1, but they share a lane"),
         (2, [[0, 0], [0, 0]], "number of arms must be an integer 3 … 12, got 2"),
@@ -191,7 +199,7 @@ GOOD = HarmonyMatrix.paper(3).to_text()
         (GOOD.replace("a1,0", "a1,1"), InputError, "a1 with a1 is 1, but they share a lane"),
         (GOOD.replace("\nb2,", "\nb3,"), InputError, "line 5: the row is labelled 'b3'.*'b2'"),
         (GOOD.replace(",b2", ",b7"), InputError, "line 1: column 5 is 'b7', expected 'b2'"),
-        (GOOD.rsplit("c2", 1)[0], InputError, "line 6: not square: .* 6 movements, 5 rows"),
+        (GOOD.rsplit("c2", 1)[0], InputError, "line 6: not square: .* 6 movements, but 5 rows"),
         (GOOD + "d1,0,0,0,0,0,0\n", InputError, "line 8: not square"),
         (",a1,a2,b1\na1,0,0,1\n", InputError, "line 1: 3 movements; .* n\\(n−1\\)"),
     ],
@@ -219,7 +227,7 @@ def test_unreadable_and_unwritable_paths(
 
 @pytest.mark.parametrize("path", [0, 1.5, None, b"m.csv"])
 def test_a_path_is_text(path: object) -> None:
-    with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
+    with pytest.raises(InputError, match=r"^harmony matrix file must be"):
         HarmonyMatrix.from_csv(path)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]

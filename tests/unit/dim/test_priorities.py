@@ -72,7 +72,6 @@ def test_memory_is_how_long_each_vehicle_has_watched() -> None:
         memory_of(site, Zones(), 8.0)
     with pytest.raises(InputError, match="sensors that reach 8 m"):
         Dim(priorities="waiting", sensor_range=8.0).start(site)
-    Dim(priorities="rotating", sensor_range=8.0).start(site)
     assert memory_of(site, Zones(), 8.5) == pytest.approx(0.5 / (40.0 / 3.6))
 
 

@@ -75,5 +75,5 @@ def test_braking_begins_at_the_red_zone_where_that_is_enough(
 def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
     place = site()  # approach lanes of 492.8 m, vehicles of 4 m
     Zones(red=480.7).check(place)
-    with pytest.raises(InputError, match=r"489 m long, .* leave 488.8 m .* make arm_length longer"):
+    with pytest.raises(InputError, match=r"leave only 488.8 m .* increase arm_length"):
         Zones(red=481).check(place)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import math
 import re
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -33,6 +35,9 @@ from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
 from minisim.vehicle import VehicleType
 from scenarios import four_way
+from scenarios.controllers import VARIANTS
+from scenarios.profiles import FAIR
+from tests.builders import replayed
 
 INTERSECTIONS = [
     Intersection((0, 120, 240)),
@@ -119,7 +124,7 @@ def test_film_counts_what_the_trajectories_say(run: Run, film: Frames) -> None:
     for time in (100.1, 112.0, 129.9):
         now = frame[np.isclose(frame["time_s"], time)]
         assert film.at(time).stop - film.at(time).start == len(now)
-        assert film.waiting(film.at(time)) == (now["speed_mps"] <= 0.1).sum()
+        assert film.waiting(film.rows(film.at(time), 1e9)) == (now["speed_mps"] <= 0.1).sum()
     assert film.served(100.0) == 0
     paths = run.site.intersection.paths
     cleared = 0
@@ -155,6 +160,10 @@ def test_collisions_are_ringed(crash: Run) -> None:
     assert film.crashes(first.time - 0.1) == []
     (ring,) = film.crashes(first.time)
     assert film.collided(first.time) == 1
+    harmed = {v for collision in crash.collisions for v in collision.vehicles}
+    clear = film.s > film.exit[film.path] + crash.site.vehicle.length
+    unharmed = set(crash.trajectories["vehicle"][clear]) - harmed
+    assert film.served(150.0) == len(unharmed), "what collided was not served"
     front = crash.site.intersection.path(
         crash.site.intersection.parse(first.movements[0])
     ).position(first.positions[0])
@@ -204,9 +213,56 @@ def test_picture_shows_the_vehicles(run: Run, picture: Picture) -> None:
     assert seen == {style.RIGHT_OF_WAY, style.WAITING}
 
 
+def test_no_two_controllers_look_the_same() -> None:
+    looks = [variant.look for variant in VARIANTS.values() if variant.look is not None]
+    looks += [look for name, look in style.ARMS.items() if name != "dim-4"]  # that is DIM
+    assert len({(look.colour, look.marker) for look in looks}) == len(looks)
+
+
 def test_every_zone_is_coloured(picture: Picture) -> None:
     seen = {tuple(c) for c in pixels(picture.draw(129.0)).reshape(-1, 3).tolist()}
     assert {tuple(rgb(colour)) for colour in style.ZONES.values()} <= seen
+
+
+#: What dichromats see, for linear RGB: Machado, Oliveira & Fernandes, IEEE TVCG 15 (2009), table of
+#: severity 1.
+EYES = {
+    "usual": np.eye(3),
+    "protanope": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                  [-0.003882, -0.048116, 1.051998]],
+    "deuteranope": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                    [-0.011820, 0.042940, 0.968881]],
+}  # fmt: skip
+
+
+def lab(colour: str, eyes: str) -> npt.NDArray[np.float64]:
+    """A colour in CIELAB (D65) as these eyes see it."""
+    values = np.array(rgb(colour)) / 255.0
+    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array(
+        [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
+         [0.0193339, 0.1191920, 0.9503041]]
+    )  # fmt: skip
+    xyz = to_xyz @ np.clip(EYES[eyes] @ linear, 0.0, 1.0) / [0.95047, 1.0, 1.08883]
+    f = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_zones_are_told_apart_without_red_and_green(eyes: str) -> None:
+    zones = list(style.ZONES.values())
+    pairs = [*itertools.combinations(zones, 2)]
+    beside = [(zone, ground) for zone in zones for ground in (style.ASPHALT, style.BLUE)]
+    for least, close in ((20.0, pairs), (15.0, beside)):
+        for one, other in close:
+            assert np.linalg.norm(lab(one, eyes) - lab(other, eyes)) >= least
+
+
+def test_the_legend_names_zones_by_their_place_and_fits(picture: Picture) -> None:
+    picture.draw(129.0)
+    texts = picture._figure.texts
+    assert {"red 38–8 m: slow", "green 2–0 m: buffer"} <= {text.get_text() for text in texts}
+    assert max(text.get_window_extent().x1 for text in texts) < picture._figure.bbox.x1
 
 
 def test_frame_times_are_steps() -> None:
@@ -251,6 +307,52 @@ def test_gif_plays_back_every_frame(tmp_path_factory: pytest.TempPathFactory, fr
             film.seek(k)
             assert film.info["duration"] == 100
             assert (pixels(film.convert("RGB")) == pixels(frame)).all()
+
+
+@pytest.mark.parametrize("fps", [0.3, 7.0, 10.0, 24.0, 30.0, 50.0])
+def test_gif_plays_as_fast_as_asked(tmp_path: Path, fps: float) -> None:
+    """No frame is shown a hundredth of a second early or late, though delays are whole ones."""
+    frames = [Image.new("RGB", (4, 4), (k % 2 * 192, 0, 0)) for k in range(60)]
+    file = tmp_path / "film.gif"
+    write_gif(iter(frames), palette_for(frames), file, fps)
+    delays = []
+    with Image.open(file) as film:
+        for k in range(film.n_frames):
+            film.seek(k)
+            delays.append(film.info["duration"])
+    assert min(delays) >= 20, "viewers take less for 100 ms"
+    ends = np.cumsum(delays)
+    np.testing.assert_allclose(ends, 1000.0 * np.arange(1, 61) / fps, atol=5.0 + 1e-6)
+
+
+def test_a_gif_of_more_than_50_frames_per_second_keeps_its_length(tmp_path: Path) -> None:
+    profile = replace(FAIR, dt=0.01)
+    run = minisim.simulate(four_way(400, profile=profile, horizon=42.0), Dim(), record="all")
+    file = tmp_path / "film.gif"
+    write_animation(run, file, start=41.0, seconds=0.5, fps=100.0)
+    with Image.open(file) as film:
+        assert film.n_frames == 25
+        assert film.info["duration"] == 20
+
+
+@pytest.mark.parametrize(("start", "seconds"), [(200.0, 2.0), (90.0, 20.0), (120.0, 20.0)])
+def test_what_was_not_recorded_is_not_animated(
+    run: Run, tmp_path: Path, start: float, seconds: float
+) -> None:
+    with pytest.raises(InputError, match="the run was recorded from 100 to 130 s"):
+        write_animation(run, tmp_path / "film.gif", start=start, seconds=seconds)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
+    def written(shown: Run) -> str:
+        return " ".join(text.get_text() for text in Picture(shown)._figure.texts)
+
+    two = replayed(four_way(33), (0.0, 0, 2), (0.0, 2, 2), horizon=30.0)
+    recorded = written(minisim.simulate(two, Dim(), record="all"))
+    assert "2 recorded arrivals" in recorded
+    assert "veh/h" not in recorded
+    assert "400 veh/h/lane" in written(run)
 
 
 def test_html_holds_every_frame(tmp_path: Path) -> None:
@@ -310,12 +412,14 @@ def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> N
     figure = decision_figure(explanation, site, Dim().start(site).plan)
     scene, graph = figure.axes
     assert {t.get_text() for t in scene.texts} >= {"a1", "b2", "c2", "d2", "a", "b", "c", "d"}
-    assert {t.get_text() for t in graph.texts} >= {"$V^{a}_{1}$", "$V^{d}_{2}$"}
+    assert {t.get_text() for t in graph.texts} >= {"a1", "b2", "c2", "d2"}
     strong = [line for line in graph.lines if line.get_color() == style.RIGHT_OF_WAY]
     assert (len(graph.lines), len(strong)) == (len(explanation.edges), 1)
     assert any(t.get_text() == "Right of way: a1, b2" for t in figure.texts)
     (zones,) = figure.legends
-    assert [t.get_text() for t in zones.get_texts()] == ["red zone", "yellow zone", "green zone"]
+    assert [t.get_text() for t in zones.get_texts()] == [
+            "red 38–8 m", "yellow 8–2 m", "green 2–0 m",
+        ]  # fmt: skip
     figure.draw_without_rendering()
     boxes = [t.get_window_extent() for t in (*scene.texts, *graph.texts, *figure.texts)]
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 for box in boxes)

@@ -146,7 +146,7 @@ def test_small_print_counts_the_runs_that_there_are() -> None:
     """Seed 2 of the all-way stop is missing, and V2I-C of the published runs has three seeds."""
     some = having(lambda e: (e.label, e.seed) != ("all-way-stop", 2))
     (note,) = [t for t in texts_of(drawn("fair", some)) if "s each" in t]
-    assert note.startswith("180 of 192 runs (2 seeds a case), 3600 s each. Fewer runs: all-way")
+    assert note.startswith("180 of 192 runs (2 seeds per case), 3600 s each. Fewer runs: all-way")
     assert "all-way-stop (fair, 4 arms, balanced, 150) has 1; and 9 more." in note
     assert "no run" not in note
     archive = Archive(synthetic_find, Effort(seeds=5))
@@ -315,7 +315,7 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "- as-run: DIM, 5 arms, balanced, 350 veh/h/lane: 4 in 0.1 h" in text
     assert "Why DIM collides as it was run: the published five-arm table" in text
-    assert "- `as-run`: Smoke test, which means nothing: " in text
+    assert "- `as-run`: A smoke test: its numbers mean nothing. " in text
 
 
 def test_the_report_keeps_its_appendix_for_the_end() -> None:

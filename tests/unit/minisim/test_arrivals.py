@@ -1,4 +1,4 @@
-"""Arrivals against their distributions, and the arrival table as a file.
+"""Arrivals against their distributions, and the arrival table.
 
 Statistical tests run on fixed seeds, so they never fail by chance; `ALPHA` is the chance with
 which a correct model would fail one of them on a fresh seed.
@@ -6,15 +6,12 @@ which a correct model would fail one of them on a fresh seed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy import stats
 
-from minisim.arrivals import Arrivals, Demand, Shares, read_arrivals, write_arrivals
-from minisim.errors import FileError, InputError
+from minisim.arrivals import Arrivals, Demand, Shares
+from minisim.errors import InputError
 
 ALPHA = 1e-3
 DAY = 86_400.0
@@ -81,6 +78,41 @@ def test_every_model_has_the_mean_that_was_asked_for(model: str) -> None:
     counts = np.bincount(arrivals.lane, minlength=4)
     assert np.abs(counts - expected).max() < 4.0 * np.sqrt(expected)
     assert arrivals.rates(4, DAY) == pytest.approx(counts / 24.0)
+
+
+@pytest.mark.parametrize("model", ["poisson", "exponential"])
+def test_counts_have_the_variance_of_poisson_and_lanes_are_independent(model: str) -> None:
+    """Counts of 10 s on 4 lanes over 10 days: variance = mean, no correlation."""
+    arrivals = Demand(density=DENSITY, model=model).draw(4, 10 * DAY, seed=2)
+    size = round(DAY)
+    counts = np.zeros((4, size))
+    np.add.at(counts, (arrivals.lane, (arrivals.time / 10.0).astype(int)), 1.0)
+    # Of the index of dispersion D of n Poisson counts, (n − 1) D is chi-square with n − 1 degrees.
+    dispersion = counts.var(axis=1, ddof=1) / counts.mean(axis=1)
+    assert (np.abs(dispersion - 1.0) < 4.0 * np.sqrt(2.0 / size)).all()
+    between = np.corrcoef(counts) - np.eye(4)
+    within = [np.corrcoef(lane[:-1], lane[1:])[0, 1] for lane in counts]
+    assert max(np.abs(between).max(), np.abs(within).max()) < 4.0 / np.sqrt(size)
+
+
+@pytest.mark.parametrize("model", ["poisson", "exponential"])
+def test_manoeuvres_do_not_depend_on_those_before_nor_on_other_lanes(model: str) -> None:
+    arrivals = Demand(density=DENSITY, model=model).draw(4, 10 * DAY, seed=6)
+    lanes = [arrivals.manoeuvre[arrivals.lane == lane] for lane in range(4)]
+    short = min(map(len, lanes))
+    for one, other in ((lanes[0][:-1], lanes[0][1:]), (lanes[1][:short], lanes[2][:short])):
+        table = np.zeros((3, 3))
+        np.add.at(table, (one - 1, other - 1), 1)
+        assert stats.chi2_contingency(table).pvalue > ALPHA
+
+
+def test_inversion_gives_the_poisson_probabilities() -> None:
+    """At the highest rate, where several come in a second: classes of up to 6."""
+    arrivals = Demand(density=3600.0).draw(3, DAY, seed=8)
+    counts = np.minimum(per_second(arrivals, 1, DAY), 6)
+    expected = stats.poisson.pmf(np.arange(6), 1.0)
+    expected = np.append(expected, 1.0 - expected.sum()) * DAY
+    assert stats.chisquare(np.bincount(counts, minlength=7), expected).pvalue > ALPHA
 
 
 def test_inflow_counts_vehicles_before_the_horizon() -> None:
@@ -236,142 +268,3 @@ def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
         Demand(density=1000.0, model="shifted", min_headway=4.0).rates(4)
     with pytest.raises(InputError, match="duration"):
         Demand(density=100.0).draw(4, 0.0, seed=1)
-
-
-# --- files -------------------------------------------------------------------------------------
-
-GOOD = "demand_time_s,lane,manoeuvre\n0.01,c,2\n2.01,a,1\n"
-
-
-@pytest.fixture
-def csv_file(tmp_path: Path) -> Callable[[str], Path]:
-    def write(text: str) -> Path:
-        path = tmp_path / "arrivals.csv"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return write
-
-
-def test_a_recorded_table_is_read(csv_file: Callable[[str], Path]) -> None:
-    arrivals = read_arrivals(csv_file(GOOD), n=4)
-    assert arrivals.time.tolist() == [0.01, 2.01]
-    assert arrivals.lane.tolist() == [2, 0]
-    assert arrivals.manoeuvre.tolist() == [2, 1]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        GOOD.replace("\n", "\r\n"),
-        "\ufeff" + GOOD,  # as spreadsheets save it
-        "manoeuvre,lane,note,demand_time_s\n2,c,x,0.01\n1,a,,2.01\n",
-        GOOD.replace("0.01,c,2", " 0.01 , c , 2 "),
-    ],
-    ids=["windows", "byte-order mark", "other columns", "blanks"],
-)
-def test_harmless_variants_are_read_alike(csv_file: Callable[[str], Path], text: str) -> None:
-    arrivals = read_arrivals(csv_file(text), n=4)
-    assert arrivals.time.tolist() == [0.01, 2.01]
-    assert arrivals.manoeuvre.tolist() == [2, 1]
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("x,a,1", "demand_time_s must be a number 0 … 1e.07, got 'x'"),
-        ("-1,a,1", "demand_time_s"),
-        ("1e999,a,1", "demand_time_s"),
-        (",a,1", "demand_time_s"),
-        ("3,e,1", "lane must be one of a, b, c, d, got 'e'"),
-        ("3,ab,1", "lane"),
-        ("3,0,1", "lane"),
-        ("3,a,0", "manoeuvre must be 1 … 3, got '0'"),
-        ("3,a,4", "manoeuvre"),
-        ("3,a,1.0", "manoeuvre"),
-        ("3,a,", "manoeuvre"),
-        ("3,a," + "9" * 5000, "manoeuvre"),
-        ("3,a", "expected 3 values"),
-        ("3", "expected 3 values"),
-        ("3,a,1,5", "expected 3 values"),
-        ('"3,a,1', "expected 3 values"),
-    ],
-)
-def test_a_malformed_line_is_named_by_its_number(
-    csv_file: Callable[[str], Path], line: str, message: str
-) -> None:
-    path = csv_file(GOOD + line + "\n")
-    with pytest.raises(FileError, match=message) as caught:
-        read_arrivals(path, n=4)
-    assert f"{path}, line 4: " in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "missing"),
-    [("", "demand_time_s, lane, manoeuvre"), ("demand_time_s,manoeuvre\n1,2\n", "lane")],
-)
-def test_missing_columns_are_named(
-    csv_file: Callable[[str], Path], text: str, missing: str
-) -> None:
-    with pytest.raises(FileError, match=f"column {missing} missing"):
-        read_arrivals(csv_file(text))
-
-
-def test_unreadable_files_are_reported(tmp_path: Path) -> None:
-    binary = tmp_path / "binary.csv"
-    binary.write_bytes(b"demand_time_s,lane,manoeuvre\n\xff\xfe,a,1\n")
-    for path in (tmp_path / "none.csv", tmp_path, binary, "a\0b"):
-        with pytest.raises(FileError, match="cannot read arrivals from"):
-            read_arrivals(path)
-    with pytest.raises(FileError, match=r"arrivals from \S*none.csv: No such file or directory$"):
-        read_arrivals(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="arrivals file must be"):
-        read_arrivals(3)  # type: ignore[arg-type]  # wrong on purpose
-
-
-def test_unwritable_files_are_reported(tmp_path: Path) -> None:
-    arrivals = Demand(density=350.0).draw(4, 60.0, seed=1)
-    for path in (tmp_path / "none" / "x.csv", tmp_path, "a\0b"):
-        with pytest.raises(FileError, match="cannot write arrivals to"):
-            write_arrivals(arrivals, path)
-
-
-def test_a_table_without_letters_for_its_lanes_is_not_half_written(tmp_path: Path) -> None:
-    path = tmp_path / "arrivals.csv"
-    table = Arrivals(np.array([0.0, 1.0]), np.array([0, 12]), np.array([1, 1]))
-    with pytest.raises(InputError, match="lane 12"):
-        write_arrivals(table, path)
-    assert not path.exists()
-
-
-def test_a_demand_time_beyond_every_horizon_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "far.csv"
-    path.write_text("demand_time_s,lane,manoeuvre\n1e300,a,1\n")
-    with pytest.raises(FileError, match=r"line 2: demand_time_s must be a number 0 … 1e\+07"):
-        read_arrivals(path, 4)
-    with pytest.raises(InputError, match="at most"):
-        Arrivals(np.array([1e300]), np.array([0]), np.array([1]))
-
-
-def test_a_column_twice_and_wrong_types_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "twice.csv"
-    path.write_text("demand_time_s,lane,manoeuvre,lane\n1,a,1,b\n")
-    with pytest.raises(FileError, match="lane missing or twice"):
-        read_arrivals(path, 4)
-    with pytest.raises(InputError, match="arrivals must be"):
-        write_arrivals(None, tmp_path / "x.csv")
-    with pytest.raises(InputError, match="number of arms"):
-        read_arrivals(path, "x")
-
-
-def test_a_table_may_tell_the_drivers_speed_factors(tmp_path: Path) -> None:
-    table = tmp_path / "factors.csv"
-    table.write_text("demand_time_s,lane,manoeuvre,speed_factor\n2,b,1,0.9\n1,a,2,1.1\n")
-    factors = read_arrivals(table).speed_factor
-    assert factors is not None
-    assert factors.tolist() == [1.1, 0.9]  # in order of demand
-    table.write_text("demand_time_s,lane,manoeuvre,speed_factor\n2,b,1,3\n")
-    with pytest.raises(FileError, match=r"line 2: speed_factor must be a number 0.2 … 2, got '3'"):
-        read_arrivals(table)
-    with pytest.raises(InputError, match=r"speed_factor must be 0.2 … 2"):
-        Arrivals(np.zeros(1), np.zeros(1, int), np.ones(1, int), np.array([0.1]))

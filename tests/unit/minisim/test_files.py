@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
+from dim import HarmonyMatrix
 from minisim.errors import FileError, InputError
 from minisim.files import (
     check_apart,
@@ -17,9 +20,13 @@ from minisim.files import (
     check_table,
     make_folder,
     markdown_table,
+    read_file,
     replacing,
     write_table,
 )
+from minisim.recorded import read_arrivals
+from minisim.results.run import Run
+from scenarios.sweep import read_experiments
 
 
 def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
@@ -87,3 +94,35 @@ def test_two_options_never_name_one_file(tmp_path: Path) -> None:
     check_apart({"--a": tmp_path / "real", "--b": tmp_path / "other", "--c": None})
     with pytest.raises(InputError, match="--a and --b name the same file"):
         check_apart({"--a": tmp_path / "real", "--b": tmp_path / "link"})
+
+
+def test_only_ordinary_files_and_pipes_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(b"12345")
+    assert read_file("notes", file) == read_file("notes", file, 5) == b"12345"
+    with pytest.raises(FileError, match=r"cannot read notes from \S*file: it has more than 0 MiB$"):
+        read_file("notes", file, 4)
+    for path in (tmp_path, tmp_path / "none", "a\0b", "x" * 5000):
+        with pytest.raises(FileError, match="cannot read notes from"):
+            read_file("notes", path)
+    with pytest.raises(InputError, match="notes file must be"):
+        read_file("notes", 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    "read", [read_arrivals, read_experiments, HarmonyMatrix.from_csv, Run.load]
+)
+def test_no_device_is_read(read: Callable[[str], object]) -> None:
+    for device in ("/dev/full", "/dev/zero"):
+        with pytest.raises(FileError, match="neither an ordinary file nor a pipe"):
+            read(device)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are POSIX's")
+def test_a_pipe_is_read(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as writer:
+        writer.submit(pipe.write_bytes, b"demand_time_s,lane,manoeuvre\n0,a,1\n")
+        assert len(read_arrivals(pipe)) == 1

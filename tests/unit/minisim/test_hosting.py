@@ -7,9 +7,15 @@ import sys
 
 import pytest
 
-from minisim.control import Wake
-from minisim.errors import InputError
+import minisim
+from dim import Dim
+from minisim.control import Marking, Open, Plan, Wake
+from minisim.errors import ControllerError, InputError
 from minisim.hosting import Alarm, checked_window
+from minisim.testing import small_scenario
+from scenarios.controllers import SAFE, controller_named
+from scenarios.library import four_way
+from tests.builders import Fixed, Scripted
 
 NEVER = sys.maxsize // 4
 
@@ -22,12 +28,6 @@ def test_a_period_rings_at_once_and_then_regularly() -> None:
             rung.append(tick)
             alarm.reset(tick)
     assert rung == [0, 5, 10]
-
-
-def test_a_period_shorter_than_a_step_rings_in_every_step() -> None:
-    alarm = Alarm(0.01, 0.1)
-    alarm.reset(0)
-    assert alarm.tick == 1
 
 
 def test_without_a_period_it_rings_once_when_asked() -> None:
@@ -69,3 +69,76 @@ def test_windows_may_be_open_at_the_end() -> None:
 def test_windows_are_checked(window: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         checked_window(window)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("answer", [None, Open(1), 7])
+def test_decide_must_return_commands(answer: object) -> None:
+    silent = Scripted(lambda view: answer)  # type: ignore[arg-type, return-value]
+    with pytest.raises(ControllerError, match=r"'scripted' at 0.0 s: decide\(\) must return comm"):
+        minisim.simulate(small_scenario(), silent)
+
+
+class Broken:
+    """A controller, and its session, that raises where it is told to."""
+
+    name = "broken"
+    plan = Plan(period=1.0)
+
+    def __init__(self, where: str) -> None:
+        self.where = where
+
+    def start(self, site: object) -> Broken:
+        self.fail("start")
+        return self
+
+    def decide(self, view: object) -> list[Wake]:
+        self.fail("decide")
+        return []
+
+    def kind(self, lane: int, rank: int) -> str:
+        self.fail("kind")
+        return "x"
+
+    def fail(self, where: str) -> None:
+        if where == self.where:
+            raise KeyError("lost")
+
+
+@pytest.mark.parametrize("where", ["start", "decide", "kind"])
+def test_an_error_of_a_controller_is_told_with_its_line(where: str) -> None:
+    line = Broken.fail.__code__.co_firstlineno + 2
+    told = rf"^controller 'broken'.*: test_hosting.py, line {line}: KeyError: 'lost'$"
+    with pytest.raises(ControllerError, match=told) as caught:
+        minisim.simulate(small_scenario(), Broken(where))
+    assert isinstance(caught.value.__cause__, KeyError), "the traceback is there"
+
+
+@pytest.mark.parametrize(
+    ("plan", "told"),
+    [
+        (Plan(sight=1000.0), r"sight \[m\] of the plan.* at most 492.8, got 1000"),
+        (Plan(marks=(10.0, 600.0)), r"marks\[1\] \[m\] of the plan.* at most 492.8, got 600"),
+        (Plan(hold_distance=490.0), r"hold_distance .* at most .*, got 490"),
+        (Plan(markings=(Marking("far", 500.0, 10.0),)), r"start of marking 'far' .* got 500"),
+        (Plan(period=0.05), r"period of the plan \[s\].* at least 0.1, got 0.05"),
+    ],
+)
+def test_a_plan_that_cannot_act_is_refused(plan: Plan, told: str) -> None:
+    with pytest.raises(ControllerError, match=f"controller 'fixed': {told}"):
+        minisim.simulate(four_way(horizon=1.0), Fixed(plan))
+
+
+def test_a_default_sight_may_be_longer_than_a_road() -> None:
+    minisim.simulate(small_scenario(arm_length=30.0), Fixed(Plan()))
+
+
+@pytest.mark.parametrize("name", [name for name in SAFE if not name.startswith("dim")])
+def test_no_plan_of_ours_reaches_beyond_a_short_road(name: str) -> None:
+    run = minisim.simulate(four_way(100, arm_length=60.0, horizon=20.0), controller_named(name))
+    road = run.site.intersection.approach_length
+    assert max(run.plan.sight, *run.plan.marks, 0.0) <= max(road, Plan().sight)
+
+
+def test_a_period_is_at_least_a_step() -> None:
+    with pytest.raises(ControllerError, match=r"controller 'dim:period=0\.05': period"):
+        minisim.simulate(four_way(horizon=1.0), Dim(period=0.05))

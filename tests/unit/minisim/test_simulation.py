@@ -253,7 +253,7 @@ def test_wake_ups_come_on_the_tick(plan: Plan, answer: Any, step: float) -> None
         times.append(view.time)
         return answer(view)
 
-    minisim.simulate(replayed(four_way(), (50.0, 0, 1), horizon=7.0), Scripted(note, plan))
+    minisim.simulate(replayed(four_way(), (6.0, 0, 1), horizon=7.0), Scripted(note, plan))
     assert times == pytest.approx(np.arange(0.0, 7.01, step))
 
 

@@ -13,7 +13,15 @@ from dim import AsRunDim, Dim, HarmonyMatrix, Monitor, NoisyPerception, Zones
 from minisim.control import Controller
 from minisim.errors import InputError
 from scenarios import controllers
-from scenarios.controllers import CONTROLLERS, RIVALS, SAFE, VARIANTS, controller_named, plugins
+from scenarios.controllers import (
+    CONTROLLERS,
+    RIVALS,
+    SAFE,
+    VARIANTS,
+    controller_named,
+    plugins,
+    unused_plugins,
+)
 
 
 @pytest.mark.parametrize("name", [*CONTROLLERS, *VARIANTS])
@@ -40,10 +48,11 @@ def test_the_paper_s_four_come_first_among_the_rivals() -> None:
         ("dim:monitor=off,matrix=None", Dim()),
         ("dim:priorities=(1,0,2,3)", Dim(priorities=(1, 0, 2, 3))),
         ("dim:matrix=paper(4)", Dim(matrix=HarmonyMatrix.paper(4))),
+        ("fixed-time:order=(c,b,a,d)", FixedTime(order=(2, 1, 0, 3))),
         ("dim:zones=zones(green=3)", Dim(zones=Zones(green=3))),
         ("fixed-time:equal_greens=TRUE", FixedTime(equal_greens=True)),
-        ("fixed-time:equal_greens=on,greens=[5,6.5,7,8]",
-         FixedTime(equal_greens=True, greens=(5, 6.5, 7, 8))),
+        ("fixed-time:all_red=1,greens=[5,6.5,7,8]",
+         FixedTime(all_red=1, greens=(5, 6.5, 7, 8))),
         ("dim-as-run:names='acbd'", AsRunDim(names="acbd")),
         ("baselines:FixedTime(amber=3)", FixedTime(amber=3)),
         ("baselines.signals.fixed_time:FixedTime(5)", FixedTime(5)),
@@ -79,21 +88,52 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("dim:gate=harmonius", "dim: unknown gate 'harmonius'.*; did you mean 'harmonious'"),
         ("dim:gate=harmonious(k=1)", r"unknown gate harmonious\(k=1\)"),
         ("dim:period=-1", r"dim: period \[s\] must be above 0, got -1"),
-        ("dim:period=1e999", r"period \[s\] must be above 0 and finite, got inf"),
+        ("dim:period=1e999", r"period \[s\] must be a finite number, got inf"),
         ("dim:monitor=on(patience=100)", r"monitor=on: patience \[s\] must be .* at most 60"),
         ("dim:monitor=onn", "unknown monitor 'onn'; allowed: on, off, none; did you mean 'on'"),
-        ("dim:monitor=3", "monitor must be a Monitor, got 3"),
+        ("dim:monitor=3", "monitor must be on, off, none or a Monitor, got 3"),
         ("dim:perception=noisy(knd=1)", "unknown perception=noisy parameter 'knd'.*mean 'kind'"),
         ("dim:gate=clear,gate=clear", "dim is given gate twice"),
         ("dim:gate", "written dim:key=value,key=value, got 'dim:gate'"),
         ("dim:", "written dim:key=value"),
         ("dim:gate=", "cannot read 'gate=', the parameters of dim"),
         ("dim:a=b)(c", "cannot read"),
-        ("dim:gate=1+1", r"cannot read '1 \+ 1' among the parameters of dim"),
+        ("dim:gate=1+1", r"cannot read '1\+1' among the parameters of dim"),
         ("dim:gate=b'x'", "cannot read"),
         ("dim:**x", "cannot read 'x'"),
         ("dim:matrix=HarmonyMatrix#12345678", "a value that only Python can give"),
         ("unregulated:k=1", "unregulated has no parameters, got k"),
+        ("DIM", "unknown controller 'DIM'.*or a class of your own.*; did you mean 'dim'"),
+        ("DIM:gate=clear", "cannot read controller .*; did you mean 'dim:gate=clear'"),
+        ("dim(gate=clear)", "; did you mean 'dim:gate=clear'"),
+        ("dim gate=clear", "; did you mean 'dim:gate=clear'"),
+        ("dim:gate=clear,", "the parameters of dim end with a comma"),
+        ("dim:monitor=on(patience=3,)", "the parameters of on end with a comma"),
+        ("dim:monitor=on(patience=3", "cannot read .*; a bracket is missing"),
+        ("dim:perception=none", "perception must be exact, noisy or a Perception, got None"),
+        ("dim:perception=noisy(shared=no)", "shared must be true or false, got 'no'"),
+        ("dim:matrix=paper", r"matrix=paper needs n; write matrix=paper\(n=…\)"),
+        ("dim:matrix=file", r"matrix=file needs path; write matrix=file\(path=…\)"),
+        (
+            "dim:matrix=file(my/m.csv)",
+            "cannot read 'my/m.csv' .* quoted texts such as 'my/file.csv'",
+        ),
+        ("dim:matrix=file(/m.csv)", "cannot read .* paths in quotes"),
+        ("dim:turn_time=5", "turn_time has an effect only with priorities=rotating or waiting"),
+        ("dim:priorities=rotating,sensor_range=90", "sensor_range .* only with priorities=waiting"),
+        ("fixed-time:greens=5,max_cycle=99", "max_cycle has an effect only with Webster's greens"),
+        ("fixed-time:greens=5,lost_time=1", "lost_time has an effect only with Webster's greens"),
+        ("fixed-time:max_cycle=5", "max_cycle .* at least 6"),
+        ("adaptive:order=(a,z)", "unknown lane in order 'z'"),
+        ("mine.Fast", "; did you mean 'mine:Fast'"),
+        ("pkg.mine.Fast(k=3)", r"; did you mean 'pkg.mine:Fast\(k=3\)'"),
+        ("mine:Fast(k=(1,2)", "the parameters of mine:Fast: .*; a bracket is missing"),
+        ("mine:Fast(k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
+        ("mine:Fast:k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
+        ("mine:Fast k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
+        ("one-at-a-time:sight=60", "unknown controller 'one-at-a-time'.*or a class of your own"),
+        ("os:PathLike", "os:PathLike is no controller: it has no name and no start"),
+        ("minisim.control:Controller", "Controller is no controller: it is a class"),
         ({"gate": "clear"}, "needs a name"),
         ({"name": 3}, "needs a name"),
         ({"name": "dim", "gate": 3}, "unknown gate 3"),
@@ -130,6 +170,22 @@ def test_installed_packages_add_names(monkeypatch: pytest.MonkeyPatch) -> None:
     plugin(monkeypatch, ("webster", "baselines:FixedTime"), ("dim", "baselines:FixedTime"))
     assert controller_named("webster:amber=3") == FixedTime(amber=3)
     assert controller_named("dim") == Dim(), "ours are not hidden"
+
+
+def test_names_that_are_taken_are_listed_as_unused(monkeypatch: pytest.MonkeyPatch) -> None:
+    twice = ("own", "baselines:FixedTime"), ("own", "baselines:Adaptive")
+    plugin(monkeypatch, ("dim", "baselines:FixedTime"), *twice)
+    assert controller_named("own") == FixedTime()
+    assert unused_plugins() == {
+        "dim of minisim-extra": "not used: minisim has a controller of that name",
+        "own of minisim-extra": "not used: minisim-extra has a controller of that name",
+    }
+
+
+def test_a_registered_class_that_is_no_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+    plugin(monkeypatch, ("extra", "os:PathLike"))
+    with pytest.raises(InputError, match="extra is no controller: it has no name and no start"):
+        controller_named("extra")
 
 
 @pytest.mark.parametrize("value", ["no_such_module:Thing", "baselines:Thing"])

@@ -66,7 +66,21 @@ def test_shares_are_numbers_or_a_text(split: str | Sequence[float]) -> None:
     assert four_way(split="balanced", turns="uniform") == four_way()
 
 
-@pytest.mark.parametrize("text", ["", "4,3", "4:x", "::", "even"])
+@pytest.mark.parametrize("text", ["4,3,2,1", "(4, 3, 2, 1)", "[4,3,2,1]", " 4 : 3:2:1 "])
+def test_shares_may_be_a_tuple_or_list_in_a_text(text: str) -> None:
+    assert four_way(split=text).demand.split == (4.0, 3.0, 2.0, 1.0)
+
+
+def test_recorded_arrivals_replace_the_demand() -> None:
+    recorded = four_way(100, horizon=60.0).arrivals(1)
+    assert four_way(recorded=recorded).recorded is recorded
+    with pytest.raises(InputError, match="recorded replaces density, split; give one or the"):
+        four_way(100, split="4:3:2:1", recorded=recorded)
+    with pytest.raises(InputError, match="min_headway goes with the model 'shifted'"):
+        four_way(min_headway=2.0)
+
+
+@pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])
 def test_bad_shares_are_one_sentence(text: str) -> None:
     with pytest.raises(InputError, match="split is balanced or written like 4:3:2:1, got"):
         four_way(split=text)

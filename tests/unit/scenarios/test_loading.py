@@ -59,6 +59,9 @@ class Failing:
     def __init__(self):
         raise RuntimeError("no luck")
 
+    def start(self, site):
+        return FixedTime().start(site)
+
 
 class Nothing:
     pass
@@ -143,26 +146,40 @@ def test_a_sweep_over_two_processes_runs_it() -> None:
     assert sorted(rows["controller"]) == ["mine-10", "mine-5"]
 
 
+@pytest.mark.usefixtures("folder")
+def test_a_sweep_says_what_a_plain_class_lacks() -> None:
+    recipe = Recipe(four_way(), "own_mine:Plain(k=3)")  # type: ignore[arg-type]
+    with pytest.raises(
+        InputError, match=r"Plain is no dataclass.*make it a frozen dataclass"
+    ) as it:
+        key_of(recipe)
+    assert "0x" not in str(it.value)
+
+
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("own_mine:Mien", "unknown class of own_mine 'Mien'.*; did you mean 'Mine'"),
+        ("own_mine:Mien", "unknown controller of own_mine 'Mien'; allowed: Mine, Plain, Failing;"),
         ("own_mine:Mine(kk=3)", "unknown own_mine:Mine parameter 'kk'.*; did you mean 'k'"),
-        ("own_mine:Mine(k='a')", "k of own_mine:Mine must be a float, got 'a'"),
-        ("own_mine:Mine(k=true)", "k of own_mine:Mine must be a float, got True"),
-        ("own_mine:Mine(label=3)", "label of own_mine:Mine must be a str, got 3"),
-        ("own_mine:Mine(parts=1.5)", "parts of own_mine:Mine must be a int or None, got 1.5"),
-        ("own_mine:Plain(k=1.5)", "k of own_mine:Plain must be a int, got 1.5"),
+        ("own_mine:Mine(k='a')", "k of own_mine:Mine must be a number, got 'a'"),
+        ("own_mine:Mine(k=true)", "k of own_mine:Mine must be a number, got True"),
+        ("own_mine:Mine(label=3)", "label of own_mine:Mine must be a text, got 3"),
+        ("own_mine:Mine(parts=1.5)", "parts of .* must be a whole number or none, got 1.5"),
+        ("own_mine:Plain(k=1.5)", "k of own_mine:Plain must be a whole number, got 1.5"),
         ("own_mine:Mine(1,'a',3,4,5)", "own_mine:Mine: too many positional arguments"),
         ("own_mine:Failing", "own_mine:Failing cannot be made: RuntimeError: no luck"),
         ("own_mine:Nothing", "own_mine:Nothing is no controller: it has no name and no start"),
+        ("own_mine", "cannot read controller 'own_mine'.*'own_mine:Mine' or 'own_mine:Plain' or"),
+        ("own_mine:", "cannot read controller 'own_mine:'.*; did you mean 'own_mine:Mine' or"),
+        ("own_mine.py", "did you mean 'own_mine.py:Mine' or"),
+        ("own_mine:Mine(greens=x(3))", "greens of own_mine:Mine has no recipe x"),
         ("own_none:Mine", "no module 'own_none': there is no own_none.py in the working directory"),
         ("nowhere/own.py:Mine", "cannot read nowhere/own.py: no such file"),
         ("own_syntax:Mine", "cannot import own_syntax: own_syntax.py, line 2: SyntaxError: "),
         ("own_raises:Mine", "cannot import own_raises: own_raises.py, line 2: ValueError: no"),
         ("own_exits:Mine", "cannot import own_exits: own_exits.py, line 1: SystemExit: 3"),
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
-        ("own_empty:Mine", "own_empty has no class 'Mine', and no other either"),
+        ("own_empty:Mine", "own_empty has no class 'Mine', and no controller either"),
         ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
         ("time:Mine", "time.py has the name of another module, time; rename the file"),
     ],

@@ -120,7 +120,7 @@ def test_reference_numbers() -> None:
     ("cell", "message"),
     [
         (("balanced", 400, 4), "no run of balanced 400"),
-        (("4:3:2:1", 350, 5), "3 and 5 arms were balanced only"),
+        (("4:3:2:1", 350, 5), "on 3 and 5 arms it has only balanced runs"),
         (("1:1", 350, 4), "unknown split"),
         (("balanced", 350.5, 4), "density"),
         (("balanced", 350, 5, "fts"), "no run of fts, balanced 350"),
@@ -190,7 +190,7 @@ def test_the_adaptive_signal_was_an_actuated_one_at_4321() -> None:
     """as_run.md, discrepancy 12; the phases come in the order of the authors' network."""
     assert controller_of("balanced", 150, 4, "ats") == Adaptive(order=PHASES)
     assert controller_of("4:1:4:1", 150, 4, "ats") == Adaptive(order=PHASES)
-    assert controller_of("4:3:2:1", 150, 4, "ats") == Actuated(order=PHASES)
+    assert controller_of("4:3:2:1", 150, 4, "ats") == Actuated(order=PHASES, presence=False)
     assert controller_of("4:3:2:1", 150, 4, "ats", as_labelled=True) == Adaptive(order=PHASES)
 
 
@@ -256,7 +256,8 @@ def test_replays_of_dim_are_those_of_sumo_1_18_and_meet_the_published_means(cell
     """Wait within 10 %, travel within 0.5 s (as_run.md); far closer in fact."""
     ours = means(cell)
     assert ours == published(cell, rel=0.02, travel=0.06)
-    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 1e-4)
+    # SUMO's trips are rounded to 0.01 s, and its means to four decimals.
+    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 2e-4)
 
 
 @pytest.mark.parametrize("density", [150, 200, 250, 300, 350])

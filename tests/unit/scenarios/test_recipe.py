@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from baselines import AllWayStop
-from dim import Dim, Mixed
+from baselines import AllWayStop, FixedTime
+from dim import AsRunDim, Dim, Mixed
 from minisim import simulate
+from minisim.control import Session, Site, Unregulated
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.recipe import Recipe
@@ -55,3 +58,54 @@ def test_it_is_a_value() -> None:
     recipe = Recipe(SHORT, Dim(), 1, humans=0.2)
     assert pickle.loads(pickle.dumps(recipe)) == recipe
     assert hash(recipe) == hash(Recipe(SHORT, Dim(), 1, humans=0.2))
+
+
+def test_a_text_or_table_names_the_controller() -> None:
+    said: Any = ("dim:gate=harmonious", {"name": "dim", "gate": "harmonious"})
+    wanted = Recipe(four_way(), Dim(gate="harmonious"))
+    assert [Recipe(four_way(), one) for one in said] == [wanted, wanted]
+    published: Any = "dim"
+    assert Recipe(four_way(profile="as_run"), published).controller == AsRunDim()
+    with pytest.raises(InputError, match="unknown gate 'harmonius'"):
+        Recipe(four_way(), "dim:gate=harmonius")  # type: ignore[arg-type]
+
+
+def test_simulate_says_how_a_text_becomes_a_controller() -> None:
+    named: Any = "dim:gate=harmonious"
+    with pytest.raises(InputError, match=r"make it by scenarios.controllers.controller_named"):
+        simulate(four_way(), named)
+
+
+def test_a_controller_that_cannot_serve_a_site_is_named() -> None:
+    with pytest.raises(InputError, match=r"^fixed-time:greens=\(5,5,5\): greens has 3 values"):
+        simulate(four_way(), FixedTime(greens=(5, 5, 5)))
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A controller with one name for all its parameters."""
+
+    k: float = 1.0
+    name = "dc"
+
+    def start(self, site: Site) -> Session:
+        return Unregulated().start(site)
+
+
+def test_rows_tell_parameters_of_one_name_apart() -> None:
+    recipes = [Recipe(four_way(0, horizon=1), Constant(k)) for k in (1.0, 2.0)]
+    assert [recipe.name for recipe in recipes] == ["dc", "dc:k=2"]
+    assert recipes[1].run().summary()["controller"] == "dc:k=2"
+
+
+@pytest.mark.parametrize("name", ["", "a\nb", "\ud800", 3])
+def test_a_controller_needs_a_name_that_can_be_printed(name: Any) -> None:
+    nameless: Any = SimpleNamespace(name=name, start=Unregulated().start)
+    with pytest.raises(InputError, match=r"the name of controller .* must be a text"):
+        Recipe(four_way(), nameless)
+
+
+def test_a_misspelt_density_gets_the_nearest_keyword() -> None:
+    misspelt: Any = {"densty": 300}
+    with pytest.raises(InputError, match=r"'densty'; allowed: density, .*; did you mean 'density'"):
+        four_way(**misspelt)

@@ -7,7 +7,9 @@ import pickle
 import numpy as np
 import pytest
 
+from minisim import simulate
 from minisim.arrivals import Arrivals, Demand
+from minisim.control import Unregulated
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.vehicle import VehicleType
@@ -68,9 +70,28 @@ def test_arrivals_come_from_the_demand_and_the_seed_alone() -> None:
 def test_recorded_arrivals_replace_the_demand() -> None:
     recorded = table((0.0, 0, 1), (1.0, 0, 2), (2.0, 3, 3))
     scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND, horizon=1800, recorded=recorded)
-    assert scenario.arrivals(1) is recorded
+    assert scenario.arrivals(1).manoeuvre.tolist() == [1, 2, 3]
     assert scenario.rates == pytest.approx((4.0, 0.0, 0.0, 2.0))
     assert scenario.density == pytest.approx(1.5)
+
+
+def test_a_table_of_which_nothing_lies_within_the_horizon_is_refused() -> None:
+    late = table((25205.0, 0, 1), (28000.0, 1, 2))
+    message = r"within the horizon of 3600 s: the first .* is at 25205 s \(07:00:05\); `start`"
+    with pytest.raises(InputError, match=message):
+        Scenario(name="x", intersection=FOUR, demand=DEMAND, recorded=late)
+    assert Scenario(name="x", intersection=FOUR, demand=DEMAND, recorded=late, horizon=25206.0)
+
+
+def test_the_horizon_is_exclusive() -> None:
+    """A vehicle that comes at the horizon has no time to drive: it is no trip."""
+    recorded = table((0.0, 0, 2), (600.0, 0, 2), (600.0, 1, 2), (601.0, 0, 2))
+    scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND, horizon=600, recorded=recorded)
+    assert sum(scenario.rates) == pytest.approx(6.0)
+    run = simulate(scenario, Unregulated())
+    assert (run.summary()["trips"], run.summary()["unfinished"]) == (1, 0)
+    assert run.columns.taken(run.counted_rows).demand_time.tolist() == [0.0]
+    assert len(run.trips) == 1
 
 
 def test_scenarios_are_values() -> None:

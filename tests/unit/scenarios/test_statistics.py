@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from minisim.errors import InputError
-from minisim.results.metrics import queue_growth
+from minisim.results.trips import queue_growth
 from scenarios.statistics import (
     Interval,
     growing,

@@ -13,9 +13,10 @@ from baselines.signals.phases import Verdict
 from minisim.control import Observed, View
 from minisim.errors import InputError
 from minisim.testing import small_scenario
+from minisim.vehicle import VehicleType
 from scenarios.library import four_way
 from scenarios.profiles import AS_RUN_SIGNALS
-from tests.builders import drive, seen
+from tests.builders import Greens, drive, queues, seen
 
 SITE = four_way(profile="fair").site()
 #: (3/1.9 + 0.5) places of 7.5 m: nearer than two seconds at 14 m/s.
@@ -49,12 +50,12 @@ def test_the_loop_is_two_seconds_before_the_line_or_nearer() -> None:
 
 def test_it_is_woken_when_a_rear_bumper_leaves_the_loop() -> None:
     plan = Actuated().start(SITE).plan
-    assert plan.marks == pytest.approx((LOOP - SITE.vehicle.length,))
+    assert plan.marks == pytest.approx((LOOP - SITE.vehicle.length, 0.0))
     assert plan.sight > LOOP
 
 
 def test_a_vehicle_leaves_the_loop_once() -> None:
-    session = GapSession(Actuated(), SITE)
+    session = GapSession(Actuated(presence=False), SITE)
     gone = seen(1, 0, 2, 10.0, 10.0)
     for time in (10.0, 11.0, 12.0):
         session.see(View(time, (gone,)))
@@ -96,9 +97,29 @@ def test_a_vehicle_standing_on_the_loop_leaves_no_gap() -> None:
         assert verdict(100.0, 5.0, seen(2, 1, 1, distance)) == PASS_ON, "of another lane"
         assert verdict(None, 49.5, seen(2, 0, 1, distance)).after == pytest.approx(0.5)
         assert verdict(None, 50.0, seen(2, 0, 1, distance)) == PASS_ON, "the longest green"
-    for distance in (LOOP + 0.1, LOOP - 5.1):
-        found = verdict(100.0, 5.0, seen(2, 0, 1, distance))
-        assert found == (PASS_ON if distance > LOOP else (0, 2.0))
+    assert verdict(100.0, 5.0, seen(2, 0, 1, LOOP + 0.1)) == PASS_ON
+
+
+def test_a_vehicle_between_loop_and_line_prolongs_the_green() -> None:
+    """It counts as one that is at the line now, and left the loop at the speed limit."""
+    near = seen(2, 0, 1, 0.0)
+
+    def waiting(elapsed: float, **more: Any) -> Verdict:
+        session = GapSession(Actuated(**more), SITE)
+        for time in (900.0, 1000.0):
+            session.see(View(time, (near,)))
+        return session.judge(View(1000.0, (near,)), 0, elapsed)
+
+    signal = Actuated()
+    assert waiting(5.0).lane == 0
+    assert waiting(5.0, presence=False) == PASS_ON, "as in SUMO"
+    assert waiting(50.0) == PASS_ON, "the longest green"
+    session = GapSession(signal, SITE)
+    for time in (9.0, 10.0, 12.0):
+        session.see(View(time, (seen(2, 0, 1, 0.0),)))
+    after = signal.max_gap - (LOOP - 5.0) / 14.0
+    assert session.judge(View(12.0 + after - 0.1, ()), 0, 5.0).lane == 0
+    assert session.judge(View(12.0 + after + 0.1, ()), 0, 5.0) == PASS_ON
 
 
 # Whole signals.
@@ -111,12 +132,22 @@ def test_on_an_empty_junction_every_green_is_the_shortest() -> None:
     }  # fmt: skip
 
 
+def test_no_green_ends_while_its_queue_stands_with_the_loop_in_a_gap() -> None:
+    """Vehicles of 6 m with gaps of 2.5 m: the third begins 17 m before the line."""
+    queue = queues(VehicleType(length=6.0))
+    signals = {presence: Greens(Actuated(presence=presence)) for presence in (True, False)}
+    for watched in signals.values():
+        minisim.simulate(queue, watched)
+    assert not any(signals[True].left)
+    assert any(signals[False].left), "as in SUMO"
+
+
 def test_it_waits_longer_than_the_adaptive_signal_where_one_lane_has_most() -> None:
     """The claim "ATS declines" at 4:3:2:1 depends on it (as published: 5.9 to 7.9 s)."""
     scenario = four_way(350, profile=AS_RUN_SIGNALS, split=(4, 3, 2, 1))
     actuated, adaptive = (
         minisim.simulate(scenario, signal, seed=1).summary()["waiting_time_s"]
-        for signal in (Actuated(), Adaptive())
+        for signal in (Actuated(presence=False), Adaptive())
     )
     assert actuated > 1.1 * adaptive
 
@@ -124,5 +155,5 @@ def test_it_waits_longer_than_the_adaptive_signal_where_one_lane_has_most() -> N
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(InputError, match="max_green must be at least min_green, 20 s, got 10 s"):
         Actuated(min_green=20.0, max_green=10.0)
-    with pytest.raises(InputError, match="order must be the lanes 0 … 3"):
+    with pytest.raises(InputError, match="order must be the lanes a … d"):
         Actuated(order=(0, 1, 1, 3)).start(SITE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import minisim
 from baselines import FixedTime
-from baselines.signals.webster import webster
+from baselines.signals.webster import MIN_GREEN, webster
 from minisim.control import Site, View
 from minisim.errors import InputError
 from minisim.results.safety import safety_summary
@@ -30,12 +31,46 @@ def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
     assert timing.greens == pytest.approx((10.75,) * 4)
 
 
-def test_the_cycle_counts_what_is_really_lost() -> None:
+def test_webster_knows_the_amber_and_the_all_red() -> None:
+    """L = 4 × (4 + 2) s: C0 = (1.5 × 24 + 5)/(1 − 800/1500)."""
+    timing = FixedTime(amber=4.0, all_red=2.0).timing(four_way(density=200).site())
+    assert (
+        timing.cycle == pytest.approx(41.0 / (1.0 - 800 / 1500)) == pytest.approx(87.857, abs=1e-3)
+    )
+    assert timing.greens == pytest.approx(((timing.cycle - 24.0) / 4,) * 4)
+
+
+def test_a_lost_time_of_its_own_moves_green_to_where_vehicles_leave() -> None:
+    """Webster: green and amber shown are the effective green and the lost time."""
     site = four_way(density=250).site()
-    timing = FixedTime(amber=3.0, all_red=1.0).timing(site)
-    assert timing.greens == pytest.approx((10.75,) * 4)
-    assert timing.cycle == pytest.approx(4 * (10.75 + 4.0))
-    assert timing.saturation == pytest.approx((250 * 59 / (1500 * 10.75),) * 4)
+    timing = FixedTime(amber=3.0, lost_time=2.0).timing(site)
+    assert timing.cycle == pytest.approx(51.0)
+    assert timing.greens == pytest.approx((9.75,) * 4)  # 10.75 s are effective
+    assert timing.saturation == pytest.approx(FixedTime().timing(site).saturation)
+    late = FixedTime(amber=1.0, lost_time=6.0, greens=(5.0, 9.0, 9.0, 9.0)).timing(site)
+    assert late.saturation[0] == np.inf, "it loses all of its green"
+    assert late.saturation[1] == pytest.approx(250 * 36 / (1500 * 4))
+    empty = FixedTime(amber=9.0, lost_time=2.0).timing(four_way(density=0).site())
+    assert min(empty.greens) >= MIN_GREEN
+
+
+def test_the_longest_cycle_holds_all_that_is_shown() -> None:
+    site = small_scenario(5, density=350).site(0)
+    timing = FixedTime(amber=4.0, all_red=2.0, max_cycle=150.0).timing(site)
+    assert timing.capped
+    assert timing.cycle == pytest.approx(150.0)
+
+
+def test_a_textbooks_signal() -> None:
+    """Khanna & Justo, Highway Engineering: two phases, amber 2 s, 12 s of all-red in a cycle.
+
+    Flows of 400 and 250 pcu/h at saturation flows of 1250 and 1000 (here at 1000) give a cycle of
+    67.5 s and greens of 28.9 and 22.5 s.
+    """
+    site: Any = SimpleNamespace(intersection=SimpleNamespace(n=2), demand=(320.0, 250.0))
+    timing = FixedTime(saturation_flow=1000.0, amber=2.0, all_red=6.0).timing(site)
+    assert timing.cycle == pytest.approx(67.5, abs=0.1)
+    assert timing.greens == pytest.approx((28.9, 22.5), abs=0.1)
 
 
 def test_greens_may_be_one_number_or_one_a_lane() -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 import minisim
-from baselines import LongestQueue
+from baselines import Adaptive, LongestQueue
 from baselines.signals.longest_queue import QueueSession
 from minisim.control import Observed, View
+from minisim.errors import InputError
 from scenarios.library import four_way, regular
 from tests.builders import drive, seen, show
 
@@ -96,3 +97,11 @@ def test_the_busier_lanes_get_more_green() -> None:
     held = frame[~frame["right_of_way"] & (frame["s_m"] < run.site.intersection.approach_length)]
     share = held.groupby("lane").size() / frame.groupby("lane").size()
     assert max(share["a"], share["b"]) < min(share["c"], share["d"])
+
+
+@pytest.mark.parametrize("signal", [Adaptive, LongestQueue])
+def test_a_detector_shorter_than_a_queue_needs_is_refused(signal: type) -> None:
+    """Its next vehicle, a length of 5 m and a gap of 2.5 m behind, would not be seen."""
+    with pytest.raises(InputError, match=r"detector_range \[m\] must be at least 11.25, got 11"):
+        signal(detector_range=11.0).start(SITE)
+    signal(detector_range=11.25).start(SITE)

@@ -24,7 +24,8 @@ MANY = 20_000
 
 
 def human(share: float, seed: int = 3, count: int = MANY) -> np.ndarray:
-    return Drivers(Humans(), share, seed).human(count)
+    drivers = Drivers(Humans(), share, seed)
+    return np.array([drivers[i % 4, i // 4].human for i in range(count)])
 
 
 def test_shares_are_nested() -> None:
@@ -41,22 +42,23 @@ def test_shares_are_nested() -> None:
 
 def test_drivers_do_not_depend_on_the_order_of_asking() -> None:
     forwards, backwards = (Drivers(Humans(deviation=0.3), 0.5, 7) for _ in range(2))
-    wanted = [forwards[i] for i in range(1000)]
-    assert [backwards[i] for i in reversed(range(1000))] == wanted[::-1]
-    assert wanted != [Drivers(Humans(deviation=0.3), 0.5, 8)[i] for i in range(1000)]
+    wanted = [forwards[1, i] for i in range(1000)]
+    assert [backwards[1, i] for i in reversed(range(1000))] == wanted[::-1]
+    for other in (Drivers(Humans(deviation=0.3), 0.5, 8), forwards):
+        assert wanted != [other[2, i] for i in range(1000)]
 
 
 def test_drawing_drivers_shifts_no_other_stream() -> None:
     before = stream(7, "drivers").bytes(64)
-    human(0.5, seed=7)
+    human(0.5, seed=7, count=100)
     assert stream(7, "drivers").bytes(64) == before
 
 
 def test_critical_gaps_are_log_normal_about_the_published_mean() -> None:
     alike = Drivers(Humans(), 1.0, 1)
-    assert {alike[i].gap for i in range(100)} == {1.0}
+    assert {alike[0, i].gap for i in range(100)} == {1.0}
     differing = Drivers(Humans(deviation=0.25), 1.0, 1)
-    gaps = np.array([differing[i].gap for i in range(MANY)])
+    gaps = np.array([differing[0, i].gap for i in range(MANY)])
     assert gaps.mean() == pytest.approx(1.0, abs=5 * 0.25 / math.sqrt(MANY))
     assert gaps.std() == pytest.approx(0.25, rel=0.05)
     logs = np.log(gaps)
@@ -83,8 +85,8 @@ def test_turns_without_a_signal_have_the_published_rates(manoeuvre: int, rate: f
 def test_what_is_believed() -> None:
     read = readings()
     drivers = Drivers(Humans(), 1.0, 1)
-    silent = next(i for i in range(100) if drivers[i].careless < 0.25)
-    telling = next(i for i in range(100) if drivers[i].careless > 0.29)
+    silent = next(i for i in range(100) if drivers[1, i].careless < 0.25)
+    telling = next(i for i in range(100) if drivers[1, i].careless > 0.29)
     everything = [3, 4, 5]  # of lane b
     table = {
         ("motion", telling, 1): everything,
@@ -125,7 +127,7 @@ def test_vehicles_of_dim_always_tell() -> None:
 def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
     read = readings(site=three_way().site())
     drivers = Drivers(Humans(), 1.0, 1)
-    silent = next(i for i in range(100) if drivers[i].careless < 0.25)
+    silent = next(i for i in range(100) if drivers[0, i].careless < 0.25)
     assert read.possible(seen(silent, 1), "silence") == [0, 1]
 
 

@@ -14,20 +14,21 @@ from dim.agent import GATES
 from dim.humans.drivers import Drivers
 from minisim.control import Go, Observed, Session, View, Wake
 from minisim.junction.movements import Movement
+from minisim.results.run import Run
 from scenarios import four_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import outcome_of
 from tests.builders import digest, replayed, seen, view
 
 SITE = four_way(profile="fair").site()
-#: Drivers of this share and seed, with ids by kind.
+#: Drivers of this share and seed, with ids (and ranks) that are of one kind on every lane.
 MIXED = Mixed(share=0.5)
-HUMAN = MIXED.human(SITE.seed, 200)
-PEOPLE = np.flatnonzero(HUMAN).tolist()
 DRIVERS = Drivers(Humans(), MIXED.share, SITE.seed)
-#: A driver that announces every turn.
-TELLING = next(i for i in PEOPLE if DRIVERS[i].careless > 0.29)
-CARS = np.flatnonzero(~HUMAN).tolist()
+HUMAN = np.array([[DRIVERS[lane, i].human for lane in range(4)] for i in range(400)])
+PEOPLE = np.flatnonzero(HUMAN.all(axis=1)).tolist()
+#: A driver that announces every turn, on every lane.
+TELLING = next(i for i in PEOPLE if all(DRIVERS[k, i].careless > 0.29 for k in range(4)))
+CARS = np.flatnonzero(~HUMAN.any(axis=1)).tolist()
 A, B, C, D = range(4)
 LEFT, STRAIGHT, RIGHT = 1, 2, 3
 EVERY_GATE = pytest.mark.parametrize("gate", GATES)
@@ -217,9 +218,26 @@ def test_a_share_without_any_human_changes_nothing_either() -> None:
     """The cautious look at humans is no other look where there are none."""
     scenario = four_way(300, profile="fair", horizon=120.0)
     rare = Mixed(share=1e-9)
-    assert not rare.human(4, 200).any()
     run, alone = (minisim.simulate(scenario, c, 4) for c in (rare, Dim()))
+    assert set(run.kinds) == {"automated"}
     assert run.trips.drop(columns="kind").equals(alone.trips)
+
+
+def test_who_is_human_depends_on_no_other_lane_and_not_on_the_horizon() -> None:
+    def kinds(run: Run) -> dict[int, list[str]]:
+        trips = run.trips
+        return {lane: trips.loc[trips["lane"] == lane, "kind"].tolist() for lane in "ac"}
+
+    road = four_way(100, profile="fair", horizon=300.0)
+    half = replace(road, demand=replace(road.demand, density=50.0, split=(1, 0, 1, 0)))
+    whole, longer, alone = (
+        kinds(minisim.simulate(it, Mixed(share=0.5), 4))
+        for it in (road, replace(road, horizon=400.0), half)
+    )
+    assert alone == whole
+    for lane, found in whole.items():
+        assert set(found) == {"human", "automated"}
+        assert longer[lane][: len(found)] == found
 
 
 def test_one_driver_alone_loses_what_stopping_costs() -> None:
@@ -243,7 +261,8 @@ def test_drivers_that_believe_in_silence_collide() -> None:
 def test_the_groups_of_a_run_make_up_the_whole() -> None:
     run = minisim.simulate(four_way(150, profile="fair", horizon=600.0), Mixed(share=0.4), 2)
     groups = run.summary()["kinds"]
-    human = run.controller.human(run.seed, len(run.columns.lane))  # type: ignore[attr-defined]
+    drivers, met = Drivers(Humans(), 0.4, run.seed), run.scenario.arrivals(run.seed)
+    human = np.array([drivers[k].human for k in zip(met.lane, met.rank, strict=True)])
     assert groups["human"]["trips"] == int(human.sum()) > 10
     waits = run.columns.waiting_time[human & run.columns.departed]
     assert groups["human"]["complete"]["waiting_time_s"] == pytest.approx(float(waits.mean()))

@@ -152,6 +152,17 @@ def test_the_order_of_looking_does_not_matter() -> None:
     assert forth == back[::-1]
 
 
+def test_what_others_do_to_ids_changes_no_error() -> None:
+    """An id depends on the arrivals on all lanes; lane and rank do not."""
+    noisy = NoisyPerception(intent_error=0.5, shared=False, position_noise=1.0, speed_noise=1.0)
+    places = list(enumerate(crowd(40).vehicles))
+    renamed = View(0.0, tuple(v._replace(id=1000 - k) for k, v in places))
+    see, again = noisy.start(SITE), noisy.start(SITE)
+    for k, ego in places:
+        seen_by, after = see(crowd(40), ego), again(renamed, renamed.vehicles[k])
+        assert [v[1:] for v in seen_by.vehicles] == [v[1:] for v in after.vehicles]
+
+
 def test_a_seed_is_a_run_of_its_own() -> None:
     perception = NoisyPerception(0.25)
     views = [intents(perception.start(small_scenario(4).site(s)), crowd(400), 0) for s in (1, 1, 2)]

@@ -8,17 +8,28 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from dim import Dim
+from dim import Dim, NoisyPerception
 from dim.humans.mixed import Mixed
 from minisim.control import Unregulated
 from minisim.errors import InputError
-from minisim.results.metrics import MEANS, METRICS, SAFETY, TABLE, Metric, heading, recording
+from minisim.results.metrics import (
+    MEANS,
+    METRICS,
+    SAFETY,
+    TABLE,
+    Metric,
+    heading,
+    metric_of,
+)
 from minisim.results.run import Run
+from minisim.results.safety import near_junction, safety_summary
+from minisim.results.trips import Floats, Trips
 from minisim.testing import small_scenario
 from scenarios import four_way
 
@@ -109,31 +120,59 @@ def test_other_wrong_questions(run: Run) -> None:
     two = [Metric("m", lambda run: 1), Metric("m", lambda run: 2)]
     for wrong, message in (
         ({"metrics": two}, "two metrics are called 'm'"),
-        ({"metrics": "trips"}, "metrics must be a sequence of names and Metrics, got 'trips'"),
+        ({"metrics": 5}, "metrics must be a sequence of names and Metrics, got 5"),
+        ({"metrics": "trip"}, "unknown metric 'trip'.*did you mean 'trips'"),
         ({"by": ["lanee"]}, "did you mean 'lane'"),
     ):
         with pytest.raises(InputError, match=message):
             run.summary(**wrong)  # type: ignore[arg-type]
     for name in ("two words", "", "seed", 3):
-        with pytest.raises(InputError, match="name of a metric must be letters"):
+        with pytest.raises(InputError, match="name of a metric must be"):
             Metric(name, len)  # type: ignore[arg-type]
+    for name in ("complete_m", "lanes_a_m", "movements_m", "kinds_m", "m_p95", "m_max", "m_ci95"):
+        with pytest.raises(
+            InputError, match=f"must be none that columns of runs have, got '{name}'"
+        ):
+            Metric(name, len)
     with pytest.raises(InputError, match="must be a function"):
         Metric("m", 5)  # type: ignore[arg-type]
 
 
-def test_an_error_in_a_metric_tells_which(run: Run) -> None:
-    with pytest.raises(ZeroDivisionError) as caught:
-        run.summary([Metric("broken", lambda run: 1 / 0)])
-    assert caught.value.__notes__ == ["in metric 'broken'"]
+def test_an_error_in_a_metric_tells_which_and_where(run: Run) -> None:
+    for of, what in (
+        (lambda run: 1 / 0, r"ZeroDivisionError: division by zero \(test_metrics.py, line \d+\)"),
+        (lambda run: run.trips["dely"], r"KeyError: 'dely' \(test_metrics.py, line \d+\)"),
+        (math.sqrt, "TypeError: must be real number, not Run"),
+    ):
+        with pytest.raises(InputError, match=f"^metric 'broken' raised {what}$"):
+            run.summary([Metric("broken", of)])
+
+
+def test_a_function_is_a_metric_too(run: Run) -> None:
+    def delays(trips: Trips) -> Floats:
+        return trips.depart_delay
+
+    delays.unit, delays.per, delays.needs = "s", "trip", "trips"  # type: ignore[attr-defined]
+    assert metric_of(delays) == Metric("delays", delays, "s", per="trip", needs="trips")
+    summary = run.summary([delays, "depart_delay_s"])
+    assert summary["delays_p95"] == summary["depart_delay_s_p95"]
+
+
+def test_a_count_of_the_controller_hides_no_metric(run: Run) -> None:
+    counting = replace(run, counts={"honks": 3, "crossings": 2})
+    summary = counting.summary(["crossings"])
+    assert (summary["honks"], summary["crossings"]) == (3, 2)
+    with pytest.raises(InputError, match="'honks' is also what the controller calls a count"):
+        counting.summary([Metric("honks", lambda run: 1)])
+    with pytest.raises(InputError, match="'trips' is also what the controller calls a count"):
+        replace(run, counts={"trips": 3}).summary()
 
 
 def test_safety_needs_trajectories() -> None:
     run = minisim.simulate(small_scenario(demand_time=20.0), Dim())
     assert not set(SAFETY) & set(run.summary())
-    with pytest.raises(InputError, match="'min_pet_s' needs trajectories: simulate with record="):
+    with pytest.raises(InputError, match="metric 'min_pet_s': no trajectories: simulate with rec"):
         run.summary(["min_pet_s"])
-    assert recording(["trips"]) is None
-    assert recording(["trips", "min_pet_s"]) == "junction"
 
 
 def test_safety_is_that_of_the_junction_whatever_was_recorded() -> None:
@@ -157,18 +196,61 @@ def test_headings() -> None:
 
 @given(warmup=st.floats(0.0, 119.0))
 def test_trips_demanded_in_the_warmup_do_not_count(warmup: float) -> None:
-    scenario = replace(four_way(300, horizon=120.0), warmup=warmup)
-    run = minisim.simulate(scenario, Dim(), 2)
+    scenario = four_way(300, horizon=120.0)
+    every = minisim.simulate(scenario, Dim(), 2).trips
+    run = minisim.simulate(replace(scenario, warmup=warmup), Dim(), 2)
     summary, trips = run.summary(), run.trips
-    kept = trips[trips["demand_time_s"] >= warmup]
+    kept = every[every["demand_time_s"] >= warmup].reset_index(drop=True)
+    pd.testing.assert_frame_equal(trips, kept)
     assert summary["trips"] == len(kept) == sum(x["trips"] for x in summary["lanes"].values())
     assert summary["unfinished"] == kept["arrival_s"].isna().sum()
     for name in ("waiting_time_s", "depart_delay_s"):
         mean = kept.loc[kept["arrival_s"].notna(), name].mean()
         assert summary[name] == (pytest.approx(mean) if mean == mean else None)
-    assert len(trips) == len(run.columns.lane), "the table has them all"
+    assert len(run.columns.lane) == len(every), "the arrays have them all"
     assert f"warmup={warmup}" in run.provenance["scenario"]
     assert summary["warmup_s"] == warmup
+
+
+@pytest.fixture(scope="module")
+def erring() -> tuple[Run, Run, Run]:
+    """One run without a warm-up, one with 60 s, and the first one until then."""
+    scenario = four_way(300, profile="fair", horizon=150.0)
+    controller = Mixed(Dim(perception=NoisyPerception(intent_error=0.25)), 0.3)
+    every, warm, early = (
+        minisim.Simulation(made, controller, seed=3, record="all", on_collision="record")
+        for made in (scenario, replace(scenario, warmup=60.0), scenario)
+    )
+    early.advance(60.0)
+    return every.run(), warm.run(), early.result()
+
+
+def test_nothing_else_in_the_warmup_is_measured(erring: tuple[Run, Run, Run]) -> None:
+    every, warm, early = erring
+    pd.testing.assert_frame_equal(every.trajectories, warm.trajectories)
+    frame = every.trajectories[every.trajectories["time_s"] >= 60.0]
+    assert warm.safety == safety_summary(near_junction(frame, every.site), every.site)
+    assert warm.safety["pets"] < every.safety["pets"]  # type: ignore[operator]  # both are numbers
+    assert early.counts["crossings"] > 0
+    for name, count in warm.counts.items():
+        assert count == pytest.approx(every.counts[name] - early.counts[name], abs=0.11)
+    assert warm.collisions == every.collisions, "they always count"
+
+
+def test_own_metrics_get_no_warmup_either(erring: tuple[Run, Run, Run]) -> None:
+    every, warm, _ = erring
+    first = Metric("first", lambda run: run.trajectories["time_s"].min(), needs="trajectories")
+    rows = Metric("rows", lambda run: len(run.trips))
+    ids = Metric("ids", lambda run: run.columns.vehicle.astype(float), per="trip")
+    kinds = Metric("kind_count", lambda run: len(run.kinds))
+    summary = warm.summary([first, rows, ids, kinds])
+    kept = every.columns.vehicle[every.columns.demand_time >= 60.0]
+    assert summary["first"] == 60.0
+    assert summary["rows"] == summary["kind_count"] == summary["trips"] == len(kept)
+    assert warm.trips["vehicle"].tolist() == kept.tolist()
+    assert summary["ids_max"] <= kept[-1]
+    assert warm.counted.counted is warm.counted
+    assert every.counted is every
 
 
 def test_a_warmup_is_shorter_than_the_run() -> None:
@@ -197,6 +279,9 @@ def test_a_repr_is_short_and_has_the_means(run: Run) -> None:
     assert len(lines) <= 5
     assert "four-way, dim+humans=0.4: 250 veh/h/lane, profile fair, seed 3, 300 s" in lines[0]
     assert f"waiting {run.summary()['waiting_time_s']:.2f} s" in repr(run)
+    warm = replace(run, scenario=replace(four_way(horizon=300.0), warmup=60.0))
+    for text in (repr(warm).splitlines()[0], warm._repr_html_()):
+        assert "seed 3, 300 s (warm-up 60 s)" in text
     odd = replace(run, scenario=replace(small_scenario(), name="a\n" * 500))
     assert len(repr(odd).splitlines()) <= 5
     empty = minisim.simulate(small_scenario(density=0), Dim())

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -19,7 +22,9 @@ from PIL import Image
 import minisim.simulation
 from dim import HarmonyMatrix
 from minisim.errors import InputError
+from minisim.recorded import write_arrivals
 from minisim.results.metrics import METRICS, SAFETY
+from minisim.results.run import Run
 from minisim.results.summary import TRIP_COLUMNS
 from scenarios import four_way
 from scenarios.cli import COMMANDS, app, main
@@ -194,6 +199,12 @@ def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: 
     assert "touched" in said
     assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
     assert list(tmp_path.iterdir()) == []
+    assert main([*arguments, "--json"]) == 1
+    printed = capsys.readouterr()
+    facts = json.loads(printed.out)
+    assert (facts["controller"], facts["seed"], facts["collisions"]) == ("unregulated", 0, 1)
+    assert len(facts["touched"][0]["vehicles"]) == 2
+    assert f"minisim: {facts['error']}; {trips} not written" in printed.err
     out = ok(capsys, *arguments, "--on-collision", "record")
     assert " touched" in out
     assert trips.exists()
@@ -218,11 +229,10 @@ def test_without_safety_nothing_is_recorded(
 
 def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
-    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--no-safety", "--json"))
+    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--json"))
     assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
     assert len(printed["movements"]) == 12
-    assert printed["max_drac_mps2"] > 0.0, "its trajectories are recorded for it"
-    assert "min_ttc_s" not in printed
+    assert printed["max_drac_mps2"] > 0.0
     out = ok(capsys, "run", "four-way", *SHORT, *asked)
     rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
     means = printed["movements"]["a1"]
@@ -230,6 +240,66 @@ def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     assert rows["a1"][2:] == [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
     for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"):
         assert word in out
+
+
+def test_each_number_is_printed_once(capsys: Captured) -> None:
+    once = ("collisions", "min_ttc_s", "trips", "unfinished", "max_braking_mps2", "crossings")
+    out = ok(capsys, "run", "four-way", *SHORT, "--metrics", ",".join(once))
+    for word in ("collisions", "minimum TTC", "trips", "unfinished", "hardest braking"):
+        assert out.replace("with unfinished", "").count(word) == 1, word
+    assert "crossings – (counted only where perception errs)" in out
+    noisy = "dim:perception=noisy(unsignalled=(0.29,0.25))"
+    out = ok(capsys, "run", "four-way", "--horizon", "60", "--metrics", "crossings", "-c", noisy)
+    assert out.count("crossings") == 1
+
+
+def test_the_warmup_is_named_and_left_out(capsys: Captured, tmp_path: Path) -> None:
+    file = tmp_path / "trips.csv"
+    arguments = ("run", "four-way", *SHORT, "--warmup", "60", "--trips", str(file))
+    assert "seed 0, 240 s (warm-up 60 s)" in ok(capsys, *arguments)
+    trips = pd.read_csv(file)
+    assert trips["demand_time_s"].min() >= 60.0
+    assert trips["vehicle"][0] > 0
+    assert len(trips) == json.loads(ok(capsys, *arguments, "--json"))["trips"]
+
+
+OWN = """
+from minisim.results.metrics import Metric
+
+
+def delay(trips):
+    return trips.depart_delay
+
+
+delay.unit, delay.per, delay.needs = "s", "trip", "trips"
+twice = Metric("twice", lambda run: 2 * len(run.trips))
+
+
+def broken(run):
+    return run.trips["dely"].mean()
+"""
+
+
+def test_metrics_of_ones_own(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own_metrics.py").write_text(OWN, encoding="utf-8")
+    run = ("run", "four-way", *SHORT, "--no-safety", "--metrics")
+    printed = json.loads(ok(capsys, *run, "own_metrics:delay, own_metrics.py:twice", "--json"))
+    assert printed["delay"] == printed["depart_delay_s"]
+    assert printed["twice"] == 2 * printed["trips"]
+    assert "delay [s]" in ok(capsys, *run, "own_metrics:delay")
+    said = fails(capsys, *run, "own_metrics:broken")
+    assert "metric 'broken' raised KeyError: 'dely' (own_metrics.py, line 14)" in said
+    assert "unknown metric of own_metrics 'dealy'" in fails(capsys, *run, "own_metrics:dealy")
+    (tmp_path / "e.toml").write_text(
+        'horizon = 60\nseeds = 2\nmetrics = ["own_metrics:delay", "own_metrics:twice"]\n'
+    )
+    out = ok(capsys, "sweep", "e.toml", "--out", "s.db", "--jobs", "2")
+    for word in ("delay [s]", "p95", "twice"):
+        assert word in out
+    del sys.modules["own_metrics"]
 
 
 def test_metrics_lists_the_table(capsys: Captured) -> None:
@@ -293,14 +363,59 @@ def test_answers_are_drawn(capsys: Captured, tmp_path: Path, command: str) -> No
         assert file.read_bytes().startswith(magic)
 
 
+def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None:
+    morning = tmp_path / "morning.csv"
+    morning.write_text("demand_time_s,lane,manoeuvre\n25205,a,2\n25207,b,1\n28900,c,3\n")
+    run = ("run", "four-way", "--arrivals", str(morning), "--no-safety", "--json")
+    late = fails(capsys, *run)
+    assert "nobody comes within the horizon of 3600 s: the first recorded arrival is at" in late
+    assert "25205 s (07:00:05)" in late
+    for start, trips in (("07:00", 2), ("25205", 2), ("8:00", 1), ("7:00:06", 1)):
+        assert json.loads(ok(capsys, *run, "--start", start))["trips"] == trips
+    assert "start must be a time of day" in fails(capsys, *run, "--start", "7h")
+    assert "nobody comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
+    film = ("-o", str(tmp_path / "film.gif"))
+    for command in (("run", "four-way"), ("animate", "four-way", *film)):
+        assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
+
+
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
-    ok(capsys, "animate", "four-way", "-o", str(file), "--start", "60", "--seconds", "2",
+    ok(capsys, "animate", "four-way", "-o", str(file), "--from", "60", "--seconds", "2",
        "--fps", "5", "--density", "400")  # fmt: skip
     with Image.open(file) as film:
         assert film.n_frames == 10
         assert film.info["duration"] == 200
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("more", [(), ("--arrivals", "{arrivals}"), ("--humans", "0.4")])
+def test_a_film_shows_the_run_of_the_same_options(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    """To the last digit of a trip; the film just ends earlier."""
+    recorded = tmp_path / "arrivals.csv"
+    write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
+    films: list[Run] = []
+    monkeypatch.setattr(
+        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
+    )
+    what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
+    what = (*what, *(() if "--arrivals" in what else ("-d", "300")))
+    for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
+        options = (*what, "-c", controller)
+        ok(capsys, "animate", *options, "-o", str(tmp_path / "x.gif"), "--from", "140")
+        ok(capsys, "run", *options, "--trips", str(tmp_path / "trips.csv"), "--no-safety")
+        film, whole = films.pop().trips, pd.read_csv(tmp_path / "trips.csv")
+        over = film["arrival_s"] <= 200.0
+        assert over.sum() > 20
+        pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
+
+
+def test_a_film_lies_within_the_run(capsys: Captured, tmp_path: Path) -> None:
+    film = ("animate", "four-way", "-o", str(tmp_path / "film.gif"), "--from", "280")
+    assert "--seconds must be" in fails(capsys, *film, "--horizon", "300")
+    assert "--from [s] must be" in fails(capsys, *film, "--horizon", "200")
 
 
 def test_animate_checks_before_it_simulates(
@@ -312,7 +427,7 @@ def test_animate_checks_before_it_simulates(
     for file, more, said in (
         ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
-        ("f.gif", ("--start", "1e300"), "start"), ("f.gif", ("--seconds", "1e300"), "seconds"),
+        ("f.gif", ("--from", "1e300"), "--from"), ("f.gif", ("--seconds", "1e300"), "seconds"),
     ):  # fmt: skip
         assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
     recorded = tmp_path / "f.gif"
@@ -381,6 +496,11 @@ BAD = [
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
     (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
+    (
+        ("run", "four-way", "--metrics", "pets,min_ttc_s", "--no-safety"),
+        "--metrics asks for pets, min_ttc_s, which --no-safety leaves out",
+    ),
+    (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
@@ -398,6 +518,15 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "above 0 and at most 1e+07, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
+    (("sweep", "capacity"), "earlier ones: minisim reproduce --only capacity"),
+    (("sweep", "x" * 300), "unknown study 'xxx"),
+    (("sweep", "x" * 300 + ".toml"), "File name too long"),
+    (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "File name too long"),
+    (("sweep", "/dev/full"), "/dev/full: it is neither an ordinary file nor a pipe"),
+    (("sweep", "/"), "cannot read experiments from /: Is a directory"),
+    (("run", "four-way", "--arrivals", "/dev/zero"), "neither an ordinary file nor a pipe"),
+    (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
+    (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("sweep", "missing.toml"), "cannot read experiments from missing.toml"),
     (("sweep",), "Missing argument"),
@@ -551,3 +680,100 @@ def test_arrivals_of_a_smaller_junction_are_refused(capsys: Captured, tmp_path: 
     assert "junction with 3 arms" in message
     table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows[:3], ""]))
     assert main(["run", "four-way", "--arrivals", str(table), "--horizon", "60"]) == 0
+
+
+FAULTY = """
+from dataclasses import dataclass
+from minisim.control import Plan
+
+@dataclass(frozen=True)
+class Faulty:
+    name: str = "faulty"
+    plan: Plan = Plan(period=1.0)
+
+    def start(self, site):
+        return self
+
+    def decide(self, view):
+        return [] if view.time < 3 else 1 / 0
+"""
+
+
+def test_an_error_of_a_controller_is_one_line(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine_faulty.py").write_text(FAULTY)
+    run = ("run", "four-way", "--horizon", "10", "-c", "mine_faulty:Faulty")
+    told = "controller 'faulty' at 3.0 s: mine_faulty.py, line 14: ZeroDivisionError: division by"
+    assert told in fails(capsys, *run)
+    Path("e.toml").write_text('seeds = 1\nhorizon = 10\ncontroller = "mine_faulty:Faulty"\n')
+    assert main(["sweep", "e.toml", "--jobs", "1"]) == 1
+    said = capsys.readouterr().out
+    assert "the first (faulty, four-way, 350 veh/h/lane, seed 1): " + told in said
+    monkeypatch.setenv("MINISIM_TRACEBACK", "1")
+    assert main(list(run)) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [
+    ["--version"], pytest.param(["sweep", "e.toml", "--jobs", "2"], marks=pytest.mark.slow),
+])  # fmt: skip
+def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_path: Path) -> None:
+    """Neither for the command nor for its workers; `collections.py` would, for all of Python."""
+    for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
+    (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "minisim", *command], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+#: Runs `minisim reproduce`, and presses Ctrl-C when a module is looked for.
+PRESSING = """
+import os, runpy, signal, sys
+
+wanted = sys.argv.pop()
+
+class Presses:
+    def find_spec(self, name, *_):
+        if name == wanted:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Presses())
+runpy.run_module("minisim", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize("module", ["scenarios.cli", "typer", "figures.reproduction_report"])
+def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PRESSING, "reproduce", module], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode in (130, -signal.SIGINT)
+    assert done.stderr in ("", "minisim: interrupted\n")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups are POSIX's")
+@pytest.mark.parametrize("seconds", [0.5 * k for k in range(1, 13)])
+def test_ctrl_c_shows_no_traceback_at_any_moment(seconds: float, tmp_path: Path) -> None:
+    """Not even of a worker that has just been started."""
+    command = [sys.executable, "-m", "minisim", "reproduce", "--only", "text", "--jobs", "2"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    ) as process:  # fmt: skip
+        time.sleep(seconds)
+        told = None
+        while told is None:  # a library may swallow the first one
+            os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                _, told = process.communicate(timeout=20)
+    assert process.returncode in (130, -signal.SIGINT)
+    assert "Traceback" not in told
+    assert "KeyboardInterrupt" not in told

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
 from minisim.parameters import parameters
+from scenarios import controllers as table
 from scenarios.controllers import CONTROLLERS
-from tests.unit.scenarios.cli.test_cli import Captured, ok
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 
 def test_it_lists_all_of_them(capsys: Captured) -> None:
@@ -31,8 +33,10 @@ def test_it_lists_the_parameters_of_each(capsys: Captured, name: str) -> None:
 
 def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     text = ok(capsys, "controllers", "dim")
-    assert "perception=noisy: " in text
-    assert ok(capsys, "controllers", "dim:gate=harmonious").split()[1:] == text.split()[1:]
+    assert "perception=noisy(…): " in text
+    given = ok(capsys, "controllers", "dim:gate=harmonious,monitor=on(patience=3)")
+    assert "\n  gate=harmonious  (clear | harmonious)" in given
+    assert "\n  patience=3 [s]" in given
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
 
@@ -53,5 +57,39 @@ def test_a_class_of_your_own(
     )
     text = ok(capsys, "controllers", "own_signal:Slow")
     assert text == "own_signal:Slow: A slow signal.\n\n  green=30  (float)\n"
+    given = ok(capsys, "controllers", "own_signal:Slow(green=20)")
+    assert given.endswith("\n\n  green=20  (float)\n")
     run = ("run", "four-way", "--horizon", "60", "--no-safety", "--json")
     assert json.loads(ok(capsys, *run, "-c", "own_signal:Slow(green=20)"))["controller"] == "slow"
+
+
+@pytest.mark.parametrize("name", ["dim:bogus=1", "os:PathLike", "dim:", "baselines:FixedTime(x=1)"])
+def test_what_is_no_controller_has_no_page(capsys: Captured, name: str) -> None:
+    assert fails(capsys, "controllers", name).count("\n") == 1
+
+
+def test_registered_names_are_listed_with_their_meaning(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = {"extra": "baselines:FixedTime", "broken": "no_such:Thing", "dim": "dim:Dim"}
+    points = [EntryPoint(name, value, "minisim.controllers") for name, value in values.items()]
+    monkeypatch.setattr(table, "entry_points", lambda group: points)
+    table.plugins.cache_clear()
+    listed = json.loads(ok(capsys, "controllers", "--json"))
+    table.plugins.cache_clear()
+    assert listed["extra"].startswith("A signal that gives each approach its green")
+    assert "cannot be loaded: ModuleNotFoundError" in listed["broken"]
+    assert listed["dim of dim"] == "not used: minisim has a controller of that name"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "four-way", "-c", "dim", "--controller=fixed-time"),
+        ("run", "four-way", "-d300", "-d", "350"),
+        ("crossval", "-c", "dim", "-c", "fixed-time", "-c", "dim"),
+        ("reproduce", "--only", "text", "--only", "text"),
+    ],
+)
+def test_what_is_given_twice_is_refused(capsys: Captured, words: tuple[str, ...]) -> None:
+    assert "is given twice" in fails(capsys, *words)

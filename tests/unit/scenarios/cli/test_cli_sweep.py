@@ -17,6 +17,7 @@ from scenarios.cli import main
 from scenarios.studies import text
 from scenarios.studies.shared.archive import find_in
 from scenarios.studies.shared.effort import Effort
+from scenarios.sweep import keys
 from scenarios.sweep.store import Store
 from tests import ROOT
 from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
@@ -31,7 +32,9 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_sweep_and_the_same_again(file: Path, tmp_path: Path, capsys: Captured) -> None:
+def test_a_sweep_and_the_same_again(
+    file: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
     store, table = tmp_path / "s.db", tmp_path / "rows.csv"
     arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
     lines = ok(capsys, *arguments).splitlines()
@@ -42,9 +45,12 @@ def test_a_sweep_and_the_same_again(file: Path, tmp_path: Path, capsys: Captured
     assert first["controller"].tolist() == ["dim", "dim", "fixed-time", "fixed-time"]
     assert first["seed"].tolist() == [1, 2, 1, 2]
     table.unlink()
-    assert main(arguments) == 0
+    assert "another version" not in ok(capsys, *arguments)
     again = pd.read_csv(table)
     pd.testing.assert_frame_equal(first, again)  # processor times too: nothing was run
+    monkeypatch.setattr(keys, "RESULTS", keys.RESULTS + 1)
+    few = [*arguments, "--seeds", "1"]
+    assert f"  {store} also keeps 2 rows of another version of minisim" in ok(capsys, *few)
 
 
 def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
@@ -54,6 +60,24 @@ def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
     rows = pd.read_parquet(table)
     assert rows["horizon_s"].tolist() == [30.0, 30.0]
     assert rows["error"].isna().all()
+
+
+def test_the_table_shows_what_was_asked_for_and_tells_cells_apart(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    file, store = tmp_path / "e.toml", str(tmp_path / "s.db")
+    file.write_text(
+        'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n'
+        'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
+    )
+    lines = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", store).splitlines()
+    head = next(line for line in lines if "veh/h/lane" in line)
+    for word in ("turns", "time loss [s]", "p95", "trips", "hardest braking [m/s²]"):
+        assert head.count(word) == 1
+    assert head.count("collisions") == 1
+    assert "waiting" not in head
+    cells = [line.split() for line in lines if " dim " in line]
+    assert [cell[3] for cell in cells] == ["uniform", "1:2:1"]
 
 
 def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> None:

@@ -59,7 +59,7 @@ def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[b
     zero: Floats = np.zeros(4)
     done = np.array(arrived)
     return Trips(
-        end=END, demand_time=depart, depart=depart,
+        end=END, vehicle=np.arange(4), demand_time=depart, depart=depart,
         arrival=np.where(done, depart + travel, np.nan), lane=np.array(LANES),
         manoeuvre=np.array([1, 2, 3, 1]), exit_lane=np.array([1, 3, 3, 2]),
         waiting_time=np.array(waiting), travel_time=np.array(travel), time_loss=zero,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +16,12 @@ import pandas as pd
 import pytest
 
 from dim import Dim
+from minisim.control import Plan
 from minisim.errors import InputError
-from minisim.results.metrics import AVERAGED, Metric
+from minisim.results.metrics import MEANS, Metric
 from minisim.results.run import Run
 from minisim.simulation import simulate
-from scenarios import Scenario, five_way, four_way, three_way
+from scenarios import Scenario, five_way, four_way, from_bearings, three_way
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.statistics import (
@@ -29,7 +33,7 @@ from scenarios.sweep.cells import CELL, cells, differences, pairs, saturated
 from scenarios.sweep.keys import RESULTS, canonical, key_of
 from scenarios.sweep.rows import outcome_of
 from scenarios.sweep.store import Store
-from tests.builders import free_flow
+from tests.builders import Fixed, free_flow
 
 Floats = npt.NDArray[np.float64]
 
@@ -80,7 +84,7 @@ def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     first = found.iloc[0]
     group = rows[:3]
     assert (first["runs"], first["failed"]) == (3, 0)
-    for metric in AVERAGED:
+    for metric in (*MEANS, *(f"complete_{name}" for name in MEANS)):
         interval = mean_interval(group[metric].tolist())
         assert first[metric] == interval.mean
         assert first[f"{metric}_ci95"] == interval.half_width
@@ -185,21 +189,41 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
 
     assert key(one) == key(one)
     assert key(power(1.0)) == key(power(1.0)) != key(power(2.0)), "what it encloses counts"
-    first, second = (
-        lambda run: 1.0,
-        lambda run: 2.0,
-    )
-    assert key(first) != key(second)
+    pair = lambda run: 1.0, lambda run: 2.0  # fmt: skip  # one name, one line
+    assert key(pair[0]) == key(pair[0]) != key(pair[1])
+    inner = [lambda run: max(x for x in (1, 2)), lambda run: max(x for x in (1, 3))]
+    assert key(inner[0]) != key(inner[1])
     told = power(1.0)
     told.version = 2  # type: ignore[attr-defined]
     assert key(told) != key(power(1.0))
 
 
-def test_a_metric_that_gives_the_wrong_thing_is_a_failed_run() -> None:
-    wrong = Metric("mine", lambda run: "many")
+LIMIT = 1.0
+
+
+def test_a_global_that_an_own_metric_reads_is_part_of_the_key(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recipe = Recipe(four_way(), Dim(), metrics=(Metric("mine", lambda run: LIMIT),))
+    before = key_of(recipe)
+    monkeypatch.setattr(sys.modules[__name__], "LIMIT", 2.0)
+    assert key_of(recipe) != before
+
+
+@pytest.mark.parametrize(
+    ("of", "message"),
+    [
+        (lambda run: "many", r"metric 'mine' must give one finite number or None, got 'many'"),
+        (
+            lambda run: run.trips["wait"],
+            r"metric 'mine' raised KeyError: 'wait' \(test_cells.py, .*",
+        ),
+    ],
+)
+def test_a_metric_that_fails_is_a_failed_run(of: Callable[[Run], Any], message: str) -> None:
     todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
-    (error,) = sweep(todo, jobs=1, metrics=[wrong])["error"]
-    assert error == "metric 'mine' must give one finite number or None, got 'many'"
+    (error,) = sweep(todo, jobs=1, metrics=[Metric("mine", of)])["error"]
+    assert re.fullmatch(message, error)
 
 
 # --- experiments -----------------------------------------------------------------------------
@@ -280,3 +304,63 @@ def test_saturated_sums_over_runs_and_lanes() -> None:
     assert saturated(pd.DataFrame([one, one]))
     lane = {**one, "queue_growth": 0.0, "lanes_c_queue_growth": 0.9 * limit}
     assert saturated(pd.DataFrame([lane])), "1/√3 of the junction's limit is a lane's"
+
+
+# --- what must not be pooled -----------------------------------------------------------------
+
+
+def refused(todo: Sequence[Recipe], first: str, second: str, told: str) -> None:
+    found = sweep(todo, jobs=1)
+    with pytest.raises(InputError, match=told):
+        cells(found)
+    with pytest.raises(InputError, match=told):
+        differences(found, "complete_travel_time_s", first, second)
+
+
+@pytest.mark.parametrize("shift", [0, 3], ids=["the same seeds", "other seeds"])
+def test_two_controllers_of_one_name_are_not_one_cell(shift: int) -> None:
+    scenario = four_way(100, horizon=10)
+    todo = [
+        Recipe(scenario, Fixed(Plan(period=float(k))), seed + shift * k)
+        for k in (1, 2)
+        for seed in (1, 2, 3)
+    ]
+    told = r"different controllers or scenarios are called fixed on four-way at 100 veh/h/lane"
+    refused([*todo, Recipe(scenario, Dim(), 1)], "fixed", "dim", told)
+
+
+def test_two_junctions_of_one_name_are_not_one_cell() -> None:
+    todo = [
+        Recipe(from_bearings(bearings, 100, horizon=10), who, seed)
+        for bearings in ((0, 90, 180, 270), (0, 80, 180, 270))
+        for who in (Dim(), Dim(gate="harmonious"))
+        for seed in (1, 2, 3)
+    ]
+    refused(todo, "dim", "dim:gate=harmonious", "are called dim on custom at 100 veh/h/lane")
+
+
+def test_a_run_counts_once() -> None:
+    todo = [Recipe(four_way(100, horizon=10), Dim(), seed) for seed in (1, 2, 2)]
+    with pytest.raises(InputError, match=r"dim on four-way .* has several runs of seed 2"):
+        cells(sweep(todo, jobs=1))
+    frame = pd.DataFrame({
+        "who": ["x", "x", "y"], "m": 1.0, "where": 1, "seed": 1, "arrivals": "same", "error": None,
+    })  # fmt: skip
+    with pytest.raises(InputError, match="x has several runs of one seed; where are the same"):
+        pairs(frame, "m", "who", ("x", "y"), ["where"])
+
+
+def test_recorded_arrivals_that_differ_by_seed_are_one_cell() -> None:
+    plain = four_way(200, horizon=120)
+    days = {seed: replace(plain, recorded=plain.arrivals(seed)) for seed in (1, 2, 3)}
+    controllers = Dim(), Dim(gate="harmonious")
+    todo = [Recipe(day, who, seed) for who in controllers for seed, day in days.items()]
+    rows = sweep(todo, jobs=1)
+    mean = np.mean([day.density for day in days.values()])
+    found = cells(rows)
+    assert found["runs"].tolist() == [3, 3]
+    assert found["density"].tolist() == pytest.approx([mean, mean])
+    (gap,) = differences(rows, "travel_time_s", *(who.name for who in controllers))["pairs"]
+    assert gap == 3
+    low = [Recipe(day, Dim(), 1) for day in days.values()]
+    assert cells(sweep(low, jobs=1))["runs"].tolist() == [1, 1, 1], "one seed, three demands"

@@ -8,13 +8,12 @@ import pytest
 
 from baselines import FixedTime
 from dim import Dim, Mixed
-from minisim.arrivals import write_arrivals
 from minisim.errors import FileError, InputError, MinisimError
+from minisim.recorded import write_arrivals
 from scenarios import five_way, four_way, from_bearings, three_way
-from scenarios.cli import main, sweep
-from scenarios.cli.sweep import DEFAULTS
+from scenarios.cli import main
 from scenarios.recipe import Recipe
-from scenarios.sweep.file import AXES, CUSTOM, SINGLE, check_can_run, read_experiments
+from scenarios.sweep.file import check_can_run, read_experiments
 from scenarios.sweep.rows import identity_of
 
 
@@ -28,14 +27,6 @@ def read(tmp_path: Path, text: str) -> list[Recipe]:
 def test_a_file_that_names_nothing(text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the file does not say what to run; name a scenario"):
         read(tmp_path, text)
-
-
-def test_the_help_has_the_values_of_what_is_left_out() -> None:
-    drawn = {**AXES, **SINGLE}
-    assert drawn.pop("arrivals") is None
-    assert drawn.pop("metrics") == ()
-    assert drawn == DEFAULTS
-    assert sweep.CUSTOM == CUSTOM
 
 
 def test_a_short_file_is_one_cell_of_defaults(tmp_path: Path) -> None:
@@ -89,6 +80,8 @@ def test_everything_of_a_demand_can_be_said(tmp_path: Path) -> None:
 
 
 def test_shares_are_numbers_or_a_text(tmp_path: Path) -> None:
+    (text,) = read(tmp_path, 'seeds = [1]\nsplit = "(4,3,2,1)"\n')
+    assert text.scenario == four_way(split=(4, 3, 2, 1))
     (one,) = read(tmp_path, "seeds = [1]\nsplit = [4, 3, 2, 1]\nturns = [1, 2, 1]\n")
     assert one.scenario == four_way(split="4:3:2:1", turns="1:2:1")
     several = read(tmp_path, 'seeds = [1]\nsplit = [[4, 3, 2, 1], "balanced", "4:1:4:1"]\n')
@@ -100,6 +93,9 @@ def test_warmup_and_metrics_hold_for_the_block(tmp_path: Path) -> None:
     (one,) = read(tmp_path, 'seeds = [1]\nwarmup = 600\nmetrics = ["travel_time_s", "min_pet_s"]')
     assert one.scenario == four_way(warmup=600.0)
     assert one.metrics == ("travel_time_s", "min_pet_s")
+    for text in ('"pets"', '"pets, trips"', '["pets", "trips"]'):
+        (one,) = read(tmp_path, f"seeds = [1]\nmetrics = {text}")
+        assert one.metrics == ("pets", "trips")[: 1 + ("trips" in text)]
 
 
 def test_blocks_share_what_is_above_them(tmp_path: Path) -> None:
@@ -126,6 +122,11 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     assert found.scenario.recorded is not None
     assert found.scenario.recorded.time.tolist() == arrivals.time.tolist()
     assert found.scenario.density == pytest.approx(len(arrivals) * 36 / 4)
+    (later,) = read(tmp_path, 'arrivals = "a.csv"\nstart = "00:01"\nseeds = [0]\nhorizon = 100\n')
+    assert (
+        later.scenario.recorded.time.tolist()
+        == (arrivals.time[arrivals.time >= 60.0] - 60.0).tolist()
+    )
     assert identity_of(found)["split"] == "recorded"
 
 
@@ -135,6 +136,10 @@ def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
     found = read_experiments(file, seeds=2, horizon=50.0)
     assert [experiment.seed for experiment in found] == [1, 2]
     assert found[0].scenario.horizon == 50.0
+    for text in ('seeds = "x"', 'horizon = "abc"', "horizon = -1"):
+        file.write_text(text)
+        with pytest.raises(InputError, match=text[:5]):
+            read_experiments(file, seeds=2, horizon=50.0)
 
 
 WRONG = [
@@ -172,14 +177,18 @@ WRONG = [
     ('humans = 1.5', r"share of humans must be at least 0 and at most 1, got 1.5"),
     ('humans = 0.1\ncontroller = "fixed-time"', r"humans .*not with 'fixed-time'"),
     ('metrics = ["min_pet"]', r"unknown metric 'min_pet'.*did you mean 'min_pet_s'"),
-    ('metrics = "trips"', r"metrics must be a sequence"),
+    ('metrics = "trip"', r"unknown metric 'trip'.*did you mean 'trips'"),
+    ("metrics = 3", r"metrics must be a sequence"),
     ('on_collision = "ignore"', r"unknown on_collision 'ignore'"),
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a str"),
+    ('start = "07:00"', r"start goes with arrivals"),
     ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
      r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
+    ("min_headway = 2", r"min_headway goes with the model 'shifted'"),
+    ("seeds = 1\n[[experiment]]\nseeds = 2", r"seeds above the blocks is never used"),
 ]  # fmt: skip
 
 

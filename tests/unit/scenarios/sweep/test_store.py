@@ -8,13 +8,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
 from dim import Dim
+from minisim.control import Plan, Site
 from minisim.errors import FileError, InputError
 from scenarios import four_way, three_way
 from scenarios.cli import main
@@ -24,6 +26,7 @@ from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import Outcome, failed, outcome_of
 from scenarios.sweep.store import APPLICATION, SCHEMA, Store
 from tests import ROOT
+from tests.builders import Fixed, ScriptedSession
 
 
 def recipe_of(seed: int = 1) -> Recipe:
@@ -80,6 +83,10 @@ def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
         sweep([recipe_of(1)], jobs=1, store=store)
         assert ran == [1, 2, 2, 3, 1], "what another version computed"
         assert len(store) == 3
+        assert store.frame()["seed"].tolist() == [1]
+        assert store.outdated == (
+            f"{tmp_path / 's.db'} also keeps 2 rows of another version of minisim, not used here"
+        )
 
 
 def test_order_is_by_what_was_run(tmp_path: Path, outcome: Outcome) -> None:
@@ -303,3 +310,20 @@ def test_every_part_of_a_recipe_is_in_its_key() -> None:
         replace(base, scenario=replace(base.scenario, recorded=base.scenario.arrivals(2))),
     ]
     assert len({key_of(base), *(key_of(other) for other in others)}) == len(others) + 1
+
+
+def test_a_class_that_a_function_makes_has_no_key_of_its_own() -> None:
+    def made(k: int) -> Any:
+        @dataclass(frozen=True)
+        class Local(Fixed):
+            def start(self, site: Site) -> Any:
+                return ScriptedSession(Plan(period=float(k)), lambda view: ())
+
+        return Local
+
+    with pytest.raises(InputError, match=r"made.<locals>.Local cannot be stored: a function makes"):
+        key_of(Recipe(four_way(), made(1)()))
+    kinds = made(1), made(2)
+    for k, kind in enumerate(kinds):
+        kind.version = k
+    assert len({key_of(Recipe(four_way(), kind())) for kind in kinds}) == 2

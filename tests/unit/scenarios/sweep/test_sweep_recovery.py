@@ -202,3 +202,28 @@ def test_two_sweeps_may_share_a_store(tmp_path: Path) -> None:
     assert all(f"24 runs in {path}" in text for text in said)
     with Store(path, create=False) as store:
         assert len(store) == 24
+
+
+INTERRUPTED = """
+import os, signal, threading, time
+from scenarios.sweep.pool import pooled, processes
+
+if __name__ == "__main__":
+    threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        list(pooled(time.sleep, dict.fromkeys(range(9), 9.0), 2, pool_of=processes))
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+@pytest.mark.slow
+def test_giving_up_leaves_no_traceback_of_a_thread(tmp_path: Path) -> None:
+    """A pool of Python's fails over a run that is cancelled while others are under way."""
+    script = tmp_path / "script.py"
+    script.write_text(INTERRUPTED)
+    done = subprocess.run(
+        [sys.executable, script], env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("interrupted\n", "")

@@ -1,0 +1,158 @@
+"""Recorded arrival tables as CSV: reading, counting from a time of day, and writing."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+
+import numpy as np
+
+from minisim.arrivals import LEAST_FACTOR, MAX_TIME, MOST_FACTOR, Arrivals
+from minisim.errors import FileError, InputError, choice, instance, integer, number, show
+from minisim.files import AnyPath, read_file, write_text
+from minisim.junction.movements import ARM_NAMES
+
+COLUMNS = ("demand_time_s", "lane", "manoeuvre")
+#: May follow: the drivers' factors on the speed limit.
+FACTORS = "speed_factor"
+
+
+def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0) -> Arrivals:
+    """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
+
+    A column `speed_factor` may be there too.
+
+    Args:
+        path: the file.
+        n: number of arms; None allows as many as there are letters.
+        start: where the run begins in the recorded time, in seconds or as a time of day such as
+            "07:00". Vehicles that come earlier are left out.
+
+    Raises:
+        InputError: a start that is no time, or after which nobody comes.
+        FileError: unreadable, a column that is missing or unknown, a broken line (named by its
+            number), or a lane or manoeuvre that does not exist with n arms.
+    """
+    arms = len(ARM_NAMES) if n is None else integer("number of arms", n, low=3, high=len(ARM_NAMES))
+    begin = seconds_of(start)
+    header, *lines = _lines(path)
+    columns = _header(*header)
+    rows = [_row(where, columns, cells, arms) for where, cells in lines]
+    table = dict(zip(columns, zip(*rows, strict=True), strict=True)) if rows else {}
+    time, lane, manoeuvre = (np.array(table.get(column, ()), float) for column in COLUMNS)
+    factors = np.array(table.get(FACTORS, ()), float) if FACTORS in columns else None
+    arrivals = Arrivals(time, lane, manoeuvre, factors)
+    if begin and len(time) and time.max() < begin:
+        raise InputError(
+            f"{path}: nobody comes from {show(start)} on; the last vehicle comes at "
+            f"{clock(time.max())}"
+        )
+    return arrivals.between(begin, math.inf) if begin else arrivals
+
+
+def write_arrivals(arrivals: Arrivals, path: AnyPath) -> None:
+    """Write an arrival table in the form that `read_arrivals` reads; raises `FileError`."""
+    instance("arrivals", arrivals, Arrivals)
+    arrivals.check(len(ARM_NAMES))
+    lanes = [ARM_NAMES[lane] for lane in arrivals.lane]
+    columns = dict(zip(COLUMNS, (arrivals.time.tolist(), lanes, arrivals.manoeuvre), strict=True))
+    if arrivals.speed_factor is not None:
+        columns[FACTORS] = arrivals.speed_factor.tolist()
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    write_text(path, text.getvalue())
+
+
+def seconds_of(start: object) -> float:
+    """A time of day such as "07:00" or "07:00:30", or seconds, as seconds; raises `InputError`."""
+    value = start
+    if isinstance(start, str):
+        parts = re.fullmatch(r"([0-9]{1,2}):([0-5][0-9])(?::([0-5][0-9]))?", start.strip())
+        try:
+            value = (
+                float(start)
+                if parts is None
+                else sum(
+                    int(part or 0) * unit
+                    for part, unit in zip(parts.groups(), (3600, 60, 1), strict=True)
+                )
+            )
+        except ValueError:
+            raise InputError(
+                f"start must be a time of day such as 07:00 or seconds, got {show(start)}"
+            ) from None
+    return number("start [s]", value, low=0, high=MAX_TIME)
+
+
+def clock(time: float) -> str:
+    """A time in seconds, also as a time of day: "25205 s (07:00:05)"."""
+    minutes, second = divmod(math.floor(time), 60)
+    return f"{time:g} s ({minutes // 60:02d}:{minutes % 60:02d}:{second:02d})"
+
+
+def _lines(path: AnyPath) -> list[tuple[str, list[str]]]:
+    """The cells of each line that is not blank, and where it is."""
+    data = read_file("arrivals", path)
+    try:
+        reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
+        lines = [(f"{path}, line {reader.line_num}", [c.strip() for c in row]) for row in reader]
+    except UnicodeDecodeError as error:
+        utf16 = " (it looks like UTF-16)" * (data[:2] in (b"\xff\xfe", b"\xfe\xff"))
+        raise FileError(
+            f"cannot read arrivals from {path}: it is not UTF-8 text{utf16}, byte {error.start}"
+        ) from error
+    except csv.Error as error:
+        raise FileError(f"cannot read arrivals from {path}: {error}") from error
+    filled = [line for line in lines if any(line[1])]
+    if not filled:
+        raise FileError(f"{path} is empty; it needs the columns {', '.join(COLUMNS)}")
+    return filled
+
+
+def _header(where: str, header: list[str]) -> list[str]:
+    """The names of the columns; raises `FileError` for a missing, a repeated or another one."""
+    if len(header) == 1 and (mark := re.search("[;\t|]", header[0])):
+        raise FileError(f"{where}: separate columns by commas, not by {mark[0]!r}")
+    for column in header:
+        try:
+            choice("column", column, (*COLUMNS, FACTORS))
+        except InputError as error:
+            raise FileError(f"{where}: {error}") from None
+        if header.count(column) > 1:
+            raise FileError(f"{where}: there is more than one column {column}")
+    if missing := [column for column in COLUMNS if column not in header]:
+        raise FileError(f"{where}: column {', '.join(missing)} missing")
+    return header
+
+
+def _row(where: str, columns: list[str], cells: list[str], arms: int) -> list[float]:
+    if len(cells) != len(columns):
+        raise FileError(
+            f"{where}: expected {len(columns)} values, {', '.join(columns)}, got {len(cells)}"
+            f"{'; write decimals with a point' * (len(cells) > len(columns))}"
+        )
+    return [_value(where, *pair, arms) for pair in zip(columns, cells, strict=True)]
+
+
+def _value(where: str, column: str, cell: str, arms: int) -> float:
+    """The number that a cell stands for: a lane's index, a manoeuvre, seconds or a factor."""
+    if column == "lane":
+        lanes = list(ARM_NAMES[:arms])
+        if cell not in lanes:
+            raise FileError(f"{where}: lane must be one of {', '.join(lanes)}, got {show(cell)}")
+        return lanes.index(cell)
+    ranges = {FACTORS: (LEAST_FACTOR, MOST_FACTOR), "manoeuvre": (1, arms - 1)}
+    low, high = ranges.get(column, (0.0, MAX_TIME))
+    try:
+        return number(
+            column, int(cell) if column == "manoeuvre" else float(cell), low=low, high=high
+        )
+    except ValueError:
+        point = "; write decimals with a point" if "," in cell else ""
+        raise FileError(
+            f"{where}: {column} must be a number {low:g} … {high:g}, got {show(cell)}{point}"
+        ) from None
