@@ -37,8 +37,9 @@ class V2IC:
 
     # 200 m in the authors' code.
     reach: float = real(
-        "how far before the junction vehicles register", "m", low=1, high=2000, default=200.0
-    )
+        "how far before the junction, on the road, vehicles register", "m",
+        low=1, high=2000, default=200.0,
+    )  # fmt: skip
     # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
     # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), at an eighth of the
     # work.

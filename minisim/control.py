@@ -239,9 +239,11 @@ class Plan:
         "m", default=(), low=-1000,
     )  # fmt: skip
     wake_on_clear: bool = switch("wake when a rear bumper leaves the junction", default=False)
-    period: float | None = real("wake at this interval", "s", default=None, above=0, optional=True)
+    period: float | None = real(
+        "wake at this interval, at least the step", "s", default=None, above=0, optional=True
+    )
     sight: float = real(
-        "how far before the junction entry a view reaches", "m", default=50.0, low=0
+        "how far before the junction entry a view reaches, on the road", "m", default=50.0, low=0
     )
     reach: float = real(
         "a view holds a vehicle until its front is at least this far past the junction entry, even "

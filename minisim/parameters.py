@@ -160,8 +160,17 @@ def _documented(about: str, kind: type) -> str:
     """The docstring of a class with its parameters."""
     lines = [
         f"    {name}: {it.meaning}{f' [{it.unit}]' if it.unit else ''} ({it.allowed})"
-        + ("." if default is MISSING else f"; {show(default)} by default.")
+        + ("." if default is MISSING else f"; {_shown(default)} by default.")
         for name, it, default in parameters(kind)
     ]
     head = inspect.cleandoc(about) or f"{kind.__name__}."
     return "\n".join([head, "", "Parameters:", *lines]) if lines else head
+
+
+def _shown(default: Any) -> str:
+    """A default in a few words: recipes by their class, with … where they are not its default."""
+    if not dataclasses.is_dataclass(default):
+        return show(default)
+    kind: Any = type(default)
+    plain = all(getattr(default, name) == given for name, _, given in parameters(kind))
+    return f"{kind.__name__}({'' if plain else '…'})"

@@ -33,7 +33,7 @@ def load_class(module: str, name: str) -> type:
         InputError: no such module or class, or one that cannot be imported; the message names the
             file and line if they are known.
     """
-    kind: type = _member(*_place(module), name, "class", _is_class, _controllers)
+    kind: type = _member(*_place(module), name, "controller", _is_class, _controllers)
     return kind
 
 
@@ -120,7 +120,7 @@ def _member(
         return value
     if names := others(loaded):
         choice(f"{what} of {module}", name, names)
-    raise InputError(f"{module} has no {what} {name!r}, and no other either")
+    raise InputError(f"{module} has no {name!r}, and no other {what} either")
 
 
 def _module(folder: str, name: str) -> ModuleType:

@@ -96,8 +96,7 @@ def test_what_a_controller_covers_is_safe_and_served_and_it_refuses_what_it_cann
             continue
         try:
             run = minisim.simulate(scenario, controller, 1, on_collision="record")
-        except (InputError, ControllerError) as refusal:  # of a site, not of its vehicles
-            assert controller.name in str(refusal)
+        except (InputError, ControllerError):  # of the site, not of its vehicles
             continue
         assert len(run.columns.lane) > 3
         assert run.collisions == (), what

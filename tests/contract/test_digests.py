@@ -6,29 +6,30 @@ import pytest
 
 from tests.digests import TRIPS, cases, digest, recipe_of
 
-#: Case -> digest of its trips, from before the house was redesigned; those of the profiles as_run
-#: and as_run_signals are from when minisim learnt to drive like SUMO 1.18.
+#: Case -> digest of its trips, from when arrivals were first drawn by lane. On the arrivals of
+#: before, the trips were what they had been before the house was redesigned, but for the profiles
+#: as_run and as_run_signals.
 KEPT = {
-    "paper/4/dim/1": "74c7e874b97929f8",
-    "paper/3/dim:commit=paper/2": "86dc123846e093ad",
-    "fair/5/dim:gate=harmonious/1": "2add2105bf9184d4",
-    "fair/4/dim:monitor=on/1": "5bee1055dff5ef79",
-    "fair/4/dim:perception=noisy(intent_error=0.15,kind=symmetric)/2": "42157dd96eb2d084",
-    "fair/4/dim/1 humans=0.3": "8321b50b1127102b",
-    "paper/4/fixed-time/1": "4b5f8709f3fe553f",
-    "fair/4/adaptive/2": "fb8fdbea82be9a26",
-    "fair/3/actuated/1": "fd4a223affdcee3d",
-    "fair/4/longest-queue/1": "42157977f50783fc",
-    "paper/4/all-way-stop/1": "300bda961bc3197f",
-    "fair/4/v2ic/1": "938779fadf79e5b5",
-    "fair/5/reservation/2": "e034d4f26190ea2d",
-    "as_run/4/dim/1": "b02cfed84a807104",
-    "as_run/4/v2ic-as-run/1": "daf65ce632436dd1",
-    "as_run_signals/4/fixed-time/1": "0bd6f544bf354d4c",
-    "fair/4/dim/2 model=krauss": "8bc201e6349842b4",
-    "fair/4/dim/1 model=iidm": "1cdcfbd7057a4c70",
-    "fair/4/dim:gate=harmonious/1 side=right": "eecc861ccbbb55ae",
-    "fair/4/v2ic/2 bearings=(0.0, 80.0, 190.0, 260.0)": "c00b10ac8de9bae6",
+    "paper/4/dim/1": "d0c30b1365c30c9c",
+    "paper/3/dim:commit=paper/2": "8d8c2b6c4efc7102",
+    "fair/5/dim:gate=harmonious/1": "36501e6c4643cd78",
+    "fair/4/dim:monitor=on/1": "d94a2f41a4737c90",
+    "fair/4/dim:perception=noisy(intent_error=0.15,kind=symmetric)/2": "814c130165be4ce4",
+    "fair/4/dim/1 humans=0.3": "1616b0007eae9dbd",
+    "paper/4/fixed-time/1": "2ecea1096805f85d",
+    "fair/4/adaptive/2": "abc0c33341f21f73",
+    "fair/3/actuated/1": "4ab28569487290ac",
+    "fair/4/longest-queue/1": "75fec4a79f90e06c",
+    "paper/4/all-way-stop/1": "f1aaaa3887c49665",
+    "fair/4/v2ic/1": "03e5b1e65cfdd957",
+    "fair/5/reservation/2": "ac20feda12386622",
+    "as_run/4/dim/1": "25bba17c88569873",
+    "as_run/4/v2ic-as-run/1": "5640e6dfdec90219",
+    "as_run_signals/4/fixed-time/1": "17f242b455294cf7",
+    "fair/4/dim/2 model=krauss": "fd5f33336042bc1f",
+    "fair/4/dim/1 model=iidm": "3ffc59a67e219812",
+    "fair/4/dim:gate=harmonious/1 side=right": "27fc7ed105d9aac7",
+    "fair/4/v2ic/2 bearings=(0.0, 80.0, 190.0, 260.0)": "0f773c4aff841039",
 }
 CASES = {str(case): case for case in cases()}
 

@@ -27,7 +27,7 @@ def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> A
 
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, … or custom.")
+    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom.")
 ]
 ControllerName = Annotated[
     str, option("Who decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")

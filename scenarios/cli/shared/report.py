@@ -211,4 +211,4 @@ def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
 
 
 def _seconds(value: float | None, unit: str = "") -> str:
-    return "–" if value is None else f"{value:.2f}{unit}"
+    return "–" if value is None else f"{value if isinstance(value, int) else f'{value:.2f}'}{unit}"

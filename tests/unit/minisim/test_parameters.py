@@ -117,6 +117,7 @@ def test_the_docstring_lists_them() -> None:
         "    radius: from hub to rim [m] (> 0, ≤ 2).\n"
         "    spokes: number of them (integer 3 … 40); 32 by default."
     )
+    assert "the front wheel (small(radius)); Wheel(…) by default." in (Bicycle.__doc__ or "")
 
 
 def test_a_subclass_may_declare_a_field_anew() -> None:

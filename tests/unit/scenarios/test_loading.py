@@ -179,7 +179,7 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
         ("own_raises:Mine", "cannot import own_raises: own_raises.py, line 2: ValueError: no"),
         ("own_exits:Mine", "cannot import own_exits: own_exits.py, line 1: SystemExit: 3"),
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
-        ("own_empty:Mine", "own_empty has no class 'Mine', and no controller either"),
+        ("own_empty:Mine", "own_empty has no 'Mine', and no other controller either"),
         ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
         ("time:Mine", "time.py has the name of another module, time; rename the file"),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -81,18 +82,22 @@ def test_a_search_has_a_power_of_two_of_steps() -> None:
 
 
 def test_capacity_of_a_signal_is_what_it_serves_when_saturated() -> None:
-    """Bisection against the trips in an hour in which far more come than leave (Webster: s·g/C)."""
+    """Bisection against the trips in an hour in which far more come than leave (Webster: s·g/C).
+
+    The median over seeds: below capacity too, a queue may happen to be longer at the end.
+    """
     signal = FixedTime(greens=(8.0,) * 4)
 
     def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any]]:
         return [outcome_of(Recipe(e.scenario, signal, e.seed, label="x")).row for e in recipes]
 
-    (capacity,) = searched(of_dim(), Search(step=20.0, steps=32, seeds=3), find)
+    (capacity,) = searched(of_dim(), Search(step=20.0, steps=32, seeds=5), find)
     flood = outcome_of(Recipe(four_way(800.0, profile="fair", horizon=3600.0), signal, 1)).row
     served = (flood["trips"] - flood["unfinished"]) / 4.0
     # The first 80 s pass before a vehicle has left; growth of 2 % still counts as served.
     expected = 1.02 * served / (1.0 - 80.0 / 3600.0)
-    assert capacity.interval.mean == pytest.approx(expected, rel=0.05)
+    found = statistics.median((low + high) / 2.0 for low, high in capacity.brackets)
+    assert found == pytest.approx(expected, rel=0.05)
 
 
 def test_growth_is_a_share_of_arrivals() -> None:

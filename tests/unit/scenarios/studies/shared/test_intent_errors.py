@@ -76,7 +76,7 @@ def test_the_collision_that_docs_explain() -> None:
     with pytest.raises(CollisionError) as caught:
         simulate(scenario, Dim(perception=NoisyPerception(0.15)), 1)
     (collision,) = caught.value.collisions
-    assert (collision.time, collision.movements) == (662.8, ("c3", "b3"))
+    assert (collision.time, collision.movements) == (434.4, ("b3", "c3"))
     table = Dim().start(scenario.site(1)).rules.table
     assert [str(m) for m in table.decide(["b3", "c3", "d1"])] == ["c3", "d1"]
     assert [str(m) for m in table.decide(["b3", "c2", "d1"])] == ["b3"]
