@@ -16,7 +16,15 @@ import numpy.typing as npt
 
 from minisim.carfollowing import ballistic, semi_implicit
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
-from minisim.engine.laws import braking_begins, closeness, follow, slow_down
+from minisim.engine.laws import (
+    braking_begins,
+    closeness,
+    follow,
+    keep_room,
+    room_behind,
+    short_of,
+    slow_down,
+)
 from minisim.engine.state import Law, build_law
 from minisim.jit import njit
 
@@ -135,26 +143,34 @@ def _drive(
             return k, hard
         s_out[k], v_out[k] = s, v
         first = True  # no vehicle is between it and the junction
-        z = 0.0
+        z, room = 0.0, math.inf
+        # Who cannot stop before the junction sees past a leader that may turn off.
+        near = s < course.crossing and v * v > -2.0 * law.b_max * s
+        behind = False
         for j in range(len(lane.s)):
             if k >= lane.s.shape[1] or lane.s[j, k] == math.inf:
                 continue
             first = first and lane.s[j, k] >= 0.0
             rear = lane.s[j, k] - law.length
-            if rear < lane.bound[j]:
+            if rear < lane.bound[j] and (not behind or lane.s[j, k] >= 0.0):
                 if rear <= s:
                     return 0, hard
-                z = closeness(v, rear - s, lane.v[j, k], law)
-                break
-            if s >= course.crossing:
+                if not behind:
+                    z = closeness(v, rear - s, lane.v[j, k], law)
+                room = min(room, room_behind(rear - s, lane.v[j, k], law))
+                behind = True
+            if not near and (behind or s >= course.crossing):
                 break
         z_exit = 0.0
-        if first or s >= 0.0:
+        if first or near or s >= 0.0:
             for j in range(len(exit_lane.s) - 1, -1, -1):
                 if k >= exit_lane.s.shape[1] or exit_lane.s[j, k] >= 0.0:  # the last to enter it
                     if k < exit_lane.s.shape[1] and exit_lane.s[j, k] < math.inf:
-                        gap = exit_lane.s[j, k] + exit_lane.bound[j] - law.length - s
-                        z_exit = closeness(v, gap, exit_lane.v[j, k], law)
+                        rear = exit_lane.s[j, k] + exit_lane.bound[j] - law.length
+                        if first or s >= 0.0:
+                            z_exit = closeness(v, rear - s, exit_lane.v[j, k], law)
+                        if rear >= course.crossing:
+                            room = min(room, room_behind(rear - s, exit_lane.v[j, k], law))
                     break
         v0 = course.turn if 0.0 <= s < course.crossing else course.limit
         acc = follow(v, v0, max(z, z_exit), law)
@@ -162,6 +178,8 @@ def _drive(
             hard = True
         if s < 0.0 and braking_begins(v, -s, law):
             acc = min(acc, slow_down(v, acc, course.turn, -s, law))
+        if short_of(room, v, v + acc * law.dt, law):
+            acc = min(acc, keep_room(v, room, law))
         acc = max(acc, -law.b_max)
         if law.semi_implicit:
             s, v = semi_implicit(s, v, acc, law.dt)

@@ -26,7 +26,7 @@ def controllers(
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
-    from minisim.control import cover_of
+    from minisim.control import ORDINARY, cover_of
     from scenarios.controllers import controller_named, maker_of, read_spec
 
     if name is None:
@@ -46,7 +46,8 @@ def controllers(
         show_json({"name": name, "meaning": meaning, "covers": covers, "parameters": parameters})
         return
     typer.echo(wrapped(f"{name}: {meaning}", 0))
-    typer.echo(wrapped(f"None collides, and each is served: {covers}.", 0))
+    if cover_of(make) != ORDINARY:
+        typer.echo(wrapped(f"None collides, and each is served: {covers}.", 0))
     _show_parameters(parameters)
     for parameter in parameters:
         for word, kind in parameter["kinds"].items():

