@@ -1,7 +1,7 @@
 """Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
 
 It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.engine.laws`). Positions are distances past the
+motion is known, by the run's own law (`minisim.laws`). Positions are distances past the
 junction entry, negative before it.
 """
 
@@ -16,8 +16,11 @@ import numpy.typing as npt
 
 from minisim.carfollowing import ballistic, semi_implicit
 from minisim.control import LATERAL_ACCELERATION, Plan, Site
-from minisim.engine.laws import (
+from minisim.jit import njit
+from minisim.laws import (
+    Law,
     braking_begins,
+    build_law,
     closeness,
     follow,
     keep_room,
@@ -25,8 +28,6 @@ from minisim.engine.laws import (
     short_of,
     slow_down,
 )
-from minisim.engine.state import Law, build_law
-from minisim.jit import njit
 
 Floats = npt.NDArray[np.float64]
 

@@ -3,10 +3,8 @@
 Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
 movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.names` and
 `minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
-numbers), and
-`minisim.carfollowing` with `minisim.jit` (equations, for prediction). None of these imports the
-engine, the hosts or the results; `make lint` checks this. `baselines.prediction` alone also takes
-the engine's laws, so that it predicts by the one that drives the vehicles.
+numbers), and `minisim.laws` with `minisim.carfollowing` and `minisim.jit` (how vehicles move, for
+prediction). None of these imports the engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.

@@ -29,7 +29,6 @@ from minisim.control import (
     as_controller,
 )
 from minisim.engine.collision import Collision
-from minisim.engine.state import NEVER, first_tick, time_of
 from minisim.errors import (
     CollisionError,
     ControllerError,
@@ -43,6 +42,7 @@ from minisim.errors import (
 )
 from minisim.names import name_of
 from minisim.results.run import Run, ScenarioLike
+from minisim.ticks import NEVER, first_tick, time_of
 
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")

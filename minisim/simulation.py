@@ -24,21 +24,13 @@ from minisim.control import (
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.cruise.law import build_cruise
-from minisim.engine.state import (
-    OBSERVED,
-    TRACE,
-    Records,
-    build_lanes,
-    build_law,
-    build_road,
-    build_vehicles,
-    first_tick,
-    time_of,
-)
+from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_road, build_vehicles
 from minisim.errors import InputError, number
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
+from minisim.laws import build_law
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
+from minisim.ticks import first_tick, time_of
 from minisim.vehicle import CruiseVehicle
 
 #: `Observed._make` without its check of the number of fields, which `OBSERVED` guarantees.

@@ -13,7 +13,7 @@ from minisim.parameters import declared, real, word
 class Model(NamedTuple):
     """A car-following model. Its equations are in `minisim.carfollowing`.
 
-    `minisim.engine.laws` says how a run applies them.
+    `minisim.laws` says how a run applies them.
 
     Attributes:
         braking: how hard it makes a vehicle brake for a stationary obstacle [m/s²], given the
@@ -71,7 +71,7 @@ class VehicleType:
     The headway has a lower bound because no law reacts faster than the longest step allows
     (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
     (`needed_braking`). Under any law but cruise control a vehicle also brakes, as hard as it can if
-    need be, for a leader that it could not stop behind (`minisim.engine.laws.keep_room`).
+    need be, for a leader that it could not stop behind (`minisim.laws.keep_room`).
     """
 
     length: float = real(

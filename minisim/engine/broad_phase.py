@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from minisim.engine.state import DRIVING, Floats, Law, Records, Road
+from minisim.engine.state import DRIVING, Floats, Records, Road
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import locate
+from minisim.laws import Law
 
 #: Bodies this close may be touching, given rounding [m]; the exact check follows in pymunk.
 TOUCH_MARGIN = 0.02

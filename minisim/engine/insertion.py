@@ -6,9 +6,9 @@ import math
 
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.laws import insertable, room_behind
-from minisim.engine.state import DRIVING, STOP_MARGIN, Law, Records, Road
+from minisim.engine.state import DRIVING, Records, Road
 from minisim.jit import njit
+from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 
 @njit

@@ -16,7 +16,10 @@ from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.cruise.step import accelerate as accelerate_cruising
 from minisim.engine.insertion import insert
-from minisim.engine.laws import (
+from minisim.engine.state import ARRIVED, DRIVING, Floats, Records, Road
+from minisim.jit import njit
+from minisim.laws import (
+    Law,
     braking_begins,
     closeness,
     follow,
@@ -26,8 +29,6 @@ from minisim.engine.laws import (
     short_of,
     slow_down,
 )
-from minisim.engine.state import ARRIVED, DRIVING, Floats, Law, Records, Road
-from minisim.jit import njit
 
 #: Reasons to return, as bits.
 MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32

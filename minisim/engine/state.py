@@ -7,7 +7,6 @@ arguments keep a call into the compiled kernel cheap, since unboxing arrays is m
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,15 +17,10 @@ from minisim.control import LATERAL_ACCELERATION, Plan, Site
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path
 from minisim.streams import Draws
-from minisim.vehicle import MODELS
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Records = npt.NDArray[np.void]
-
-#: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
-#: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
-STOP_MARGIN = 0.25
 
 #: Values of the field `status`.
 WAITING, DRIVING, ARRIVED = 0, 1, 2
@@ -119,33 +113,6 @@ class Road(NamedTuple):
     marks: Floats
 
 
-class Law(NamedTuple):
-    """The scalars of a run: car following, lines and switches (SI units)."""
-
-    dt: float
-    a: float
-    b: float
-    b_max: float
-    headway: float
-    min_gap: float
-    delta: float
-    model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
-    semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
-    length: float
-    width: float
-    entry: float  # s of the junction entry
-    hold: float  # s of the hold line
-    leave: float  # s up to which a vehicle at least stays in view
-    margin: float  # see `minisim.vehicle.Model`
-    sight: float  # how far before the entry a view reaches
-    depart_speed: float  # the most at insertion
-    wake_on_clear: bool
-    record_from: int  # ticks
-    record_to: int
-    record_start: float  # s where recording starts
-    record_past: float  # how far past the junction exit recording continues
-
-
 def build_road(site: Site, plan: Plan) -> Road:
     """Lay out the paths with the speed profile of the site and the plan's markings."""
     intersection = site.intersection
@@ -187,61 +154,6 @@ def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, floa
         if not profile or profile[-1][1] != limit:
             profile.append((edge, limit))
     return profile
-
-
-def build_law(
-    site: Site,
-    plan: Plan,
-    *,
-    depart_speed: float | None,
-    record: str | None,
-    record_window: tuple[float, float],
-) -> Law:
-    """Collect the scalars of a run."""
-    vehicle = site.vehicle
-    entry = site.intersection.approach_length
-    near = record == "junction"
-    return Law(
-        dt=site.dt,
-        a=vehicle.acceleration,
-        b=vehicle.deceleration,
-        b_max=vehicle.max_deceleration,
-        headway=vehicle.headway,
-        min_gap=vehicle.min_gap,
-        delta=vehicle.exponent,
-        model=list(MODELS).index(vehicle.model),
-        semi_implicit=MODELS[vehicle.model].stepwise,
-        length=vehicle.length,
-        width=vehicle.width,
-        entry=entry,
-        hold=entry - plan.hold_distance,
-        leave=entry + plan.reach,
-        margin=MODELS[vehicle.model].margin,
-        sight=plan.sight,
-        depart_speed=math.inf if depart_speed is None else depart_speed,
-        wake_on_clear=plan.wake_on_clear,
-        record_from=first_tick(record_window[0], site.dt) if record else NEVER,
-        record_to=first_tick(record_window[1], site.dt) if record else NEVER,
-        record_start=entry - RECORD_BEFORE if near else -math.inf,
-        record_past=RECORD_PAST if near else math.inf,
-    )
-
-
-#: How far a recording of the junction alone reaches before its entry and past its exit [m].
-RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
-
-#: A tick that never comes.
-NEVER = 2**62
-
-
-def first_tick(time: float, dt: float) -> int:
-    """First tick at or after `time` [s]."""
-    return NEVER if time / dt >= NEVER else math.ceil(time / dt - 1e-6)
-
-
-def time_of(tick: int, dt: float) -> float:
-    """Simulated time at a tick [s], free of rounding errors."""
-    return round(tick * dt, 6)
 
 
 def build_vehicles(site: Site, arrivals: Arrivals) -> Records:

@@ -15,7 +15,7 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.control import Controller, Plan, Site
 from minisim.engine.collision import Collision
-from minisim.engine.state import Records, first_tick
+from minisim.engine.state import Records
 from minisim.errors import InputError
 from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
@@ -23,6 +23,7 @@ from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
 from minisim.results.trajectories import TRAJECTORY_COLUMNS
 from minisim.results.trips import Trips
+from minisim.ticks import first_tick
 from minisim.version import __version__
 
 if TYPE_CHECKING:

@@ -83,7 +83,7 @@ def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | N
 
 def near_junction(frame: pd.DataFrame, site: Site) -> pd.DataFrame:
     """The part of a recording that `record="junction"` keeps."""
-    from minisim.engine.state import RECORD_BEFORE, RECORD_PAST
+    from minisim.laws import RECORD_BEFORE, RECORD_PAST
 
     paths = site.intersection.paths
     last = np.array([path.exit + RECORD_PAST for path in paths])

@@ -12,9 +12,8 @@ from typing import Any
 
 from minisim.carfollowing import cruise_control
 from minisim.engine.cruise.law import Cruise, follow, realise
-from minisim.engine.laws import hold
-from minisim.engine.state import STOP_MARGIN
 from minisim.errors import InputError
+from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
 from minisim.sumo.steering import Car, Released, Speeds, near
 from minisim.vehicle import CruiseVehicle

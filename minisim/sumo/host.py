@@ -20,14 +20,16 @@ from typing import IO
 
 from minisim.control import Command, Controller, View
 from minisim.engine.cruise.law import build_cruise
-from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
+from minisim.engine.state import build_road, build_vehicles
 from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
 from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
+from minisim.laws import build_law
 from minisim.results.run import Run, ScenarioLike
 from minisim.sumo.files import CONFIGURATION, FCD, read_trips, write_configuration, write_routes
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
+from minisim.ticks import first_tick, time_of
 from minisim.vehicle import MODELS as CAR_FOLLOWING
 from minisim.vehicle import VehicleType
 

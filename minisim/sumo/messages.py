@@ -8,8 +8,9 @@ from typing import IO, Any, NamedTuple
 from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import Law, Records, Road
+from minisim.engine.state import Records, Road
 from minisim.junction.movements import Movements
+from minisim.laws import Law
 from minisim.sumo.network import Network
 
 

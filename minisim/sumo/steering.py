@@ -1,6 +1,6 @@
 """How vehicles in SUMO are told what the road ahead and the controller ask of them.
 
-`Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.engine.laws`) compute what a
+`Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.laws`) compute what a
 hold line, a marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`)
 where a lower limit applies, or a commanded speed (`setSpeed`) while a vehicle has to brake for
 what is ahead. A command heeds the leaders, too.
@@ -16,9 +16,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from minisim.engine import laws
-from minisim.engine.state import STOP_MARGIN, Law, Records
+from minisim import laws
+from minisim.engine.state import Records
 from minisim.junction.movements import Movements
+from minisim.laws import STOP_MARGIN, Law
 from minisim.sumo.messages import Job
 
 #: SUMO keeps the maximum acceleration (2). It heeds no right of way (no 8). A commanded speed may

@@ -32,11 +32,12 @@ from minisim.control import (
     Wake,
 )
 from minisim.engine.collision import Collision
-from minisim.engine.state import NEVER, TRACE, Records, time_of
+from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
 from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
+from minisim.ticks import NEVER, time_of
 
 #: Lines of a recording that are held as Python objects before they become an array.
 TRACE_LINES = 100_000

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from minisim.carfollowing import braking_distance
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import ARRIVED, DRIVING, Law, Records, Road
+from minisim.engine.state import ARRIVED, DRIVING, Records, Road
 from minisim.jit import njit
+from minisim.laws import Law
 
 #: Length of the turnarounds at the far ends of the published roads [m].
 TURNAROUND = 4.67

@@ -9,10 +9,11 @@ import numpy as np
 
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag
 from minisim.control import Site
-from minisim.engine.state import Floats, Ints, Law, Records
+from minisim.engine.state import Floats, Ints, Records
 from minisim.jit import njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
+from minisim.laws import Law
 from minisim.vehicle import CruiseVehicle
 
 #: What the law remembers of a vehicle, row by row as in `minisim.engine.state.VEHICLE`.

@@ -10,9 +10,11 @@ import numpy as np
 from minisim.carfollowing import braking_distance
 from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
-from minisim.engine.state import DRIVING, NEVER, Floats, Ints, Law, Records
+from minisim.engine.state import DRIVING, Floats, Ints, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.meetings import Meeting
+from minisim.laws import Law
+from minisim.ticks import NEVER
 
 #: The most vehicles inside the junction at once.
 INSIDE = 64

@@ -7,9 +7,9 @@ import math
 from minisim.carfollowing import cruise_control
 from minisim.engine.cruise.law import Cruise, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.laws import hold
-from minisim.engine.state import DRIVING, Law, Records, Road
+from minisim.engine.state import DRIVING, Records, Road
 from minisim.jit import njit
+from minisim.laws import Law, hold
 
 
 @njit

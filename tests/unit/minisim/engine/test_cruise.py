@@ -20,15 +20,10 @@ from minisim.carfollowing import (
 from minisim.control import Advise, Plan, Unregulated
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.cruise.step import accelerate
-from minisim.engine.state import (
-    DRIVING,
-    build_lanes,
-    build_law,
-    build_road,
-    build_vehicles,
-)
+from minisim.engine.state import DRIVING, build_lanes, build_road, build_vehicles
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
+from minisim.laws import build_law
 from minisim.vehicle import CruiseVehicle, VehicleType
 from scenarios import AS_RUN, Scenario, four_way
 from scenarios.library import MAKERS

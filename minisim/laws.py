@@ -1,12 +1,14 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
 Everything that depends on `Law.model` is in this module. The equations are in
-`minisim.carfollowing`, and the table of models is in `minisim.vehicle`.
+`minisim.carfollowing`, and the table of models is in `minisim.vehicle`. The hosts move vehicles by
+these functions, and `baselines.prediction` predicts by them.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from minisim.carfollowing import (
     STILL,
@@ -21,12 +23,85 @@ from minisim.carfollowing import (
     stepwise_towards,
     stop_within,
 )
-from minisim.engine.state import STOP_MARGIN, Law
+from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
+from minisim.ticks import NEVER, first_tick
 from minisim.vehicle import MODELS
+
+#: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
+#: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
+STOP_MARGIN = 0.25
+
+#: How far a recording of the junction alone reaches before its entry and past its exit [m].
+RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
 
 #: Values of `Law.model`.
 IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
+
+
+class Law(NamedTuple):
+    """The scalars of a run: car following, lines and switches (SI units)."""
+
+    dt: float
+    a: float
+    b: float
+    b_max: float
+    headway: float
+    min_gap: float
+    delta: float
+    model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
+    semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
+    length: float
+    width: float
+    entry: float  # s of the junction entry
+    hold: float  # s of the hold line
+    leave: float  # s up to which a vehicle at least stays in view
+    margin: float  # see `minisim.vehicle.Model`
+    sight: float  # how far before the entry a view reaches
+    depart_speed: float  # the most at insertion
+    wake_on_clear: bool
+    record_from: int  # ticks
+    record_to: int
+    record_start: float  # s where recording starts
+    record_past: float  # how far past the junction exit recording continues
+
+
+def build_law(
+    site: Site,
+    plan: Plan,
+    *,
+    depart_speed: float | None,
+    record: str | None,
+    record_window: tuple[float, float],
+) -> Law:
+    """Collect the scalars of a run."""
+    vehicle = site.vehicle
+    entry = site.intersection.approach_length
+    near = record == "junction"
+    return Law(
+        dt=site.dt,
+        a=vehicle.acceleration,
+        b=vehicle.deceleration,
+        b_max=vehicle.max_deceleration,
+        headway=vehicle.headway,
+        min_gap=vehicle.min_gap,
+        delta=vehicle.exponent,
+        model=list(MODELS).index(vehicle.model),
+        semi_implicit=MODELS[vehicle.model].stepwise,
+        length=vehicle.length,
+        width=vehicle.width,
+        entry=entry,
+        hold=entry - plan.hold_distance,
+        leave=entry + plan.reach,
+        margin=MODELS[vehicle.model].margin,
+        sight=plan.sight,
+        depart_speed=math.inf if depart_speed is None else depart_speed,
+        wake_on_clear=plan.wake_on_clear,
+        record_from=first_tick(record_window[0], site.dt) if record else NEVER,
+        record_to=first_tick(record_window[1], site.dt) if record else NEVER,
+        record_start=entry - RECORD_BEFORE if near else -math.inf,
+        record_past=RECORD_PAST if near else math.inf,
+    )
 
 
 @njit_inline

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from minisim.control import Unregulated
-from minisim.engine.laws import closeness, follow, insertable
-from minisim.engine.state import Law, build_law
+from minisim.laws import Law, build_law, closeness, follow, insertable
 from minisim.testing import small_scenario
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 
