@@ -25,6 +25,7 @@ from minisim.carfollowing import (
 )
 from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
+from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
 from minisim.vehicle import MODELS
 
@@ -56,6 +57,7 @@ class Law(NamedTuple):
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
     leave: float  # s up to which a vehicle at least stays in view
+    room: float  # see `minisim.junction.partings.turning_room`
     margin: float  # see `minisim.vehicle.Model`
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # the most at insertion
@@ -78,7 +80,7 @@ def build_law(
     vehicle = site.vehicle
     entry = site.intersection.approach_length
     near = record == "junction"
-    return Law(
+    law = Law(
         dt=site.dt,
         a=vehicle.acceleration,
         b=vehicle.deceleration,
@@ -93,6 +95,7 @@ def build_law(
         entry=entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
+        room=turning_room(site.intersection, site.vehicle),
         margin=MODELS[vehicle.model].margin,
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
@@ -102,6 +105,9 @@ def build_law(
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )
+    # A whole number for a float would have every kernel compiled once more.
+    kinds = Law.__annotations__.values()
+    return Law._make(float(x) if it == "float" else x for x, it in zip(law, kinds, strict=True))
 
 
 @njit_inline
@@ -122,10 +128,10 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
     """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
 
-    The leader comes to rest no sooner than its brakes can stop it, and half the gap at standstill
-    stays free: the laws themselves never come that near.
+    The leader comes to rest no sooner than its brakes can stop it, and what corners need in a turn
+    stays free.
     """
-    room = gap - 0.5 * law.min_gap
+    room = gap - law.room
     if law.semi_implicit:
         return 2.0 * law.b_max * (room + braking_distance(v_leader, law.b_max, law.dt))
     return 2.0 * law.b_max * room + v_leader * v_leader
@@ -172,6 +178,15 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
     if law.model == IIDM:
         return iidm(v, v0, z, law.a, law.b, law.delta)
     return idm(v, v0, z, law.a, law.b, law.delta)
+
+
+@njit_inline
+def within(v: float, acc: float, limit: float, law: Law) -> float:
+    """`acc`, unless a step of it would take a vehicle past its speed limit.
+
+    Where a·dt is large the IDM would overshoot: it takes a step for short.
+    """
+    return min(acc, (limit - v) / law.dt) if v < limit else acc
 
 
 @njit
