@@ -106,8 +106,9 @@ def build_law(
         record_past=RECORD_PAST if near else math.inf,
     )
     # A whole number for a float would have every kernel compiled once more.
-    kinds = Law.__annotations__.values()
-    return Law._make(float(x) if it == "float" else x for x, it in zip(law, kinds, strict=True))
+    whole = ("model", "record_from", "record_to")
+    plain = {k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole}
+    return law._replace(**plain)
 
 
 @njit_inline

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from minisim.control import Unregulated
+from minisim.control import Plan, Unregulated
 from minisim.laws import Law, build_law, closeness, follow, insertable
 from minisim.testing import small_scenario
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
@@ -51,3 +51,9 @@ def test_the_table_says_how_a_model_steps_and_where_it_inserts(name: str) -> Non
     assert law(name).semi_implicit == (name in ("krauss", "cc"))
     assert law(name).margin == (0.1 if name == "cc" else 0.0)
     assert list(MODELS)[law(name).model] == name
+
+
+def test_whole_numbers_do_not_have_the_kernels_compiled_once_more() -> None:
+    site = small_scenario(vehicle=VehicleType(acceleration=2, headway=1), speed_limit=14).site(0)
+    made = build_law(site, Plan(), depart_speed=5, record=None, record_window=(0.0, math.inf))
+    assert [type(x) for x in made] == [type(x) for x in law("idm")]
