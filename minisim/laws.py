@@ -8,7 +8,7 @@ these functions, and `baselines.prediction` predicts by them.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from minisim.carfollowing import (
     STILL,
@@ -107,7 +107,9 @@ def build_law(
     )
     # A whole number for a float would have every kernel compiled once more.
     whole = ("model", "record_from", "record_to")
-    plain = {k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole}
+    plain: dict[str, Any] = {
+        k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole
+    }
     return law._replace(**plain)
 
 
@@ -187,7 +189,7 @@ def within(v: float, acc: float, limit: float, law: Law) -> float:
 
     Where a·dt is large the IDM would overshoot: it takes a step for short.
     """
-    return min(acc, (limit - v) / law.dt) if v < limit else acc
+    return (limit - v) / law.dt if v < limit < v + acc * law.dt else acc
 
 
 @njit
