@@ -170,14 +170,14 @@ def replay(
         recorded=published_arrivals(split, density, arms, controller),
     )
     vehicle, junction = made.profile.vehicle, made.intersection
-    if not isinstance(vehicle, CruiseVehicle) or junction.ways is None:
+    if vehicle.sumo is None or junction.ways is None:
         return made
-    signals = controller == "fts"  # its network has none
-    turnarounds = "" if sumo != "1.18" or signals or arms != 4 else TURNAROUNDS[split]
+    cruises = isinstance(vehicle, CruiseVehicle)
+    turnarounds = "" if sumo != "1.18" or arms != 4 else TURNAROUNDS[split]
     return replace(
         made,
         intersection=replace(junction, ways=published_ways(arms, turnarounds)),
-        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo)),
+        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo if cruises or sumo == "1.18" else None)),
     )
 
 

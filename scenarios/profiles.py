@@ -76,6 +76,7 @@ AS_RUN_SIGNALS = Profile(
         max_deceleration=1000.0,
         speed_deviation=0.1,
         model="krauss",
+        sumo="1.18",
     ),
     speed_limit=14.0,
     depart_speed=0.0,

@@ -1,7 +1,8 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. At the end of a green, vehicles that can no longer stop
+depend on the length of an amber. Where vehicles look out for those that cross (`VehicleType`), it
+turns green at once, as the published signals did. At the end of a green, vehicles that can no longer stop
 comfortably keep their right of way; all others stop.
 """
 
@@ -59,6 +60,7 @@ class Heads:
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
         self._deceleration = site.vehicle.deceleration
+        self._at_once = site.vehicle.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * n
 
@@ -92,7 +94,7 @@ class Heads:
             for other, colour in enumerate(self.colours)
         ):
             return False
-        return not any(
+        return self._at_once or not any(
             (v.distance < 0.0 or v.id in self._let_go)
             and self._crossed[lane][self._rows[v.lane][v.manoeuvre]]
             for v in view.vehicles

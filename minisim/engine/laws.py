@@ -22,10 +22,13 @@ from minisim.carfollowing import (
 )
 from minisim.engine.state import STOP_MARGIN, Law
 from minisim.jit import njit, njit_inline
-from minisim.vehicle import MODELS
+from minisim.vehicle import MODELS, POSITION_EPS
 
 #: Values of `Law.model`.
 IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
+
+#: How far before a red light SUMO's vehicles stop (`jmStoplineGap`'s default) [m].
+STOP_LINE_GAP = 1.0
 
 
 @njit_inline
@@ -103,6 +106,8 @@ def hold(v: float, s: float, law: Law) -> float:
     it must. If that no longer suffices, it brakes as hard as it must to stop before the junction.
     """
     to_line = law.hold - s
+    if law.sumo and law.model == KRAUSS:
+        return stop_at_line(v, to_line, law)
     if law.semi_implicit:
         return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
     distance = to_line - STOP_MARGIN
@@ -115,6 +120,18 @@ def hold(v: float, s: float, law: Law) -> float:
         return -law.b
     to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
     return -max(law.b, v * v / (2.0 * to_junction))
+
+
+@njit
+def stop_at_line(v: float, to_line: float, law: Law) -> float:
+    """`hold` as SUMO has it: a vehicle stops 1 m before a line, or nearer if it must.
+
+    Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
+    """
+    braking = braking_distance(v, law.b, law.dt)
+    room = to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS) - STILL
+    v_new = stepwise_towards(0.0, room, law.b, law.dt) if room >= 0.0 else 0.0
+    return (v_new - v) / law.dt
 
 
 @njit

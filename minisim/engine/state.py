@@ -135,7 +135,8 @@ class Law(NamedTuple):
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
     leave: float  # s up to which a vehicle at least stays in view
-    margin: float  # see `minisim.vehicle.Model`
+    margin: float  # see `minisim.vehicle.VehicleType`
+    sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # negative means the highest safe speed
     wake_on_clear: bool
@@ -220,7 +221,8 @@ def build_law(
         entry=entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        margin=MODELS[vehicle.model].margin,
+        margin=vehicle.margin,
+        sumo=vehicle.sumo is not None,
         sight=plan.sight,
         depart_speed=-1.0 if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,

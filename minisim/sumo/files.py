@@ -64,7 +64,7 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
                 "type": "car",
                 "route": movements[vehicles["path"][i]],
                 "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": site.vehicle.length + MODELS[site.vehicle.model].margin,
+                "departPos": site.vehicle.length + site.vehicle.margin,
                 "departSpeed": "max" if depart_speed is None else depart_speed,
                 "speedFactor": f"{vehicles['factor'][i]:.9f}",
             },
