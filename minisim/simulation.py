@@ -23,6 +23,7 @@ from minisim.control import (
 )
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
+from minisim.engine.cruise.law import build_cruise
 from minisim.engine.state import (
     OBSERVED,
     TRACE,
@@ -88,7 +89,7 @@ class Simulation:
             record_window=hosted.record_window,
         )
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
-        self._motion = kernel.build_motion(self.site, self._vehicles, teleports)
+        self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
         self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
@@ -139,7 +140,7 @@ class Simulation:
                 self._lanes,
                 self._road,
                 self._law,
-                self._motion,
+                self._cruise,
                 self._trace,
                 self._traced,
                 self._bodies,

@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import ballistic, semi_implicit
-from minisim.control import Site
-from minisim.engine import cruise
 from minisim.engine.broad_phase import may_touch
-from minisim.engine.laws import braking_begins, closeness, follow, hold, insertable, slow_down
-from minisim.engine.state import ARRIVED, DRIVING, STOP_MARGIN, Floats, Law, Records, Road
+from minisim.engine.cruise.ends import look
+from minisim.engine.cruise.law import Cruise
+from minisim.engine.cruise.step import accelerate as accelerate_cruising
+from minisim.engine.insertion import insert
+from minisim.engine.laws import braking_begins, closeness, follow, hold, slow_down
+from minisim.engine.state import ARRIVED, DRIVING, Floats, Law, Records, Road
 from minisim.jit import njit
 
 #: Reasons to return, as bits.
@@ -23,14 +25,6 @@ MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
 #: SUMO's limit below which a vehicle counts as waiting [m/s].
 WAITING_SPEED = 0.1
 
-#: The data of a law of motion with leaders of its own. There is one such law.
-Motion = cruise.Cruise
-
-
-def build_motion(site: Site, vehicles: Records, teleports: bool = False) -> Motion | None:
-    """The data that the law of these vehicles needs beside `Law`, or None."""
-    return cruise.build_cruise(site, len(vehicles), teleports)
-
 
 @njit
 def advance(
@@ -38,7 +32,7 @@ def advance(
     lanes: Records,
     road: Road,
     law: Law,
-    motion: Motion | None,
+    cruise: Cruise | None,
     trace: Records,
     traced: int,
     bodies: Floats,
@@ -49,7 +43,7 @@ def advance(
     """Advance from `tick` to `until` at most; stop after any step that gives a reason to return.
 
     Args:
-        motion: the data of a law with leaders of its own; None under a plain car-following law.
+        cruise: what vehicles under cruise control need beside `law`; None under any other law.
         trace: the recording, filled from line `traced` on.
         bodies: scratch space (k, 5) for the k vehicles that can be in or near the junction at once.
         observed: filled with what a view shows at the end, see `observe`.
@@ -60,7 +54,7 @@ def advance(
     """
     reasons = 0
     while tick < until and reasons == 0:
-        reasons = step(vehicles, lanes, road, law, motion, bodies, tick)
+        reasons = step(vehicles, lanes, road, law, cruise, bodies, tick)
         tick += 1
         if law.record_from <= tick < law.record_to:
             traced = record(vehicles, lanes, road, law, trace, traced, tick)
@@ -75,77 +69,26 @@ def step(
     lanes: Records,
     road: Road,
     law: Law,
-    motion: Motion | None,
+    cruise: Cruise | None,
     bodies: Floats,
     tick: int,
 ) -> int:
     """Take one step, from `tick` to the next; returns the reasons to return, as bits."""
     reasons = 0
-    if insert(vehicles, lanes, road, law, motion, tick):
+    if insert(vehicles, lanes, road, law, cruise, tick):
         reasons |= MARK
-    if motion is None:
+    if cruise is None:
         overlap = accelerate(vehicles, lanes, road, law)
     else:
-        overlap = cruise.accelerate(vehicles, lanes, road, law, motion)
+        overlap = accelerate_cruising(vehicles, lanes, road, law, cruise)
     if overlap:
         reasons |= GAP
     reasons |= move(vehicles, lanes, road, law, tick + 1)
-    if motion is not None and cruise.look(vehicles, lanes, road, law, motion, tick + 1):
+    if cruise is not None and look(vehicles, lanes, road, law, cruise, tick + 1):
         reasons |= CLEAR
     if may_touch(vehicles, lanes, road, law, bodies):
         reasons |= TOUCH
     return reasons
-
-
-@njit
-def insert(
-    vehicles: Records, lanes: Records, road: Road, law: Law, motion: Motion | None, tick: int
-) -> bool:
-    """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
-
-    Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
-    lower limits ahead and, while the lane is closed, stop at the hold line.
-
-    Returns whether a vehicle was inserted past a wake-up mark.
-    """
-    passed = False
-    for lane in range(len(lanes)):
-        i = lanes[lane]["next"]
-        if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
-            continue
-        if motion is not None and cruise.blocked(vehicles, road, law, motion, lane):
-            continue
-        s, p = law.length + law.margin, vehicles[i]["path"]
-        section = 0
-        while s >= road.section_start[p, section + 1]:
-            section += 1
-        factor = vehicles[i]["factor"]
-        v = road.section_speed[p, section] * factor
-        for k in range(section + 1, road.section_start.shape[1] - 1):
-            room = max(road.section_start[p, k] - s, 0.0)
-            v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * law.b * room))
-        if lanes[lane]["open"] == 0:
-            v = min(v, math.sqrt(2.0 * law.b * max(law.hold - STOP_MARGIN - s, 0.0)))
-        j = i - 1
-        if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
-            safe = insertable(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
-            if safe < 0.0:
-                continue
-            v = min(v, safe)
-        if law.depart_speed >= 0.0:
-            if law.depart_speed > v:
-                continue
-            v = law.depart_speed
-        lanes[lane]["next"] = i + 1
-        vehicles[i]["status"] = DRIVING
-        vehicles[i]["s"] = s
-        vehicles[i]["v"] = v
-        vehicles[i]["depart_tick"] = tick
-        vehicles[i]["section"] = section
-        while s >= road.marks[vehicles[i]["mark"]]:
-            vehicles[i]["mark"] += 1
-            passed = True
-    return passed
 
 
 @njit

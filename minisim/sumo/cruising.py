@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from minisim.carfollowing import cruise_control
-from minisim.engine.cruise import Cruise, follow, realise
+from minisim.engine.cruise.law import Cruise, follow, realise
 from minisim.engine.laws import hold
 from minisim.engine.state import STOP_MARGIN
 from minisim.errors import InputError

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from minisim.control import Command, Controller, View
-from minisim.engine.kernel import build_motion
+from minisim.engine.cruise.law import build_cruise
 from minisim.engine.state import build_law, build_road, build_vehicles, first_tick, time_of
 from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
@@ -227,7 +227,7 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
         plan=plan,
         road=build_road(site, plan),
         law=law,
-        motion=build_motion(site, vehicles),
+        cruise=build_cruise(site, len(vehicles)),
         top_speed=site.vehicle.top_speed(site.speed_limit),
         network=network,
         vehicles=vehicles,

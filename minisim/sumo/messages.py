@@ -7,7 +7,7 @@ from typing import IO, Any, NamedTuple
 
 from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
-from minisim.engine.kernel import Motion
+from minisim.engine.cruise.law import Cruise
 from minisim.engine.state import Law, Records, Road
 from minisim.junction.movements import Movements
 from minisim.sumo.network import Network
@@ -22,7 +22,7 @@ class Job(NamedTuple):
         model: car-following model, one of `minisim.sumo.MODELS`.
         plan: the session's plan.
         road, law: the run's road and law, with its limits, marks and lines.
-        motion: as returned by `minisim.engine.kernel.build_motion`.
+        cruise: as returned by `minisim.engine.cruise.law.build_cruise`.
         top_speed: speed that no vehicle exceeds [m/s].
         network: the lanes' lengths in SUMO.
         vehicles: as returned by `minisim.engine.state.build_vehicles`.
@@ -38,7 +38,7 @@ class Job(NamedTuple):
     plan: Plan
     road: Road
     law: Law
-    motion: Motion | None
+    cruise: Cruise | None
     top_speed: float
     network: Network
     vehicles: Records

@@ -58,7 +58,7 @@ class Worker:
         self._job, self._libsumo, self._caller = job, libsumo, caller
         road, law = job.road, job.law
         self._steering: Steering = (
-            Follower(job, libsumo) if job.motion is None else Cruiser(job, libsumo, job.motion)
+            Follower(job, libsumo) if job.cruise is None else Cruiser(job, libsumo, job.cruise)
         )
         self._limits = limits(job)
         self._marks = road.marks.tolist()

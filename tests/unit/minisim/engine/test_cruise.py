@@ -18,7 +18,8 @@ from minisim.carfollowing import (
     semi_implicit,
 )
 from minisim.control import Advise, Plan, Unregulated
-from minisim.engine.cruise import accelerate, build_cruise
+from minisim.engine.cruise.law import build_cruise
+from minisim.engine.cruise.step import accelerate
 from minisim.engine.state import (
     DRIVING,
     build_lanes,
@@ -219,7 +220,7 @@ def chosen(
     )
     vehicles = build_vehicles(site, what.arrivals(0))
     lanes = build_lanes(site, vehicles, plan.lanes_open)
-    cruise = build_cruise(site, len(vehicles), teleports=False)
+    cruise = build_cruise(site, len(vehicles))
     assert cruise is not None
     rows = []
     for lane, _, s, v, a, entered in cars:

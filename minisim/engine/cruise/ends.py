@@ -1,0 +1,90 @@
+"""What happens at the ends of the roads: the order on an exit lane, and SUMO's rules there."""
+
+from __future__ import annotations
+
+from minisim.carfollowing import braking_distance
+from minisim.engine.cruise.law import Cruise
+from minisim.engine.state import ARRIVED, DRIVING, Law, Records, Road
+from minisim.jit import njit
+
+#: Length of the turnarounds at the far ends of the published roads [m].
+TURNAROUND = 4.67
+
+#: Time headway that SUMO leaves a vehicle behind another that is inserted (`tau`'s default) [s].
+REACTION = 1.0
+
+#: SUMO's `NUMERICAL_EPS` [m].
+TOLERANCE = 0.001
+
+
+@njit
+def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -> bool:
+    """Whether no vehicle can be inserted on an arm for one that arrives there.
+
+    Where the road leads back, SUMO takes it that the vehicle at its end might do so, and keeps room
+    for it to stop. Source: `MSLane::isInsertionSuccess`, `MSCFModel::getSecureGap`.
+    """
+    i = cruise.last[arm]
+    if i < 0 or not cruise.turns_back[arm] or vehicles[i]["status"] != DRIVING:
+        return False
+    while vehicles[i]["ahead"] >= 0 and vehicles[vehicles[i]["ahead"]]["status"] == DRIVING:
+        i = vehicles[i]["ahead"]
+    first = vehicles[i]
+    rest = road.ends[first["path"], 1] - first["s"]
+    needed = braking_distance(first["v"], law.b_max, law.dt) + REACTION * first["v"]
+    return bool(rest + TURNAROUND + law.margin - law.min_gap < needed)
+
+
+@njit
+def look(
+    vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise, tick: int
+) -> bool:
+    """Note after a step which vehicles have entered the junction, and which an exit lane.
+
+    The vehicle ahead on an exit lane is the one that entered that lane before.
+
+    Returns whether a vehicle was taken off the road.
+    """
+    lost = False
+    for lane in range(len(lanes)):
+        for i in range(lanes[lane]["first"], lanes[lane]["next"]):
+            mine = cruise.memory[i]
+            if i < lanes[lane]["front"] and mine["entered"] == 0:
+                mine["entered"] = tick
+            p = vehicles[i]["path"]
+            if mine["merged"] == 0 and vehicles[i]["s"] >= law.entry + cruise.waits[p, 0]:
+                mine["merged"] = tick
+            if mine["left"] == 0 and vehicles[i]["s"] >= road.ends[p, 0]:
+                mine["left"] = 1
+                exit_arm = int(road.ends[p, 2])
+                vehicles[i]["ahead"] = cruise.last[exit_arm]
+                cruise.last[exit_arm] = i
+            if cruise.teleports and mine["left"] != 0 and vehicles[i]["status"] == DRIVING:
+                lost |= teleport(vehicles, road, law, cruise, i, tick)
+    return lost
+
+
+@njit
+def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int) -> bool:
+    """Take a vehicle off the road that has run into the one ahead on its exit; whether it has.
+
+    SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
+    Source: `MSLane::detectCollisionBetween`; `MSVehicleTransfer`, which finds no road behind.
+    """
+    j = vehicles[i]["ahead"]
+    if j < 0 or vehicles[j]["status"] != DRIVING:
+        return False
+    ends = road.ends
+    rear = vehicles[j]["s"] - law.length - ends[vehicles[j]["path"], 0]
+    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= law.min_gap - TOLERANCE:
+        return False
+    vehicles[i]["status"] = ARRIVED
+    vehicles[i]["arrival_tick"] = tick
+    vehicles[i]["cleared"] = 1
+    for k in range(len(vehicles)):  # those behind it follow the one before it
+        if vehicles[k]["ahead"] == i:
+            vehicles[k]["ahead"] = j
+    arm = int(ends[vehicles[i]["path"], 2])
+    if cruise.last[arm] == i:
+        cruise.last[arm] = j
+    return True

@@ -1,0 +1,122 @@
+"""The data of a run under SUMO's CC model, and its law as the engine carries it out."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from minisim.carfollowing import STANDSTILL, distance_control, engine_lag
+from minisim.control import Site
+from minisim.engine.state import Floats, Ints, Law, Records
+from minisim.jit import njit_inline
+from minisim.junction.geometry import Intersection
+from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
+from minisim.vehicle import CruiseVehicle
+
+#: What the law remembers of a vehicle, row by row as in `minisim.engine.state.VEHICLE`.
+MEMORY = np.dtype(
+    [
+        ("entered", np.int64),  # tick of entering the junction
+        ("merged", np.int64),  # tick of passing the waiting position, if there is one
+        ("left", np.int64),  # its front has left the junction
+        ("stopping", np.int64),  # it was advised to stand still in the previous step
+    ]
+)
+
+
+class Cruise(NamedTuple):
+    """What a run of `minisim.vehicle.CruiseVehicle` needs besides `Law` (SI units).
+
+    Attributes:
+        teleports: whether a vehicle that runs into another on its exit is taken off the road.
+        crossing_foes: whether the radar sees vehicles that only cross.
+        meetings: (p, 2, p, 2, 4), see `minisim.junction.meetings.meetings`.
+        waits: (p, 2): waiting position past the junction entry, sagitta [m].
+        yields: (p, p): whether the first way must give way to the second.
+        turns_back: (n,): whether the road of an arm leads back at its far end.
+        memory: (k,) of `MEMORY`.
+        last: (n,): last row that entered the exit lane of each arm, or -1.
+    """
+
+    cruise_speed: float
+    cruise_gain: float
+    a: float
+    b: float
+    headway: float
+    spacing_gain: float
+    spacing: float
+    lag: float
+    a_max: float
+    radar: float
+    max_speed: float
+    teleports: bool
+    crossing_foes: bool
+    meetings: Floats
+    waits: Floats
+    yields: Bools
+    turns_back: Bools
+    memory: Records
+    last: Ints
+
+
+def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | None:
+    """Collect what a run of `count` vehicles needs; None where they have no cruise control."""
+    vehicle, intersection = site.vehicle, site.intersection
+    if not isinstance(vehicle, CruiseVehicle):
+        return None
+    waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
+    return Cruise(
+        cruise_speed=vehicle.cruise_speed,
+        cruise_gain=vehicle.cruise_gain,
+        a=vehicle.cruise_acceleration,
+        b=vehicle.cruise_deceleration,
+        headway=vehicle.headway,
+        spacing_gain=vehicle.spacing_gain,
+        spacing=vehicle.spacing,
+        lag=vehicle.lag,
+        a_max=vehicle.engine_acceleration,
+        radar=vehicle.radar,
+        max_speed=vehicle.max_speed,
+        teleports=teleports,
+        crossing_foes=vehicle.sumo == "1.18",
+        meetings=meetings(intersection),
+        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
+        yields=_yields(intersection),
+        turns_back=_turns_back(intersection),
+        memory=np.zeros(count, MEMORY),
+        last=np.full(intersection.n, -1),
+    )
+
+
+def _yields(intersection: Intersection) -> Bools:
+    """Whether a way must give way to another (`MSVehicle::isLeader`); a road's priority decides."""
+    rights = right_of_way(intersection)
+    major, other = rights.major[:, None], rights.major[None, :]
+    return np.where(major == other, rights.yields, ~major)
+
+
+def _turns_back(intersection: Intersection) -> Bools:
+    ways = zip(intersection.paths, intersection.ways or (), strict=False)
+    arms = {path.exit_arm for path, way in ways if way.turns_back}
+    return np.array([arm in arms for arm in range(intersection.n)])
+
+
+@njit_inline
+def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
+    """Acceleration that the ACC asks for behind a leader [m/s²]; infinite beyond the radar."""
+    if gap > cruise.radar:
+        return math.inf
+    return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
+
+
+@njit_inline
+def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
+    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
+
+    Starting one step after a desired speed of 0, SUMO asks for standstill within one step.
+    """
+    u = -v / law.dt if stopping else max(u, -v / law.dt)
+    a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -law.b_max)
+    return -v / law.dt if v + a * law.dt < STANDSTILL * law.dt else a

@@ -1,0 +1,218 @@
+"""Which vehicles inside the junction one follows, on other ways than its own."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from minisim.carfollowing import braking_distance
+from minisim.engine.cruise.law import Cruise, follow
+from minisim.engine.state import DRIVING, NEVER, Floats, Ints, Law, Records
+from minisim.jit import njit, njit_inline
+from minisim.junction.meetings import Meeting
+
+#: The most vehicles inside the junction at once.
+INSIDE = 64
+
+NOWHERE, JOIN, PART = int(Meeting.NOWHERE), int(Meeting.JOIN), int(Meeting.PART)
+CROSS, WAIT = int(Meeting.CROSS), int(Meeting.WAIT)
+
+#: SUMO's speed below which a vehicle halts (`SUMO_const_haltingSpeed`) [m/s].
+HALTING = 0.1
+
+#: More than any gap [m].
+FAR = 1e9
+
+
+class Ahead(NamedTuple):
+    """What the leaders on a vehicle's own roads ask of it [m/s²], infinite without one."""
+
+    own: float  # the one on its own lane or way
+    part: int  # the part of the way on which that is; -1 is its own lane, 2 no leader
+    tail: float  # the last one on its exit
+
+
+@njit
+def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law) -> Ints:
+    """The rows of the vehicles at least partly in the junction."""
+    inside = np.empty(INSIDE, np.int64)
+    count = 0
+    for lane in range(len(lanes)):
+        for i in range(lanes[lane]["first"], lanes[lane]["next"]):
+            s, p = vehicles[i]["s"], vehicles[i]["path"]
+            if s < law.entry:
+                break
+            if (
+                vehicles[i]["status"] == DRIVING
+                and s - law.length < ends[p, 0]
+                and count < len(inside)
+            ):
+                inside[count] = i
+                count += 1
+    return inside[:count]
+
+
+@njit
+def meet(
+    vehicles: Records, ends: Floats, law: Law, cruise: Cruise, inside: Ints, i: int, ahead: Ahead
+) -> float:
+    """Acceleration that vehicles inside the junction on other ways ask of vehicle i [m/s²].
+
+    A vehicle that has yet to enter may drive up to the junction (`MSVehicle::checkLinkLeader`), so
+    only its radar counts. Inside it follows those that meet the part of the way that it is on; for
+    a vehicle that only crosses it may also speed up so far that it comes after that one
+    (`MSVehicle::adaptToJunctionLeader`).
+    """
+    s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
+    wait = cruise.waits[p, 0]
+    part = 0 if wait > 0.0 and s < law.entry + wait else 1  # the next, or the one that it is on
+    u = seen = radar(vehicles, ends, law, cruise, inside, i, part, ahead)
+    if s < law.entry:
+        return u
+    for j in inside:
+        other = vehicles[j]
+        q = other["path"]
+        for k in range(2):
+            kind = int(cruise.meetings[p, part, q, k, 0])
+            if kind == NOWHERE:
+                continue
+            gap, to_crossing, in_the_way = room(vehicles, ends, law, cruise, i, part, j, k)
+            if gap == math.inf or not (in_the_way or before(vehicles, cruise, i, j, kind)):
+                continue
+            a = follow(v, gap, other["v"], cruise) if gap >= 0.0 else seen
+            if kind == WAIT:
+                a = seen
+            elif kind == CROSS and to_crossing >= 0.0:
+                time = (to_crossing - gap) / max(other["v"], HALTING)  # until that one is past
+                faster = max(v, 2.0 * (to_crossing - law.min_gap) / time - v)
+                a = max(a, min((faster - v) / time, seen))
+            u = min(u, a)
+    return u
+
+
+@njit
+def radar(
+    vehicles: Records,
+    ends: Floats,
+    law: Law,
+    cruise: Cruise,
+    inside: Ints,
+    i: int,
+    part: int,
+    ahead: Ahead,
+) -> float:
+    """Acceleration that the radar's leader asks of vehicle i on this `part` of its way [m/s²].
+
+    Part by part of the way: the leader on it, then the one of those that meet it behind whom there
+    is the least room, counting what they need to brake.
+    Source: `MSCFModel_CC::getRadarMeasurements`, `MSLane::getLeaderOnConsecutive`,
+    `libsumo::Vehicle::getLeader` (where what is less than no room becomes none).
+    """
+    s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
+    for here in range(part, 2):
+        if ahead.part <= here:
+            return ahead.own
+        shortest = math.inf
+        seen = math.inf
+        for j in inside:
+            other = vehicles[j]
+            q = other["path"]
+            for k in range(2):
+                kind = int(cruise.meetings[p, here, q, k, 0])
+                if kind == NOWHERE or not (cruise.crossing_foes or kind == JOIN):
+                    continue
+                gap, _, _ = room(vehicles, ends, law, cruise, i, here, j, k)
+                stops = gap + braking_distance(other["v"], law.b_max, law.dt)
+                if stops >= shortest:
+                    continue
+                if s >= law.entry and not before(vehicles, cruise, i, j, kind):
+                    continue
+                shortest = stops
+                if gap < 0.0 and not cruise.crossing_foes:
+                    gap = max(law.entry + here * cruise.waits[p, 0] - s, 0.0)
+                elif gap < 0.0:
+                    gap = 0.0 if other["s"] < ends[q, 0] else math.inf
+                seen = follow(v, gap, other["v"], cruise)
+        if shortest < math.inf:
+            return seen
+    return ahead.tail
+
+
+@njit_inline
+def room(
+    vehicles: Records, ends: Floats, law: Law, cruise: Cruise, i: int, part: int, j: int, k: int
+) -> tuple[float, float, bool]:
+    """Room between vehicle i and a vehicle j that meets its way, as if both were on one way [m].
+
+    It is infinite where j is not on part k of its way, or does not matter (any more), and a large
+    negative number where i has to wait for it anyway.
+    Also the distance from i to the crossing [m], and whether j stands in the way there.
+    Source: `MSLink::getLeaderInfo`.
+    """
+    s, p, q = vehicles[i]["s"], vehicles[i]["path"], vehicles[j]["path"]
+    wait = cruise.waits[q, 0]
+    begin = wait if k == 1 else 0.0
+    end = wait if k == 0 else ends[q, 0] - law.entry
+    driven = vehicles[j]["s"] - law.entry
+    rear = driven - law.length
+    if driven < begin or rear >= end:
+        return math.inf, 0.0, False
+    kind = int(cruise.meetings[p, part, q, k, 0])
+    width, rival_width = cruise.meetings[p, part, q, k, 3], cruise.meetings[q, k, p, part, 3]
+    to_end = (law.entry + cruise.waits[p, 0] if part == 0 else ends[p, 0]) - s
+    to_crossing = to_end - cruise.meetings[p, part, q, k, 2]
+    if to_crossing + width < 0.0 and kind != JOIN:
+        return math.inf, 0.0, False
+    rival_behind = cruise.meetings[q, k, p, part, 1]
+    behind = end - rival_behind - rear  # of its rear, before the crossing
+    past = behind + rival_width + cruise.waits[p, 1] < 0.0
+    waiting = k == 0 and wait > 0.0
+    in_the_way = (
+        behind < law.length
+        and not waiting
+        and (cruise.crossing_foes or driven < end)
+        and (
+            (not past and to_crossing > 0.0) or (kind == JOIN and to_crossing > behind - law.length)
+        )
+    )
+    if to_crossing < -law.margin and not in_the_way:
+        return math.inf, 0.0, False
+    if kind == PART and s >= law.entry and driven < s - law.entry - law.length:
+        return math.inf, 0.0, False
+    if kind == WAIT:
+        return -FAR, to_crossing, in_the_way
+    if past and kind != JOIN:
+        return math.inf, 0.0, False
+    if kind == JOIN and behind < 0.0:
+        behind += max(rival_behind - cruise.meetings[p, part, q, k, 1], 0.0)
+    return to_crossing - law.min_gap - behind - rival_width, to_crossing, in_the_way
+
+
+@njit_inline
+def before(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool:
+    """Whether j was in the junction before i, which is inside; if both at once, the faster one.
+
+    What counts as being in it, is for the way that must yield to have passed its waiting position.
+    Source: `MSVehicle::isLeader`.
+    """
+    mine, other = cruise.memory[i], cruise.memory[j]
+    if other["left"] != 0:
+        return True
+    p, q = vehicles[i]["path"], vehicles[j]["path"]
+    me, it = mine["entered"], other["entered"]
+    if kind != PART:
+        if cruise.yields[p, q]:
+            me = mine["merged"]
+            if cruise.yields[q, p]:
+                it = other["merged"]
+        else:
+            it = other["merged"]
+    me = me if me > 0 else NEVER
+    it = it if it > 0 else NEVER
+    if me != it:
+        return bool(it < me)
+    if vehicles[i]["v"] != vehicles[j]["v"]:
+        return bool(vehicles[i]["v"] < vehicles[j]["v"])
+    return bool(vehicles[i]["id"] < vehicles[j]["id"])

@@ -1,0 +1,82 @@
+"""How vehicles under cruise control choose their accelerations: the leaders, and the hold line."""
+
+from __future__ import annotations
+
+import math
+
+from minisim.carfollowing import cruise_control
+from minisim.engine.cruise.law import Cruise, follow, realise
+from minisim.engine.cruise.radar import Ahead, gather, meet
+from minisim.engine.laws import hold
+from minisim.engine.state import DRIVING, Law, Records, Road
+from minisim.jit import njit
+
+
+@njit
+def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise) -> bool:
+    """Choose every vehicle's acceleration from the present state; returns whether two overlap.
+
+    All in one function for the reason given in `minisim.engine.kernel.accelerate`.
+    """
+    overlap = False
+    ends = road.ends
+    inside = gather(vehicles, lanes, ends, law)
+    for lane in range(len(lanes)):
+        is_open = lanes[lane]["open"] != 0
+        first = lanes[lane]["first"]
+        for i in range(first, lanes[lane]["next"]):
+            me = vehicles[i]
+            if me["status"] != DRIVING:
+                continue
+            s, v, p = me["s"], me["v"], me["path"]
+            v0 = cruise.cruise_speed if me["advice"] == math.inf else me["advice"]
+            u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            nearest = own = tail = math.inf
+            part = 2  # of its way on which the leader is, see `Ahead`
+            leave = ends[p, 0]
+            if s < leave:
+                u = min(u, (cruise.max_speed - v) / law.dt)
+                wait = law.entry + cruise.waits[p, 0]
+                for j in range(i - 1, first - 1, -1):
+                    ahead = vehicles[j]
+                    if ahead["status"] != DRIVING:
+                        continue
+                    rear = ahead["s"] - law.length
+                    on_way = ahead["path"] == p and ahead["s"] >= law.entry and rear < leave
+                    on_lane = j == i - 1 and s < law.entry and rear < law.entry
+                    if on_way or on_lane:
+                        asked = follow(v, rear - s - law.min_gap, ahead["v"], cruise)
+                        u = min(u, asked)
+                        nearest = min(nearest, rear - s)
+                        if part == 2:
+                            own = asked
+                            part = -1 if on_lane else (1 if rear >= wait else 0)
+                    if on_way and ahead["s"] >= wait:
+                        break
+                j = cruise.last[int(ends[p, 2])]
+            else:
+                j = me["ahead"]
+            if j >= 0 and vehicles[j]["status"] == DRIVING:
+                ahead = vehicles[j]
+                rear = ahead["s"] - law.length - ends[ahead["path"], 0]
+                gap = rear - (s - leave)
+                # A vehicle beside it on another way is left to the radar (`adaptToLeader`).
+                beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
+                if not beside:
+                    tail = follow(v, gap - law.min_gap, ahead["v"], cruise)
+                    u = min(u, tail)
+                if s >= leave:
+                    nearest = min(nearest, gap)
+            near = law.entry - s <= cruise.radar and s < leave
+            if len(inside) and near and (part >= 0 or s >= law.entry):
+                foes = Ahead(own, part, tail)
+                u = min(u, meet(vehicles, ends, law, cruise, inside, i, foes))
+            overlap |= nearest <= 0.0
+            stopping = cruise.memory[i]["stopping"] != 0
+            a = realise(v, me["a"], u, stopping, law, cruise)
+            a = min(a, max(me["brake"], -v / law.dt))
+            cruise.memory[i]["stopping"] = v0 == 0.0
+            if not is_open and me["go"] == 0 and s < law.entry:
+                a = max(min(a, hold(v, s, law)), -law.b_max)
+            me["a"] = a
+    return overlap

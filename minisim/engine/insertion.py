@@ -1,0 +1,62 @@
+"""How vehicles come onto the roads."""
+
+from __future__ import annotations
+
+import math
+
+from minisim.engine.cruise.ends import blocked
+from minisim.engine.cruise.law import Cruise
+from minisim.engine.laws import insertable
+from minisim.engine.state import DRIVING, STOP_MARGIN, Law, Records, Road
+from minisim.jit import njit
+
+
+@njit
+def insert(
+    vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise | None, tick: int
+) -> bool:
+    """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
+
+    Its speed is the highest from which it can follow the vehicle ahead, brake comfortably for the
+    lower limits ahead and, while the lane is closed, stop at the hold line.
+
+    Returns whether a vehicle was inserted past a wake-up mark.
+    """
+    passed = False
+    for lane in range(len(lanes)):
+        i = lanes[lane]["next"]
+        if i == lanes[lane]["end"] or vehicles[i]["demand_tick"] > tick:
+            continue
+        if cruise is not None and blocked(vehicles, road, law, cruise, lane):
+            continue
+        s, p = law.length + law.margin, vehicles[i]["path"]
+        section = 0
+        while s >= road.section_start[p, section + 1]:
+            section += 1
+        factor = vehicles[i]["factor"]
+        v = road.section_speed[p, section] * factor
+        for k in range(section + 1, road.section_start.shape[1] - 1):
+            room = max(road.section_start[p, k] - s, 0.0)
+            v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * law.b * room))
+        if lanes[lane]["open"] == 0:
+            v = min(v, math.sqrt(2.0 * law.b * max(law.hold - STOP_MARGIN - s, 0.0)))
+        j = i - 1
+        if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
+            safe = insertable(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
+            if safe < 0.0:
+                continue
+            v = min(v, safe)
+        if law.depart_speed >= 0.0:
+            if law.depart_speed > v:
+                continue
+            v = law.depart_speed
+        lanes[lane]["next"] = i + 1
+        vehicles[i]["status"] = DRIVING
+        vehicles[i]["s"] = s
+        vehicles[i]["v"] = v
+        vehicles[i]["depart_tick"] = tick
+        vehicles[i]["section"] = section
+        while s >= road.marks[vehicles[i]["mark"]]:
+            vehicles[i]["mark"] += 1
+            passed = True
+    return passed
