@@ -20,7 +20,7 @@ from minisim.carfollowing import (
     speed_towards,
     stepwise_towards,
 )
-from minisim.engine.state import STOP_MARGIN, Law
+from minisim.engine.state import STOP_MARGIN, Law, Records, Road
 from minisim.jit import njit, njit_inline
 from minisim.vehicle import MODELS, POSITION_EPS
 
@@ -98,6 +98,29 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
     return max((v_new - v) / law.dt, -law.b)
 
 
+@njit
+def free(me: Records, road: Road, law: Law) -> float:
+    """The acceleration of a vehicle that no other one hinders, within the limits here and ahead."""
+    s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
+    start, speed = road.section_start, road.section_speed
+    acc = follow(v, min(speed[p, section] * factor, me["advice"]), 0.0, law)
+    k = section + 1
+    while braking_begins(v, start[p, k] - s, law):
+        acc = min(acc, slow_down(v, acc, speed[p, k] * factor, start[p, k] - s, law))
+        k += 1
+    return acc
+
+
+@njit
+def stop_within(v: float, room: float, law: Law) -> float:
+    """The acceleration with which a vehicle may still stop in `room` [m], as Krauß's law has it.
+
+    Source: SUMO's `MSCFModel_Krauss::stopSpeed`.
+    """
+    v_new = stepwise_towards(0.0, room - STILL, law.b, law.dt) if room >= STILL else 0.0
+    return (v_new - v) / law.dt
+
+
 @njit_inline
 def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
@@ -129,9 +152,7 @@ def stop_at_line(v: float, to_line: float, law: Law) -> float:
     Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
     """
     braking = braking_distance(v, law.b, law.dt)
-    room = to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS) - STILL
-    v_new = stepwise_towards(0.0, room, law.b, law.dt) if room >= 0.0 else 0.0
-    return (v_new - v) / law.dt
+    return stop_within(v, to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS), law)
 
 
 @njit

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from minisim.carfollowing import STANDSTILL, distance_control, engine_lag
+from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
+from minisim.engine.laws import KRAUSS
 from minisim.engine.state import Floats, Ints, Law, Records
 from minisim.jit import njit_inline
 from minisim.junction.geometry import Intersection
@@ -62,10 +63,13 @@ class Cruise(NamedTuple):
 
 
 def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | None:
-    """Collect what a run of `count` vehicles needs; None where they have no cruise control."""
+    """Collect what a run of `count` vehicles needs; None where they do not drive like SUMO's."""
     vehicle, intersection = site.vehicle, site.intersection
-    if not isinstance(vehicle, CruiseVehicle):
+    if vehicle.sumo is None:
         return None
+    looks_out = vehicle.looks_out
+    if not isinstance(vehicle, CruiseVehicle):
+        vehicle = CruiseVehicle()  # without effect under any other law
     waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
     return Cruise(
         cruise_speed=vehicle.cruise_speed,
@@ -80,9 +84,9 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         radar=vehicle.radar,
         max_speed=vehicle.max_speed,
         teleports=teleports,
-        crossing_foes=vehicle.sumo == "1.18",
+        crossing_foes=looks_out,
         meetings=meetings(intersection),
-        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
+        waits=np.stack([waits, sagittas(intersection, site.vehicle.length)], axis=-1),
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
         memory=np.zeros(count, MEMORY),
@@ -104,8 +108,13 @@ def _turns_back(intersection: Intersection) -> Bools:
 
 
 @njit_inline
-def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
-    """Acceleration that the ACC asks for behind a leader [m/s²]; infinite beyond the radar."""
+def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> float:
+    """Acceleration that a leader asks for [m/s²]; under the ACC infinite beyond the radar.
+
+    The gap is measured beyond `min_gap`.
+    """
+    if law.model == KRAUSS:
+        return (safe_speed(gap, v_leader, law.b, law.headway, law.dt) - v) / law.dt
     if gap > cruise.radar:
         return math.inf
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)

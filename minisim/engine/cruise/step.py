@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
-from minisim.carfollowing import cruise_control
+from minisim.carfollowing import STANDSTILL, cruise_control
 from minisim.engine.cruise.law import Cruise, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.laws import hold
+from minisim.engine.laws import KRAUSS, free, hold, stop_at_line, stop_within
 from minisim.engine.state import DRIVING, Law, Records, Road
 from minisim.jit import njit
+from minisim.vehicle import POSITION_EPS
 
 
 @njit
@@ -30,12 +31,16 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 continue
             s, v, p = me["s"], me["v"], me["path"]
             v0 = cruise.cruise_speed if me["advice"] == math.inf else me["advice"]
-            u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if law.model == KRAUSS:
+                u = free(me, road, law)
+            else:
+                u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
             nearest = own = tail = math.inf
             part = 2  # of its way on which the leader is, see `Ahead`
             leave = ends[p, 0]
             if s < leave:
-                u = min(u, (cruise.max_speed - v) / law.dt)
+                if law.model != KRAUSS:
+                    u = min(u, (cruise.max_speed - v) / law.dt)
                 wait = law.entry + cruise.waits[p, 0]
                 for j in range(i - 1, first - 1, -1):
                     ahead = vehicles[j]
@@ -45,7 +50,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     on_way = ahead["path"] == p and ahead["s"] >= law.entry and rear < leave
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
-                        asked = follow(v, rear - s - law.min_gap, ahead["v"], cruise)
+                        asked = follow(v, rear - s - law.min_gap, ahead["v"], law, cruise)
                         u = min(u, asked)
                         nearest = min(nearest, rear - s)
                         if part == 2:
@@ -60,20 +65,29 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
-                # A vehicle beside it on another way is left to the radar (`adaptToLeader`).
+                # A vehicle beside it on another way is left to the radar, or waited for before the
+                # junction (`adaptToLeader`).
                 beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
-                if not beside:
-                    tail = follow(v, gap - law.min_gap, ahead["v"], cruise)
+                if beside and law.model == KRAUSS:
+                    u = min(u, stop_within(v, law.entry - s - POSITION_EPS, law))
+                elif not beside:
+                    tail = follow(v, gap - law.min_gap, ahead["v"], law, cruise)
                     u = min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
             near = law.entry - s <= cruise.radar and s < leave
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
-                u = min(u, meet(vehicles, ends, law, cruise, inside, i, foes))
+                asked = meet(vehicles, ends, law, cruise, inside, i, foes)
+                if law.model == KRAUSS and s < law.entry:
+                    asked = max(asked, stop_at_line(v, law.entry - s, law))
+                u = min(u, asked)
             overlap |= nearest <= 0.0
-            stopping = cruise.memory[i]["stopping"] != 0
-            a = realise(v, me["a"], u, stopping, law, cruise)
+            if law.model == KRAUSS:
+                a = max(u, -law.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
+            else:
+                stopping = cruise.memory[i]["stopping"] != 0
+                a = realise(v, me["a"], u, stopping, law, cruise)
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
             if not is_open and me["go"] == 0 and s < law.entry:
