@@ -82,6 +82,7 @@ class Observed(NamedTuple):
         speed: [m/s].
         length: [m].
         demand_time: when it wanted to enter the road [s].
+        speed_factor: its driver's factor on the speed limit.
     """
 
     id: int
@@ -91,6 +92,7 @@ class Observed(NamedTuple):
     speed: float
     length: float
     demand_time: float = 0.0
+    speed_factor: float = 1.0
 
     @property
     def movement(self) -> Movement:

@@ -25,7 +25,7 @@ class Adaptive:
     goes on while the other lanes are empty.
 
     A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
-    its way. Time loss is relative to the speed limit, whatever speed a driver would like.
+    its way. Time loss is relative to the speed that the driver would like (`MSE2Collector`).
     Defaults are SUMO's, except for greens and amber, which are from the authors' network.
     """
 
@@ -83,7 +83,8 @@ class DelaySession(PhaseSession):
             v.distance / limit
             for v in approaching
             if v.lane == lane
-            and time_loss(*self._entered[v.id], now, v.distance, limit) > signal.min_time_loss
+            and time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
+            > signal.min_time_loss
         ]
         in_time = [time for time in times if elapsed + time <= signal.max_green]
         prolongation = max(0.0, signal.min_green - elapsed, *in_time)

@@ -265,5 +265,6 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen["speed"] = me["v"]
             seen["length"] = law.length
             seen["demand_time"] = me["demand_tick"] * law.dt
+            seen["speed_factor"] = me["factor"]
             count += 1
     return count

@@ -92,6 +92,7 @@ OBSERVED = np.dtype(
         ("speed", np.float64),
         ("length", np.float64),
         ("demand_time", np.float64),
+        ("speed_factor", np.float64),
     ]
 )
 
