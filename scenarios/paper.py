@@ -53,6 +53,10 @@ SERIES: Mapping[str, str] = {
 }  # fmt: skip
 
 
+#: The series of the two signals.
+SIGNALS = ("fts", "ats")
+
+
 class Cell(NamedTuple):
     """One published run: one of `SPLITS`, inflow a lane [veh/h], arms, and a key of `SERIES`."""
 
@@ -172,12 +176,18 @@ def replay(
     vehicle, junction = made.profile.vehicle, made.intersection
     if vehicle.sumo is None or junction.ways is None:
         return made
-    cruises = isinstance(vehicle, CruiseVehicle)
-    turnarounds = "" if sumo != "1.18" or arms != 4 else TURNAROUNDS[split]
+    if sumo != "1.18":
+        turnarounds = ""
+        vehicle = replace(vehicle, sumo=sumo if isinstance(vehicle, CruiseVehicle) else None)
+    elif controller in SIGNALS:
+        turnarounds = "" if split == RENAMED else TURNAROUNDS[split]
+    else:
+        turnarounds = TURNAROUNDS[split] if arms == 4 else ""
+    ways = published_ways(arms, turnarounds, waits=controller not in SIGNALS)
     return replace(
         made,
-        intersection=replace(junction, ways=published_ways(arms, turnarounds)),
-        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo if cruises or sumo == "1.18" else None)),
+        intersection=replace(junction, ways=ways),
+        profile=replace(made.profile, vehicle=vehicle),
     )
 
 

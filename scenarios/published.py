@@ -27,13 +27,17 @@ TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
 
 
 @lru_cache
-def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]:
+def published_ways(
+    arms: int, turnarounds: str | None = None, *, waits: bool = True
+) -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
 
     Args:
         arms: how many.
         turnarounds: arms at whose far end the road leads back; None is as in the networks of the
             authors.
+        waits: whether vehicles that turn far have a place to wait inside. Those in the networks of
+            the signals have none.
 
     Raises:
         InputError: another number of arms.
@@ -46,16 +50,16 @@ def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]
         rows = list(csv.DictReader(text))
     exits = movements_of(arms).exits.tolist()  # the rows are in their order
     return tuple(
-        _way(row, ARM_NAMES[exit_arm] in turnarounds)
+        _way(row, ARM_NAMES[exit_arm] in turnarounds, waits)
         for row, exit_arm in zip(rows, exits, strict=True)
     )
 
 
-def _way(row: dict[str, str], turns_back: bool) -> Way:
+def _way(row: dict[str, str], turns_back: bool, waits: bool) -> Way:
     numbers = [float(number) for number in row["points"].split()]
     points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
     return Way(
-        points, float(row["length_m"]), float(row["wait_m"]), speed=float(row["speed_mps"]),
+        points, float(row["length_m"]), float(row["wait_m"]) if waits else 0.0, speed=float(row["speed_mps"]),
         major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
         turns_back=turns_back,

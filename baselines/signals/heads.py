@@ -8,12 +8,13 @@ comfortably keep their right of way; all others stop.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from minisim.carfollowing import braking_distance
 from minisim.control import (
     COMMIT_MARGIN,
     Close,
@@ -59,7 +60,10 @@ class Heads:
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
-        self._deceleration = site.vehicle.deceleration
+        b, dt = site.vehicle.deceleration, site.dt
+        self._stops = lambda v: can_stop(v, b)
+        if site.vehicle.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
+            self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
         self._at_once = site.vehicle.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * n
@@ -83,7 +87,7 @@ class Heads:
         return commands
 
     def _close(self, lane: int, view: View) -> list[Command]:
-        going = committed([v for v in view.vehicles if v.lane == lane], self._deceleration)
+        going = committed([v for v in view.vehicles if v.lane == lane], self._stops)
         self._let_go.update(v.id for v in going)
         return [Close(lane), *(Go(v.id) for v in going)]
 
@@ -122,14 +126,14 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
     return order
 
 
-def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
+def committed(lane: Iterable[Observed], stops: Callable[[Observed], bool]) -> list[Observed]:
     """The vehicles before the junction that keep their right of way when their lane is closed.
 
-    Comfortable braking [m/s²] can no longer stop them, or a vehicle behind them, before the
-    junction. `lane` holds the vehicles of one lane, front to back.
+    They, or a vehicle behind them, can no longer stop before the junction. `lane` holds the
+    vehicles of one lane, front to back.
     """
     approaching = [v for v in lane if v.distance >= 0.0]
-    last = max((i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1)
+    last = max((i for i, v in enumerate(approaching) if not stops(v)), default=-1)
     return approaching[: last + 1]
 
 

@@ -190,6 +190,11 @@ def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, floa
     return profile
 
 
+#: SUMO's vehicle has left a lane once it is past its end. One that slows down for a turn often gets
+#: to the very end, and a light may change then [m].
+PAST_THE_END = 1e-9
+
+
 def build_law(
     site: Site,
     plan: Plan,
@@ -219,7 +224,7 @@ def build_law(
         semi_implicit=MODELS[vehicle.model].stepwise,
         length=vehicle.length,
         width=vehicle.width,
-        entry=entry,
+        entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
         margin=vehicle.margin,
