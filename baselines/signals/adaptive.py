@@ -80,7 +80,7 @@ class DelaySession(PhaseSession):
         self._entered = {v.id: self._entered[v.id] for v in approaching}
         limit, now = self._speed_limit, view.time
         times = [
-            v.distance / limit
+            self.duration(v.distance / limit)
             for v in approaching
             if v.lane == lane
             and time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)

@@ -81,7 +81,7 @@ class PhaseSession:
         self.see(view)
         if self._exact and view.time > 0.0:
             view = view._replace(time=round(view.time + self._dt, 6))
-        if view.time + self._early >= self._due:
+        while view.time + self._early >= self._due:
             self._rang = self._due
             self._go_on(view)
         wanted = [Colour.RED] * len(self._order)
@@ -101,7 +101,7 @@ class PhaseSession:
         # Times in views are exact to a microsecond.
         verdict = self.judge(view, self._lane, round(view.time - self._began, 6))
         if verdict.lane == self._lane:
-            self._due = self._since(view) + max(verdict.after, self._dt)
+            self._due = self._since(view) + max(verdict.after, 0.0 if self._exact else self._dt)
             return
         self._next, self._began = verdict.lane, None
         if self._amber > 0.0:
@@ -112,7 +112,11 @@ class PhaseSession:
 
     def _since(self, view: View) -> float:
         """The time from which the next timer counts [s]."""
-        return round(self._rang, 3) if self._exact else view.time
+        return self._rang if self._exact else view.time
+
+    def duration(self, time: float) -> float:
+        """A time as its timers measure it [s]: SUMO's count milliseconds."""
+        return round(time, 3) if self._exact else time
 
 
 def on_detector(view: View, detector_range: float) -> list[Observed]:
