@@ -11,7 +11,7 @@ import numpy as np
 from minisim.arrivals import Arrivals, read_arrivals
 from minisim.errors import choice
 from minisim.junction.movements import ARM_NAMES, movements_of
-from minisim.junction.paths import Way
+from minisim.junction.paths import Way, distances_along
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
 #: when the runs at 4:1:4:1 were made (in `my_network.net.xml` as of then, b+ comes from the south
@@ -56,11 +56,14 @@ def published_ways(
 
 
 def _way(row: dict[str, str], turns_back: bool, waits: bool) -> Way:
-    numbers = [float(number) for number in row["points"].split()]
-    points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
+    points = np.array(row["points"].split(), dtype=float).reshape(-1, 2)
+    length, wait = float(row["length_m"]), float(row["wait_m"])
+    if wait > 0.0 and not waits:  # the same curve without a point there
+        points = np.delete(points, np.abs(distances_along(points) - wait).argmin(), axis=0)
+        length, wait = round(float(distances_along(points)[-1]), 2), 0.0
     return Way(
-        points, float(row["length_m"]), float(row["wait_m"]) if waits else 0.0, speed=float(row["speed_mps"]),
-        major=row["major"] == "1",
+        tuple((float(x), float(y)) for x, y in points),
+        length, wait, speed=float(row["speed_mps"]), major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
         turns_back=turns_back,
     )  # fmt: skip
