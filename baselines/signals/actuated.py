@@ -82,7 +82,8 @@ class GapSession(PhaseSession):
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
             if v.id not in self._passed:
-                self._left[v.lane] = view.time
+                past = free - v.distance - v.length
+                self._left[v.lane] = view.time - (past / v.speed if self._exact else 0.0)
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:

@@ -78,9 +78,9 @@ class PhaseSession:
         than a whole step away is due, an event counts from the one before, and it acts on the move
         that ends at its time (`MSEventControl::execute`).
         """
-        self.see(view)
         if self._exact and view.time > 0.0:
             view = view._replace(time=round(view.time + self._dt, 6))
+        self.see(view)
         while view.time + self._early >= self._due:
             self._rang = self._due
             self._go_on(view)
