@@ -61,7 +61,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 j = cruise.last[int(ends[p, 2])]
             else:
                 j = me["ahead"]
-            if j >= 0 and vehicles[j]["status"] == DRIVING:
+            held = not is_open and me["go"] == 0 and s < law.entry
+            blind = held and law.model == KRAUSS  # to what is beyond a red light
+            if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
@@ -75,7 +77,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     u = min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
-            near = law.entry - s <= cruise.radar and s < leave
+            near = law.entry - s <= cruise.radar and s < leave and not blind
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
                 asked = meet(vehicles, ends, law, cruise, inside, i, foes)
@@ -90,7 +92,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 a = realise(v, me["a"], u, stopping, law, cruise)
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
-            if not is_open and me["go"] == 0 and s < law.entry:
+            if held:
                 a = max(min(a, hold(v, s, law)), -law.b_max)
             me["a"] = a
     return overlap
