@@ -101,15 +101,18 @@ class Ran(NamedTuple):
     profile: Profile | None = None
 
 
+#: `AS_RUN` in SUMO's speed mode 31, as the drivers of the signals set it.
+OBEYING = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, obeys=True))
+
 #: Controller and split -> what ran, where the label is wrong. The unbalanced runs of the fixed-time
 #: signal had DIM's vehicle: their driver switches its ACC on, and their trips have a speed factor
 #: of 1.00 and the 0.16 s of waiting with which that vehicle starts.
 RAN: dict[tuple[str, str], Ran] = {
     ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
+    ("fts", "4:3:2:1"): Ran(green=5.0, profile=OBEYING),
     ("ats", "4:3:2:1"): Ran(controller="actuated"),
     ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN),
+    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=OBEYING),
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }
 
@@ -178,7 +181,10 @@ def replay(
         return made
     if sumo != "1.18":
         turnarounds = ""
-        vehicle = replace(vehicle, sumo=sumo if isinstance(vehicle, CruiseVehicle) else None)
+        if isinstance(vehicle, CruiseVehicle):
+            vehicle = replace(vehicle, sumo=sumo, obeys=False)
+        else:
+            vehicle = replace(vehicle, sumo=None)
     elif controller in SIGNALS:
         turnarounds = "" if split == RENAMED else TURNAROUNDS[split]
     else:
@@ -202,7 +208,8 @@ def controller_of(
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     if cell.controller == "fts":
-        return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
+        green = 19.75 if cell.split == RENAMED and cell.density == 300 else GREENS[cell.density]
+        return FixedTime(greens=ran.green or green, order=PHASES)
     if cell.controller == "ats":
         signal = Actuated if ran.controller == "actuated" else Adaptive
         return signal(order=PHASES)

@@ -29,6 +29,7 @@ from minisim.control import (
 )
 from minisim.errors import InputError, integer, items
 from minisim.parameters import checked
+from minisim.vehicle import CruiseVehicle
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
@@ -62,7 +63,11 @@ class Heads:
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
         b, dt = site.vehicle.deceleration, site.dt
         self._stops = lambda v: can_stop(v, b)
-        if site.vehicle.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
+        self._open = [Colour.GREEN]
+        if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
+            self._open += [Colour.AMBER]
+            self._stops = lambda _: True  # dead, see there
+        elif site.vehicle.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
             self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
         self._at_once = site.vehicle.looks_out
         self._let_go: set[int] = set()
@@ -77,7 +82,7 @@ class Heads:
         self._let_go.intersection_update(v.id for v in view.vehicles)
         for lane, colour in enumerate(wanted):
             if colour is not Colour.GREEN:
-                if self.colours[lane] is Colour.GREEN:
+                if self.colours[lane] in self._open and colour not in self._open:
                     commands += self._close(lane, view)
                 self.colours[lane] = colour
         for lane, colour in enumerate(wanted):

@@ -38,6 +38,8 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
             f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
             f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
+    if vehicle.obeys:
+        raise InputError("hosted in SUMO, a CruiseVehicle cannot obey limits and lights by itself")
     return {
         "accel": vehicle.engine_acceleration, "decel": vehicle.max_deceleration,
         "ccAccel": vehicle.cruise_acceleration, "ccDecel": vehicle.cruise_deceleration,

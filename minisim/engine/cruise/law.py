@@ -10,8 +10,8 @@ import numpy as np
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
 from minisim.engine.laws import KRAUSS
-from minisim.engine.state import Floats, Ints, Law, Records
-from minisim.jit import njit_inline
+from minisim.engine.state import Floats, Ints, Law, Records, Road
+from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
 from minisim.vehicle import CruiseVehicle
@@ -32,6 +32,7 @@ class Cruise(NamedTuple):
 
     Attributes:
         teleports: whether a vehicle that runs into another on its exit is taken off the road.
+        obeys: whether vehicles keep to limits and lights (`CruiseVehicle.obeys`).
         crossing_foes: whether the radar sees vehicles that only cross.
         meetings: (p, 2, p, 2, 4), see `minisim.junction.meetings.meetings`.
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
@@ -53,6 +54,7 @@ class Cruise(NamedTuple):
     radar: float
     max_speed: float
     teleports: bool
+    obeys: bool
     crossing_foes: bool
     meetings: Floats
     waits: Floats
@@ -84,6 +86,7 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         radar=vehicle.radar,
         max_speed=vehicle.max_speed,
         teleports=teleports,
+        obeys=vehicle.obeys,
         crossing_foes=looks_out,
         meetings=meetings(intersection),
         waits=np.stack([waits, sagittas(intersection, site.vehicle.length)], axis=-1),
@@ -118,6 +121,23 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
     if gap > cruise.radar:
         return math.inf
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
+
+
+@njit
+def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise: Cruise) -> float:
+    """The speed that a vehicle which obeys limits may drive [m/s].
+
+    It takes its desired speed for a factor on the limit where it was one step before. So a limit
+    counts for the first step beyond it only.
+    Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
+    """
+    before = s - v * law.dt
+    limit, turn = road.section_speed[p, 0], road.section_speed[p, 1]
+    if before < law.entry <= s:
+        return v0 * turn / limit
+    if before < road.ends[p, 0] <= s:
+        return min(v0 * limit / turn, cruise.max_speed)
+    return v0
 
 
 @njit_inline

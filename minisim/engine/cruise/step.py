@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from minisim.carfollowing import STANDSTILL, cruise_control
-from minisim.engine.cruise.law import Cruise, follow, realise
+from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.laws import KRAUSS, free, hold, stop_at_line, stop_within
-from minisim.engine.state import DRIVING, Law, Records, Road
+from minisim.engine.state import DRIVING, PAST_THE_END, Law, Records, Road
 from minisim.jit import njit
 from minisim.vehicle import POSITION_EPS
 
@@ -35,6 +35,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 u = free(me, road, law)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if cruise.obeys:
+                u = min(u, (allowed(s, v, p, v0, road, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
             part = 2  # of its way on which the leader is, see `Ahead`
             leave = ends[p, 0]
@@ -62,7 +64,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             else:
                 j = me["ahead"]
             held = not is_open and me["go"] == 0 and s < law.entry
-            blind = held and law.model == KRAUSS  # to what is beyond a red light
+            blind = held and (law.model == KRAUSS or cruise.obeys)  # to what is beyond a red light
             if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
@@ -92,7 +94,10 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 a = realise(v, me["a"], u, stopping, law, cruise)
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
-            if held:
+            if held and cruise.obeys:
+                to_line = max(law.entry - PAST_THE_END - s, 0.0)
+                a = min(a, (to_line / law.dt - v) / law.dt)
+            elif held:
                 a = max(min(a, hold(v, s, law)), -law.b_max)
             me["a"] = a
     return overlap
