@@ -19,7 +19,7 @@ from minisim.errors import InputError, choice, integer
 from minisim.vehicle import CruiseVehicle
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
-from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS, Profile
+from scenarios.profiles import AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS, Profile
 from scenarios.published import (
     PUBLISHED_ARMS,
     RENAMED,
@@ -101,18 +101,15 @@ class Ran(NamedTuple):
     profile: Profile | None = None
 
 
-#: `AS_RUN` in SUMO's speed mode 31, as the drivers of the signals set it.
-OBEYING = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, obeys=True))
-
 #: Controller and split -> what ran, where the label is wrong. The unbalanced runs of the fixed-time
 #: signal had DIM's vehicle: their driver switches its ACC on, and their trips have a speed factor
 #: of 1.00 and the 0.16 s of waiting with which that vehicle starts.
 RAN: dict[tuple[str, str], Ran] = {
     ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:3:2:1"): Ran(green=5.0, profile=OBEYING),
+    ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN_OBEYING),
     ("ats", "4:3:2:1"): Ran(controller="actuated"),
     ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=OBEYING),
+    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN_OBEYING),
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from minisim.errors import choice, number
 from minisim.parameters import declared, part, real, text
 from minisim.vehicle import CruiseVehicle, VehicleType
@@ -61,6 +63,15 @@ AS_RUN = Profile(
     dt=0.01,
 )
 
+#: `AS_RUN` in SUMO's speed mode 31, set by the driver of the fixed-time signal at unequal inflow.
+AS_RUN_OBEYING = Profile(
+    name="as_run_obeying",
+    vehicle=replace(AS_RUN.vehicle, obeys=True),
+    speed_limit=14.0,
+    depart_speed=0.0,
+    dt=0.01,
+)
+
 #: How the published numbers of the two signals arose where the inflow was balanced, and those of
 #: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
 #: is not given), accel 50, decel 1000, length 4, minGap 2; drivers' speed factors N(1, 0.1), which
@@ -84,7 +95,7 @@ AS_RUN_SIGNALS = Profile(
 )
 
 #: The profiles of the published runs; they use the junctions in the authors' networks.
-PUBLISHED_PROFILES = (AS_RUN, AS_RUN_SIGNALS)
+PUBLISHED_PROFILES = (AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS)
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROFILES)}
 
