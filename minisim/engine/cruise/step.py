@@ -64,7 +64,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             else:
                 j = me["ahead"]
             held = not is_open and me["go"] == 0 and s < law.entry
-            blind = held and (law.model == KRAUSS or cruise.obeys)  # to what is beyond a red light
+            blind = held and law.model == KRAUSS  # to what is beyond a red light
             if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
