@@ -22,6 +22,7 @@ MEMORY = np.dtype(
         ("entered", np.int64),  # tick of entering the junction
         ("merged", np.int64),  # tick of passing the waiting position, if there is one
         ("left", np.int64),  # its front has left the junction
+        ("at_red", np.int64),  # it would have run a red light and stops dead
         ("stopping", np.int64),  # it was advised to stand still in the previous step
     ]
 )

@@ -8,7 +8,7 @@ from minisim.carfollowing import STANDSTILL, cruise_control
 from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.laws import KRAUSS, free, hold, stop_at_line, stop_within
-from minisim.engine.state import DRIVING, PAST_THE_END, Law, Records, Road
+from minisim.engine.state import DRIVING, Law, Records, Road
 from minisim.jit import njit
 from minisim.vehicle import POSITION_EPS
 
@@ -95,8 +95,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
             if held and cruise.obeys:
-                to_line = max(law.entry - PAST_THE_END - s, 0.0)
-                a = min(a, (to_line / law.dt - v) / law.dt)
+                if s + (v + a * law.dt) * law.dt >= law.entry:
+                    a = -v / law.dt
+                    cruise.memory[i]["at_red"] = 1
             elif held:
                 a = max(min(a, hold(v, s, law)), -law.b_max)
             me["a"] = a
