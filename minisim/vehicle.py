@@ -9,7 +9,6 @@ from typing import NamedTuple
 from minisim.errors import InputError
 from minisim.parameters import declared, real, switch, word
 
-
 #: SUMO's `POSITION_EPS` [m].
 POSITION_EPS = 0.1
 
@@ -191,8 +190,8 @@ class CruiseVehicle(VehicleType):
         default=55.55, above=0, high=100,
     )  # fmt: skip
     obeys: bool = switch(
-        "whether it keeps to limits and lights by itself, late: it brakes once it is in a turn, runs "
-        "amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
+        "whether it keeps to limits and lights by itself, but late: it brakes once it is in a "
+        "turn, runs amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
     )  # fmt: skip
     sumo: str = word(
         "the version of SUMO whose radar it has; that of the published runs saw more",

@@ -186,7 +186,8 @@ def replay(
         turnarounds = "" if split == RENAMED else TURNAROUNDS[split]
     else:
         turnarounds = TURNAROUNDS[split] if arms == 4 else ""
-    ways = published_ways(arms, turnarounds, waits=controller not in SIGNALS)
+    waits = controller not in SIGNALS or (controller == "fts" and split == RENAMED)
+    ways = published_ways(arms, turnarounds, waits=waits)
     return replace(
         made,
         intersection=replace(junction, ways=ways),

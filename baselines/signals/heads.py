@@ -2,8 +2,8 @@
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
 depend on the length of an amber. Where vehicles look out for those that cross (`VehicleType`), it
-turns green at once, as the published signals did. At the end of a green, vehicles that can no longer stop
-comfortably keep their right of way; all others stop.
+turns green at once, as the published signals did. At the end of a green, vehicles that can no
+longer stop comfortably keep their right of way; all others stop.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ from baselines.signals.heads import Colour, Heads, full_order, stopping_sight
 from minisim.control import Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError
 
-
 #: Views are exact to a microsecond [s].
 TICK = 1e-6
 

@@ -165,7 +165,7 @@ class _Senses:
         """One vehicle as the ego perceives it."""
         recipe, draws = self._recipe, self._draws
         observer = _ALL if recipe.shared else ego
-        id, lane, manoeuvre, distance, speed, length, demand_time = vehicle
+        id, lane, manoeuvre, distance, speed, *rest = vehicle
         if recipe.misreads and manoeuvre != UNKNOWN:
             when = _ALL if recipe.persistent else moment
             manoeuvre = self._intent(lane, manoeuvre, id, observer, when)
@@ -173,7 +173,7 @@ class _Senses:
             distance += recipe.position_noise * draws.normal(_POSITION, id, observer, moment)
         if recipe.speed_noise:
             speed += recipe.speed_noise * draws.normal(_SPEED, id, observer, moment)
-        return Observed(id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time)
+        return Observed(id, lane, manoeuvre, distance, max(speed, 0.0), *rest)
 
     def _read(self, lane: int, manoeuvre: int, vehicle: int, observer: int, when: int) -> int:
         """What a manoeuvre is taken for, or `UNKNOWN`."""

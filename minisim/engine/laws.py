@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from minisim.carfollowing import (
     STILL,
     braking_distance,
@@ -20,7 +22,7 @@ from minisim.carfollowing import (
     speed_towards,
     stepwise_towards,
 )
-from minisim.engine.state import STOP_MARGIN, Law, Records, Road
+from minisim.engine.state import STOP_MARGIN, Law, Road
 from minisim.jit import njit, njit_inline
 from minisim.vehicle import MODELS, POSITION_EPS
 
@@ -99,7 +101,7 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
 
 
 @njit
-def free(me: Records, road: Road, law: Law) -> float:
+def free(me: np.void, road: Road, law: Law) -> float:
     """The acceleration of a vehicle that no other one hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
     start, speed = road.section_start, road.section_speed

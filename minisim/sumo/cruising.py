@@ -105,7 +105,7 @@ class Cruiser:
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
         if ahead is not None:
             gap = ahead.s - law.length - car.s
-            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, cruise))
+            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, law, cruise))
         return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
 
     def _desired(self, car: Car) -> float:

@@ -17,7 +17,7 @@ from minisim.results.trips import Trips
 from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.vehicle import MODELS, CruiseVehicle
+from minisim.vehicle import CruiseVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
 TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"

@@ -132,7 +132,13 @@ class Worker:
                     break
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
-                    car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
+                    car.id,
+                    car.lane,
+                    manoeuvre,
+                    distance,
+                    car.v,
+                    law.length,
+                    car.demand_time,
                     car.factor,
                 )
 

@@ -135,9 +135,9 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
     before = s - v * law.dt
     limit, turn = road.section_speed[p, 0], road.section_speed[p, 1]
     if before < law.entry <= s:
-        return v0 * turn / limit
+        return float(v0 * turn / limit)
     if before < road.ends[p, 0] <= s:
-        return min(v0 * limit / turn, cruise.max_speed)
+        return float(min(v0 * limit / turn, cruise.max_speed))
     return v0
 
 
