@@ -28,7 +28,7 @@ from scenarios.paper import (
     replay,
     scenario,
 )
-from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
+from scenarios.profiles import AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
 from tests.builders import reference_value
 
@@ -182,7 +182,7 @@ def test_each_run_has_its_vehicle() -> None:
 
     assert profile("fts", "balanced") == profile("ats", "4:1:4:1") == AS_RUN_SIGNALS
     assert profile("dim", "4:3:2:1") == profile("v2ic", "balanced") == AS_RUN
-    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN
+    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN_OBEYING
     assert profile("fts", "4:3:2:1", as_labelled=True) == AS_RUN_SIGNALS
 
 
@@ -256,7 +256,7 @@ def test_replays_of_dim_are_those_of_sumo_1_18_and_meet_the_published_means(cell
     """Wait within 10 %, travel within 0.5 s (as_run.md); far closer in fact."""
     ours = means(cell)
     assert ours == published(cell, rel=0.02, travel=0.06)
-    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 1e-4)
+    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 2e-4)
 
 
 @pytest.mark.parametrize("density", [150, 200, 250, 300, 350])
