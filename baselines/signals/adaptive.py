@@ -69,8 +69,12 @@ class DelaySession(PhaseSession):
     def see(self, view: View) -> None:
         """Note when and where a vehicle comes onto a detector."""
         for v in view.vehicles:
-            if v.id not in self._entered and 0.0 < v.distance <= self._signal.detector_range:
-                self._entered[v.id] = view.time, v.distance
+            reach = self._signal.detector_range
+            if v.id not in self._entered and 0.0 < v.distance <= reach:
+                # SUMO also counts the part of the step after the entry.
+                past = (reach - v.distance) if self._exact and v.speed > 0.0 else 0.0
+                since = view.time - (past / v.speed if past else 0.0)
+                self._entered[v.id] = since, v.distance + past
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""

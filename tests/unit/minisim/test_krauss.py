@@ -27,7 +27,9 @@ from tests.builders import Fixed, replayed
 CAR = VehicleType(model="krauss")
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=CAR)
 #: The published vehicle, every driver at the limit.
-ALIKE = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, speed_deviation=0.0))
+#: The vehicle of the signals by minisim's own rules, which the host shares.
+HOSTED = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, sumo=None))
+ALIKE = replace(HOSTED, vehicle=replace(HOSTED.vehicle, speed_deviation=0.0))
 
 
 def follower(dt: float, leader_v: float, seconds: float, gap: float, v: float) -> tuple[float, ...]:
@@ -204,7 +206,7 @@ def test_a_step_of_a_tenth_gives_the_waits_of_a_hundredth() -> None:
     """The published step is 0.01 s; common arrivals and drivers, a quarter of an hour."""
     coarse, fine = (
         minisim.simulate(
-            four_way(250, profile=replace(AS_RUN_SIGNALS, dt=dt), horizon=900.0),
+            four_way(250, profile=replace(HOSTED, dt=dt), horizon=900.0),
             FixedTime(greens=10.75),
             1,
         ).summary()
