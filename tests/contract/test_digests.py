@@ -24,7 +24,7 @@ KEPT = {
     "fair/5/reservation/2": "e034d4f26190ea2d",
     "as_run/4/dim/1": "b02cfed84a807104",
     "as_run/4/v2ic-as-run/1": "daf65ce632436dd1",
-    "as_run_signals/4/fixed-time/1": "0bd6f544bf354d4c",
+    "as_run_signals/4/fixed-time/1": "cfe79b624bf4eb30",
     "fair/4/dim/2 model=krauss": "8bc201e6349842b4",
     "fair/4/dim/1 model=iidm": "1cdcfbd7057a4c70",
     "fair/4/dim:gate=harmonious/1 side=right": "eecc861ccbbb55ae",
