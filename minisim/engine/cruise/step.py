@@ -7,7 +7,15 @@ import math
 from minisim.carfollowing import STANDSTILL, cruise_control
 from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.laws import KRAUSS, free, hold, stop_at_line, stop_within
+from minisim.engine.laws import (
+    KRAUSS,
+    STOP_LINE_GAP,
+    braking_begins,
+    free,
+    hold,
+    stop_at_line,
+    stop_within,
+)
 from minisim.engine.state import DRIVING, Law, Records, Road
 from minisim.jit import njit
 from minisim.vehicle import POSITION_EPS
@@ -80,6 +88,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 if s >= leave:
                     nearest = min(nearest, gap)
             near = law.entry - s <= cruise.radar and s < leave and not blind
+            if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
+                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, law)
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
                 asked = meet(vehicles, ends, law, cruise, inside, i, foes)
