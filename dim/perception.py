@@ -103,7 +103,7 @@ class Reader(NamedTuple):
         for vehicle in view.vehicles:
             if vehicle.distance > start:
                 continue
-            _, lane, manoeuvre, distance, _, _, _, _ = vehicle
+            _, lane, manoeuvre, distance, *_ = vehicle
             front = distance >= 0.0 and lane != lane_served
             if front:
                 lane_served = lane

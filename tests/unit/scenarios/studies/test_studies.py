@@ -62,7 +62,7 @@ def test_the_as_run_study_runs_what_ran() -> None:
     for series, rates in (("adaptive", (400, 400, 100, 100)), ("dim", (400, 100, 400, 100))):
         assert recipes[series, "4:1:4:1", 250.0].scenario.rates == pytest.approx(rates)
     profiles = {recipe.scenario.profile.name for recipe in recipes.values()}
-    assert profiles == {"as_run", "as_run_signals"}
+    assert profiles == {"as_run", "as_run_obeying", "as_run_signals"}
 
 
 def test_all_controllers_of_a_study_share_their_arrivals() -> None:
