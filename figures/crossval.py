@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 MINISIM = style.Look("minisim", style.BLUE, "o", "-")
 SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
 PUBLISHED = style.Look("published", style.BLACK, "D", ":")
-#: The lines are this far apart, so that their interval bars do not overlap [veh/h/lane].
-DODGE: Final = 2.5
 
 #: The section that a trajectory figure shows: time around the parting [s], and distance around the
 #: junction entry [m].
@@ -60,31 +58,23 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
 
 def means_figure(results: Sequence[Result]) -> Figure:
     """Means over density with 95 % intervals: minisim's, SUMO's and, where known, the paper's."""
-    figure = style.new_figure(8.6, 4.0)
-    panels = figure.subplots(1, len(JUDGED))
-    figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
+    figure, panels = plots.panels(
+        8.6, 4.0, len(JUDGED), sharey=False, left=0.08, right=0.985, top=0.76, bottom=0.135,
+        wspace=0.2,
+    )  # fmt: skip
     for axes, (metric, name) in zip(panels, JUDGED.items(), strict=True):
-        densities = [result.case.density for result in results]
-        for look, host, aside in ((MINISIM, "minisim", -DODGE / 2), (SUMO, "sumo", DODGE / 2)):
-            intervals = [getattr(result.row(metric), host) for result in results]
-            plots.draw_line(
-                axes, [density + aside for density in densities],
-                [plots.Estimate(i.mean, i.mean - i.half_width, i.mean + i.half_width)
-                 for i in intervals],
-                look, **plots.BOLD,
-            )  # fmt: skip
-        paper = [
-            (density, plots.Estimate(value, value, value))
-            for density, result in zip(densities, results, strict=True)
-            if (value := result.case.reference(metric, "all")) is not None
-        ]
-        if paper:
-            x, values = zip(*paper, strict=True)
-            plots.draw_line(axes, x, values, PUBLISHED, **plots.BOLD)
-        style.plot_axes(axes, name, "density [veh/h/lane]", "mean [s]")
-        axes.set_xticks(sorted(set(densities)))
-        axes.margins(x=0.08, y=0.1)
-        axes.set_ylim(bottom=0.0)
+        ours: dict[float, plots.Estimate] = {}
+        theirs: dict[float, plots.Estimate] = {}
+        paper: dict[float, plots.Estimate] = {}
+        for result in results:
+            density, row = result.case.density, result.row(metric)
+            for line, (mean, half, _) in ((ours, row.minisim), (theirs, row.sumo)):
+                line[density] = plots.Estimate(mean, mean - half, mean + half)
+            value = result.case.reference(metric, "all")
+            if value is not None:
+                paper[density] = plots.Estimate(value, value, value)
+        lines = [(MINISIM, ours), (PUBLISHED, paper), (SUMO, theirs)]
+        plots.draw_side_by_side(axes, [line for line in lines if line[1]], name)
     _head(figure, panels[0], results[0])
     return figure
 

@@ -15,7 +15,6 @@ from dim.proofs.verification import Analysis
 from figures import style
 from figures.junction import drawing
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES
 
 #: One colour for each tied clique; further cliques repeat the colours, dashed.
 CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
@@ -66,11 +65,9 @@ def _draw_worst(
         goes = clique == explanation.right_of_way
         for pair in combinations(clique, 2):
             ends = np.array([places[m] for m in pair])
-            axes.plot(
-                *ends.T, color=colour, linestyle=dashes, linewidth=6.0 if goes else 2.4,
-                zorder=2 if goes else 1, solid_capstyle="round",
-            )  # fmt: skip
+            width, order = (6.0, 2) if goes else (2.4, 1)
+            axes.plot(*ends.T, color=colour, linestyle=dashes, linewidth=width, zorder=order,
+                      solid_capstyle="round")  # fmt: skip
     for movement in movements:
         goes = movement in explanation.right_of_way
-        label = f"{ARM_NAMES[movement.origin]}{movement.manoeuvre}"
-        drawing.draw_node(axes, places[movement], 0.19, label, 12, 0.01, goes=goes)
+        drawing.draw_node(axes, places[movement], str(movement), goes=goes)

@@ -52,13 +52,12 @@ def capacity_figure(results: Results) -> Figure:
     for edge in range(1, len(RIVALS)):
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
     axes.set_xlim(0.0, highest)
-    plots.heading(figure, "Capacity: the largest demand served without a growing queue")
-    plots.looks_legend(figure, LOOKS.values(), 0.91, lines=False)
     note = f"{_extent(results)}; profile fair.  Pale line: a bound is all that is known."
     if len(known) < len(STUDY.points):
         missing = len(STUDY.points) - len(known)
         note += f"  Not drawn, since there is no run: {missing} of {len(STUDY.points)} cases."
-    plots.footnote(figure, note)
+    title = "Capacity: the largest demand served without a growing queue"
+    plots.frame(figure, title, LOOKS.values(), note, lines=False)
     return figure
 
 

@@ -29,10 +29,12 @@ def confidence_figure(results: Results) -> Figure:
             outcomes.draw(axes, places, cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
         outcomes.dress(axes, outcome, outcome, "lowest confidence that is believed", ticks)
-    plots.heading(figure, f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of "
-                          "intents persistently misread by all alike")  # fmt: skip
-    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.93, 3)
-    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note(results)}")
+    title = (
+        f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of intents persistently "
+        "misread by all alike"
+    )
+    note = f"{outcomes.NOTE}  {missing_note(results)}"
+    plots.frame(figure, title, outcomes.KIND_LOOKS.values(), note)
     return figure
 
 

@@ -29,13 +29,12 @@ def fair_figure(results: Results) -> Figure:
         plots.log_time(axes, 0.0, 4000.0, linear=0.1)
         plots.density_axis(axes, rows["density"])
     panels[0].set_ylabel(f"mean of all vehicles [s], {plots.scale_words(0.1)}", **style.LABEL)
-    plots.heading(figure, "Every controller on four arms, profile fair")
-    plots.looks_legend(figure, map(style.look, RIVALS), 0.93, 4)
-    plots.marks_legend(figure, 0.842)
-    plots.footnote(figure, (
+    note = (
         f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
         "before a full road, and V2I-C's vehicles crawl."
-    ))  # fmt: skip
+    )
+    title, looks = "Every controller on four arms, profile fair", map(style.look, RIVALS)
+    plots.frame(figure, title, looks, note, ncols=4, marks=0.842)
     return figure
 
 
@@ -66,14 +65,13 @@ def crossing_figure(results: Results) -> Figure:
         plots.density_axis(axes, results.good["density"])
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
-    plots.heading(figure, "Demands at which DIM does worse than …")
-    plots.looks_legend(figure, map(style.look, GATES), 0.925)
+    title, looks = "Demands at which DIM does worse than …", map(style.look, GATES)
+    plots.frame(figure, title, looks, missing_note(results))
     words = (
         "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
         "its 95 % interval     hollow: at none or all of these demands in the mean"
     )
     style.write(figure, plots.LEFT, 0.845, words, 8.5)
-    plots.footnote(figure, missing_note(results))
     return figure
 
 

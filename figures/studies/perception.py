@@ -55,12 +55,10 @@ def perception_figure(results: Results, series: str) -> Figure:
         outcomes.dress(axes, outcome, f"{outcome}, {outcomes.KIND_LOOKS[kind].label}",
                      "probability of an error", [f"{rate:g}" for rate in RATES])  # fmt: skip
     label = style.look(series).label
-    plots.heading(
-        figure, f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
-    )
-    plots.looks_legend(figure, [*LOOKS.values(), SILENT], 0.93, 3)
-    note = missing_note(results, wanted=lambda point: point.series == series)
-    plots.footnote(figure, f"{outcomes.NOTE}  {note}")
+    title = f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
+    missing = missing_note(results, wanted=lambda point: point.series == series)
+    note = f"{outcomes.NOTE}  {missing}"
+    plots.frame(figure, title, [*LOOKS.values(), SILENT], note, ncols=3)
     return figure
 
 
