@@ -35,8 +35,8 @@ def item_named(name: str) -> Item:
 
 def write(drawing: Drawing, folder: Path, name: str) -> list[Path]:
     """Write a drawing in all its formats, each completely or not at all; return the files."""
-    writer: Callable[[Any, Path], None]
-    writer, formats = (save, FORMATS) if isinstance(drawing, Figure) else (save_table, WRITERS)
+    writer: Callable[[Any, Path], None] = save if isinstance(drawing, Figure) else save_table
+    formats = FORMATS if isinstance(drawing, Figure) else WRITERS
     files = [folder / f"{name}.{suffix}" for suffix in formats]
     for file in files:
         writer(drawing, file)

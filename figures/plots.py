@@ -93,10 +93,8 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
     `rows` come from a study (`Results.good`); a series without rows is left out.
     """
     if rows.empty:
-        axes.text(
-            0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top", fontsize=11,
-            color=style.MUTED,
-        )  # fmt: skip
+        axes.text(0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top",
+                  fontsize=11, color=style.MUTED)  # fmt: skip
         return
     for place, name in enumerate(series):
         known = rows[(rows["series"] == name) & rows[metric].notna()]
@@ -129,15 +127,12 @@ def draw_published(
         look = style.look(name)
         chosen = table[table["series"] == name]
         x = chosen["density"].astype(float) + offset(rows, place, len(series))
-        axes.plot(
-            x, chosen["paper"], marker=look.marker, markersize=8.0, markeredgewidth=1.2,
-            markeredgecolor=look.colour, markerfacecolor="none", linestyle="none", zorder=5,
-        )  # fmt: skip
+        drawn: dict[str, Any] = {
+            "color": look.colour, "markeredgewidth": 1.2, "linestyle": "none", "zorder": 5
+        }  # fmt: skip
+        axes.plot(x, chosen["paper"], look.marker, markersize=8.0, markerfacecolor="none", **drawn)
         crossed = (chosen["comparable"] != "yes").to_numpy()
-        axes.plot(
-            x[crossed], chosen["paper"][crossed], marker="x", markersize=7.0,
-            markeredgewidth=1.2, color=look.colour, linestyle="none", zorder=6,
-        )  # fmt: skip
+        axes.plot(x[crossed], chosen["paper"][crossed], "x", markersize=7.0, **drawn)
 
 
 def offset(rows: pd.DataFrame, place: int, count: int) -> float:
@@ -201,16 +196,6 @@ def frame(
     too. Without `lines`, the looks are markers only.
     """
     style.write(figure, LEFT, 0.965, title, 13, bold=True)
-    looks_legend(figure, looks, ncols, lines=lines)
-    if marks is not None:
-        marks_legend(figure, marks, paper=paper)
-    footnote(figure, note)
-
-
-def looks_legend(
-    figure: Figure, looks: Iterable[style.Look], ncols: int | None, *, lines: bool
-) -> None:
-    """A legend of lines and markers, or of markers only."""
     shown = list(looks)
     handles = [
         Line2D([], [], color=k.colour, marker=k.marker, linewidth=1.7, markersize=5.5,
@@ -218,10 +203,17 @@ def looks_legend(
         for k in shown
     ]  # fmt: skip
     legend(figure, handles, [k.label for k in shown], 0.93, ncols)
+    if marks is not None:
+        _marks_legend(figure, marks, paper=paper)
+    # A letter is about 0.54 times its size in width; an inch has 72 points.
+    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
+    figure.text(
+        LEFT, 0.008, textwrap.fill(note, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        va="bottom", linespacing=1.05,
+    )  # fmt: skip
 
 
-def marks_legend(figure: Figure, top: float, *, paper: bool) -> None:
-    """A legend of every series' markers, with or without the markers of the paper's values."""
+def _marks_legend(figure: Figure, top: float, *, paper: bool) -> None:
     handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
     labels = ["ours, mean and 95 % interval"]
     if paper:
@@ -247,16 +239,6 @@ def legend(
         "loc": "upper left", "bbox_to_anchor": (LEFT, top), "frameon": False, "fontsize": 9.5,
         "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
         "handler_map": {tuple: HandlerTuple(ndivide=1)}, "columnspacing": 1.7,
-        "ncols": len(labels) if ncols is None else ncols,
+        "ncols": ncols or max(len(labels), 1),
     }  # fmt: skip
     figure.legend(handles, labels, **(drawn | changes))
-
-
-def footnote(figure: Figure, text: str) -> None:
-    """Small print along the lower edge, on as many lines as it needs."""
-    # A letter is about 0.54 times its size in width; an inch has 72 points.
-    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
-    figure.text(
-        LEFT, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
-        va="bottom", linespacing=1.05,
-    )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
 from dim import Explanation
 from figures import plots, style
@@ -41,7 +41,7 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
     zones = drawing.zone_words(plan)
     swatches = [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in zones]
     plots.legend(
-        figure, swatches, [*zones.values()], 0.08, max(len(zones), 1), loc="center right",
+        figure, swatches, [*zones.values()], 0.08, loc="center right",
         bbox_to_anchor=(0.98, 0.08), fontsize=9, handlelength=1.4, columnspacing=1.4,
     )  # fmt: skip
     return figure
@@ -50,7 +50,6 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
 def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) -> None:
     intersection, vehicle = site.intersection, site.vehicle
     reach = intersection.junction_radius + APPROACH
-    axes.add_patch(Rectangle((-reach, -reach), 2 * reach, 2 * reach, facecolor=style.GRASS))
     drawing.draw_junction(axes, intersection, plan, reach)
     drawing.draw_hold_lines(axes, intersection, plan)
     for movement in explanation.participants:

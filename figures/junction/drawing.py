@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import Circle, FancyArrowPatch, Polygon
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from figures import style
 from minisim.control import Marking, Plan
@@ -51,6 +51,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_axis_off()
     far = 1.5 * reach
+    axes.add_patch(Rectangle((-far, -far), 2 * far, 2 * far, facecolor=style.GRASS))
     axes.add_patch(Polygon(
         outline(intersection, far), facecolor=style.ASPHALT, edgecolor="#9AA2AD", linewidth=1.0,
         joinstyle="round", zorder=1,
@@ -165,10 +166,9 @@ def draw_node(axes: Axes, place: Floats, label: str, *, goes: bool) -> None:
     """Draw a node of a harmony graph; it is filled if its vehicle `goes`."""
     colour = style.RIGHT_OF_WAY if goes else style.WAITING
     face, ink = (colour, style.PAPER) if goes else (style.PAPER, colour)
-    axes.add_patch(
-        Circle(tuple(place), 0.2, facecolor=face, edgecolor=colour, linewidth=2.2, zorder=3)
-    )
-    axes.text(*place, label, ha="center", va="center", fontsize=13, zorder=4, color=ink)
+    x, y = place
+    axes.add_patch(Circle((x, y), 0.2, facecolor=face, edgecolor=colour, linewidth=2.2, zorder=3))
+    axes.text(x, y, label, ha="center", va="center", fontsize=13, zorder=4, color=ink)
 
 
 def _axes_of(arm: Arm) -> tuple[Floats, Floats]:

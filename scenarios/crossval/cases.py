@@ -9,20 +9,11 @@ from typing import Final
 from minisim.arrivals import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
+from scenarios import paper
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
 from scenarios.library import MAKERS
-from scenarios.paper import (
-    BASELINE_GRID,
-    DENSITIES,
-    GRID,
-    SERIES,
-    SPLITS,
-    Cell,
-    controller_of,
-    reference_rows,
-    replay,
-)
+from scenarios.paper import DENSITIES, SERIES, SPLITS, Cell
 from scenarios.profiles import AS_RUN, Profile
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -52,7 +43,7 @@ class Case:
     scenario: Scenario = part("junction, demand and profile", Scenario)
     controller: str = text("its command-line name")
     published: Cell | None = part(
-        "the published run that is replayed; None where arrivals are drawn", Cell,
+        "the published run that is replayed; None if arrivals are drawn", Cell,
         optional=True, default=None,
     )  # fmt: skip
 
@@ -65,7 +56,7 @@ class Case:
         Vehicles do touch in the published runs; in other runs that is an error.
         """
         if self.published is not None and self.same_law:
-            controller = controller_of(*self.published)
+            controller = paper.controller_of(*self.published)
         else:
             controller = controller_named(self.controller, self.scenario.profile)
         reaction = "record" if self.same_law else "stop"
@@ -101,7 +92,7 @@ class Case:
         if who is None or not float(self.density).is_integer():
             return None
         cell = Cell(self.split, int(self.density), self.scenario.intersection.n, who)
-        chosen = reference_rows(cell, metric, lane)
+        chosen = paper.reference_rows(cell, metric, lane)
         if self.published is None:
             chosen = chosen[chosen["comparable"] == "yes"]
         return None if chosen.empty else float(chosen["value"].iloc[0])
@@ -115,19 +106,14 @@ class Case:
             return None
         who, busiest = self.published.controller, self.published.density == max(DENSITIES)
         travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
-        return {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}.get(
-            metric
-        )
+        known = {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}
+        return known.get(metric)
 
 
 def replayed_cases(
-    names: Sequence[str],
-    controllers: Sequence[str],
-    densities: Sequence[float],
-    splits: Sequence[str],
-    profile: str | Profile | None,
-    horizon: float,
-) -> list[Case]:
+    names: Sequence[str], controllers: Sequence[str], densities: Sequence[float],
+    splits: Sequence[str], profile: str | Profile | None, horizon: float,
+) -> list[Case]:  # fmt: skip
     """The published runs with these junctions, controllers, densities and splits; empty means all.
 
     Densities [veh/h] and splits are as in the runs' labels. With profile None, each run keeps its
@@ -140,16 +126,13 @@ def replayed_cases(
     arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]
     ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
     cases = [
-        Case(
-            replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
-            ran[cell.controller],
-            cell,
-        )
-        for cell in (*GRID, *BASELINE_GRID)
+        Case(replace(scenario, horizon=horizon), ran[cell.controller], cell)
+        for cell in (*paper.GRID, *paper.BASELINE_GRID)
         if cell.controller in ran
         and cell.arms in (arms or MAKERS)
         and cell.density in (densities or DENSITIES)
         and cell.split in (splits or SPLITS)
+        for scenario in [paper.replay(*cell, profile=profile, sumo=HOST_VERSION)]
     ]
     if not cases:
         wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]

@@ -21,7 +21,8 @@ from scipy import stats
 from baselines import FixedTime, V2ICAsRun
 from dim import AsRunDim, Dim
 from figures import save
-from figures.crossval import DODGE, crossval_figures
+from figures.crossval import crossval_figures
+from figures.plots import DODGE
 from minisim.errors import SumoError
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
