@@ -132,7 +132,7 @@ def _tolerances() -> tuple[str, ...]:
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
         "the paper when mean waiting is within 10 % of the published number, and mean travel "
         "within 0.5 s (DIM; at 350 veh/h within 3 s), 1 s (V2I-C) or 2 s (signals).",
-        f"{NOTHING} is no verdict: no run of the cell ended well in both hosts, or no trip did. "
+        f"{NOTHING} means no verdict: no run of the cell ended well in both hosts, or no trip did. "
         f"Verdicts over fewer than {FEW} trips are marked: one trip may decide them.",
     )
 

@@ -283,7 +283,7 @@ images = st.lists(
 
 
 def palette_for(frames: list[Image.Image]) -> Image.Image:
-    """A palette of all pictures at once: four levels a channel, few enough to change none."""
+    """A palette of all pictures at once: four levels per channel, few enough to change none."""
     strip = Image.new("RGB", (4, 4 * len(frames)))
     for k, frame in enumerate(frames):
         strip.paste(frame, (0, 4 * k))
