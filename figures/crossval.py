@@ -104,18 +104,15 @@ def parting_figure(result: Result, parting: Parting) -> Figure:
     """Distance to the junction over time, one panel per lane, with both hosts overlaid."""
     junction = result.case.scenario.intersection
     entry, arms = junction.approach_length, junction.n
-    start = parting.time - SHOWN_BEFORE
+    start, end = parting.time - SHOWN_BEFORE, parting.time + SHOWN_AFTER
     figure = style.new_figure(9.6, 1.25 + 1.45 * arms)
     height = figure.get_figheight()
     panels = figure.subplots(arms, 1, sharex=True, squeeze=False)[:, 0]
-    figure.subplots_adjust(
-        left=0.085, right=0.985, top=1.0 - 0.95 / height, bottom=0.55 / height, hspace=0.14
-    )
+    top, bottom = 1.0 - 0.95 / height, 0.55 / height
+    figure.subplots_adjust(left=0.085, right=0.985, top=top, bottom=bottom, hspace=0.14)
     for frame, look in ((parting.minisim, MINISIM), (parting.sumo, SUMO)):
-        near = frame[
-            frame[TIME].between(start, start + SHOWN_BEFORE + SHOWN_AFTER)
-            & frame[S].between(entry + SHOWN_FROM, entry + SHOWN_TO)
-        ]
+        near = frame[frame[TIME].between(start, end)]
+        near = near[near[S].between(entry + SHOWN_FROM, entry + SHOWN_TO)]
         width = 1.3 if look is MINISIM else 1.8
         for _, trip in near.groupby(VEHICLE):
             axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
@@ -126,8 +123,7 @@ def parting_figure(result: Result, parting: Parting) -> Figure:
     for axes, lane in zip(panels, ARM_NAMES, strict=False):
         style.plot_axes(axes, "", "", f"lane {lane} [m]")
         axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
-        axes.set_ylim(SHOWN_FROM, SHOWN_TO)
-        axes.set_xlim(start, start + SHOWN_BEFORE + SHOWN_AFTER)
+        axes.set(xlim=(start, end), ylim=(SHOWN_FROM, SHOWN_TO))
     ring: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
     panels[ARM_NAMES.index(parting.movement[0])].plot(
         parting.time, parting.positions[0] - entry, "o", markersize=13, markeredgewidth=1.8, **ring
@@ -174,12 +170,9 @@ def _limits(values: Floats) -> tuple[float, float]:
 
 def _travel_times(result: Result) -> Floats:
     """Times in minisim and in SUMO of the trips that ended in both [s], shape (2, k)."""
-    return np.hstack([
-        np.array([pair.minisim.travel_time, pair.sumo.travel_time])[
-            :, pair.minisim.arrived & pair.sumo.arrived
-        ]
-        for pair in result.pairs
-    ])  # fmt: skip
+    trips = [(pair.minisim, pair.sumo) for pair in result.pairs]
+    both = [np.array([a.travel_time, b.travel_time])[:, a.arrived & b.arrived] for a, b in trips]
+    return np.hstack(both)
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:

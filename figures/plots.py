@@ -31,9 +31,6 @@ LEFT = 0.012
 #: Size of the small print [pt].
 FOOTNOTE_SIZE = 7.5
 
-#: Style of a line with few points.
-BOLD: dict[str, Any] = {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
-
 
 class Estimate(NamedTuple):
     """A value with its 95 % interval."""
@@ -80,7 +77,7 @@ def draw_side_by_side(
     for k, (look, points) in enumerate(drawn):
         aside = DODGE * (k - (len(drawn) - 1) / 2.0)
         places = [density + aside for density in points]
-        draw_line(axes, places, [*points.values()], look, **BOLD)
+        draw_line(axes, places, [*points.values()], look, markersize=5.5, capsize=3.5)
     axes.set_xticks(sorted({density for _, points in drawn for density in points}))
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.08)

@@ -42,10 +42,8 @@ def animation_format(path: AnyPath) -> str:
     """The suffix as one of `FORMATS`; .mp4 without ffmpeg raises `MissingExtraError`."""
     suffix = suffix_of(path, "an animation", FORMATS)
     if suffix == "mp4" and shutil.which("ffmpeg") is None:
-        raise MissingExtraError(
-            "an .mp4 needs the program ffmpeg, which was not found; "
-            "install it, or write a .gif or .html"
-        )
+        lacking = "an .mp4 needs the program ffmpeg, which was not found"
+        raise MissingExtraError(f"{lacking}; install it, or write a .gif or .html")
     return suffix
 
 

@@ -22,9 +22,7 @@ def confidence_figure(results: Results) -> Figure:
     )  # fmt: skip
     for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
         for (kind, look), aside in zip(outcomes.KIND_LOOKS.items(), (-0.08, 0.08), strict=True):
-            cells = [
-                outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
-            ]
+            cells = [outcomes.select(rows, kind=kind, confidence=level) for level in THRESHOLDS]
             places = [k + aside for k in range(len(THRESHOLDS))]
             outcomes.draw(axes, places, cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
@@ -41,9 +39,7 @@ def confidence_figure(results: Results) -> Figure:
 SECTION = Section(
     "Believing only confident readings",
     (
-        Item(
-            "confidence", "collisions, false grants and delay by the lowest confidence believed",
-            confidence_figure, ("confidence",),
-        ),
+        Item("confidence", "collisions, false grants and delay by the lowest confidence believed",
+             confidence_figure, ("confidence",)),
     ),
 )  # fmt: skip

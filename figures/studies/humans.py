@@ -51,7 +51,7 @@ def human_figure(results: Results) -> Figure:
         "run for vehicles that had not left it."
     )
     title = "Human drivers among vehicles of DIM on four arms, profile fair"
-    plots.frame(figure, title, [*LOOKS.values(), stop], note, ncols=3, marks=0.842)
+    plots.frame(figure, title, [*LOOKS.values(), stop], note, ncols=3, marks=0.832)
     return figure
 
 

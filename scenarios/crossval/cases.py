@@ -88,10 +88,10 @@ class Case:
         """The paper's mean [s]; None if the paper has none that this cell should reproduce."""
         if not self.same_law or self.scenario.horizon != 3600.0:  # the published runs' horizon
             return None
-        who = PUBLISHED.get(self.controller)
-        if who is None or not float(self.density).is_integer():
+        name = PUBLISHED.get(self.controller)
+        if name is None or not float(self.density).is_integer():
             return None
-        cell = Cell(self.split, int(self.density), self.scenario.intersection.n, who)
+        cell = Cell(self.split, int(self.density), self.scenario.intersection.n, name)
         chosen = paper.reference_rows(cell, metric, lane)
         if self.published is None:
             chosen = chosen[chosen["comparable"] == "yes"]
@@ -104,8 +104,8 @@ class Case:
         """
         if self.published is None:
             return None
-        who, busiest = self.published.controller, self.published.density == max(DENSITIES)
-        travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
+        name, busiest = self.published.controller, self.published.density == max(DENSITIES)
+        travel = TRAVEL_350 if name == "dim" and busiest else TRAVEL[name]
         known = {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}
         return known.get(metric)
 
@@ -124,7 +124,7 @@ def replayed_cases(
     for split in splits:
         choice("split of a published run", split, SPLITS)
     arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]
-    ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
+    ran = {PUBLISHED[choice("published controller", name, PUBLISHED)]: name for name in controllers}
     cases = [
         Case(replace(scenario, horizon=horizon), ran[cell.controller], cell)
         for cell in (*paper.GRID, *paper.BASELINE_GRID)

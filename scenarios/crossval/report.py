@@ -119,15 +119,14 @@ def _rows(result: Result) -> Iterator[dict[str, Any]]:
 
 
 def _tolerances() -> tuple[str, ...]:
-    hosts = ", ".join(
-        f"mean {JUDGED[name].lower()} {tolerance}" for name, tolerance in HOST_TOLERANCES.items()
-    )
+    most = [f"mean {JUDGED[name].lower()} {limit}" for name, limit in HOST_TOLERANCES.items()]
     return (
         "Means are over the trips that ended before the horizon, as SUMO and the paper count them; "
         "± is half a 95 % interval over seeds; a difference is SUMO − minisim, paired by seed (the "
         "arrivals are the same); KS is the largest distance between the two distributions of a "
         "trip's time (0 the same, 1 apart).",
-        f"The hosts agree when, each with its own car following, they differ by at most: {hosts}; "
+        "The hosts agree when, each with its own car following, they differ by at most: "
+        f"{', '.join(most)}; "
         f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
         "the paper when mean waiting is within 10 % of the published number, and mean travel "
@@ -155,10 +154,8 @@ def _verdicts(results: Sequence[Result]) -> str:
 
 
 def _means(results: Sequence[Result], metric: str) -> str:
-    return markdown_table(
-        ("cell", "minisim", "SUMO", "difference", "KS", "published"),
-        ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows),
-    )
+    rows = ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows)
+    return markdown_table(("cell", "minisim", "SUMO", "difference", "KS", "published"), rows)
 
 
 def _replays(results: Sequence[Result]) -> str:

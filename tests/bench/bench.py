@@ -33,16 +33,8 @@ from xml.etree import ElementTree
 BUDGET, BARE_BUDGET = 30.0, 10.0
 
 #: Options of every run of SUMO.
-STEPPED = [
-    "--step-length",
-    "0.1",
-    "--time-to-teleport",
-    "-1",
-    "--no-step-log",
-    "true",
-    "--no-warnings",
-    "true",
-]
+STEPPED = ["--step-length", "0.1", "--time-to-teleport", "-1"]
+STEPPED += ["--no-step-log", "true", "--no-warnings", "true"]
 
 
 def main() -> None:

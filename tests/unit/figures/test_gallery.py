@@ -318,8 +318,7 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
     assert "- `as-run`: A smoke test: its numbers mean nothing. " in text
 
 
-def test_the_report_keeps_its_appendix_for_the_end() -> None:
-    assert [section.appendix for section in SECTIONS] == sorted(s.appendix for s in SECTIONS)
+def test_no_two_drawings_have_the_same_name() -> None:
     names = [item.name for section in SECTIONS for item in section.items]
     assert len(names) == len(set(names))
 
