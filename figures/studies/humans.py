@@ -27,7 +27,7 @@ def human_figure(results: Results) -> Figure:
     rows = results.good
     run = [density for density in DENSITIES if (rows["density"] == density).any()]
     figure, panels = plots.panels(
-        11.0, 4.9, len(run), left=0.062, right=0.985, top=0.735, bottom=0.145, wspace=0.06
+        11.0, 4.9, len(run), left=0.062, right=0.985, top=0.715, bottom=0.145, wspace=0.06
     )
     stop = style.look(STOP)._replace(label="all-way stop (mean)", marker="")
     for axes, density in zip(panels, run, strict=True):
