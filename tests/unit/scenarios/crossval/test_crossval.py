@@ -32,16 +32,8 @@ from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.crossval import Case, Result, crossvalidate, film, replayed_cases, runs, write_report
-from scenarios.crossval.comparison import (
-    CLOSE,
-    Pair,
-    Tolerance,
-    agreement,
-    compare,
-    first_divergence,
-    first_parting,
-    times,
-)
+from scenarios.crossval import comparison as hosts
+from scenarios.crossval.comparison import CLOSE, Pair, Tolerance
 from scenarios.crossval.report import markdown, summary, table
 from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
 from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
@@ -92,7 +84,7 @@ def test_ks_distance_is_the_largest_gap_of_scipys_ecdfs(
 
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
-    rows = {(row.lane, row.metric): row for row in compare([pair()], 3)}
+    rows = {(row.lane, row.metric): row for row in hosts.compare([pair()], 3)}
     assert set(rows) == {(lane, metric) for lane in ("all", "a", "b", "c") for metric in MEANS}
     overall = rows["all", "waiting_time_s"]
     assert overall.trips == (4, 3)
@@ -117,32 +109,32 @@ def test_differences_are_paired_by_seed() -> None:
         Pair(seed, *(trips([wait] * 4, [50.0] * 4, ALL) for wait in both))
         for seed, both in enumerate(waits)
     ]
-    row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
+    row = hosts.compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
 
 
 def test_same_trips_need_both_times() -> None:
-    assert agreement([pair()]) == pytest.approx(2 / 4)
-    assert agreement([SAME]) == 1.0
+    assert hosts.agreement([pair()]) == pytest.approx(2 / 4)
+    assert hosts.agreement([SAME]) == 1.0
 
 
 def test_rounding_makes_no_difference() -> None:
     ours = trips([0.1 + 0.2] * 4, [50.0] * 4, ALL)
     theirs = trips([0.3] * 4, [50.0 + CLOSE] * 4, ALL)
-    row = compare([Pair(1, ours, theirs)], 2)[0]
+    row = hosts.compare([Pair(1, ours, theirs)], 2)[0]
     assert (row.ks, row.within) == (0.0, 1.0)
-    assert times(ours, "waiting_time_s").tolist() == [0.3] * 4
-    assert agreement([Pair(1, ours, theirs)]) == 1.0
+    assert hosts.times(ours, "waiting_time_s").tolist() == [0.3] * 4
+    assert hosts.agreement([Pair(1, ours, theirs)]) == 1.0
 
 
 def test_the_first_divergence_is_the_first_in_demand() -> None:
-    found = first_divergence(pair(seed=7))
+    found = hosts.first_divergence(pair(seed=7))
     assert found is not None
     assert (found.seed, found.vehicle, found.movement, found.depart) == (7, 2, "a3", 30.0)
     assert found.travel == (52.0, 70.0)
     assert found.end == END, "it never arrives in SUMO"
-    assert first_divergence(SAME) is None
+    assert hosts.first_divergence(SAME) is None
 
 
 def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
@@ -157,8 +149,8 @@ def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
         )
 
     same = frame({})
-    assert first_parting(same, frame({(4, 1.0): 0.4})) is None
-    found = first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
+    assert hosts.first_parting(same, frame({(4, 1.0): 0.4})) is None
+    found = hosts.first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
     assert found is not None
     assert (found.time, found.vehicle, found.positions) == (2.0, 6, (20.0, 18.0))
     assert found.movement == "a2"
