@@ -159,7 +159,7 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("own_mine:Mien", "unknown class of own_mine 'Mien'; allowed: Mine, Plain, Failing;"),
+        ("own_mine:Mien", "unknown controller of own_mine 'Mien'; allowed: Mine, Plain, Failing;"),
         ("own_mine:Mine(kk=3)", "unknown own_mine:Mine parameter 'kk'.*; did you mean 'k'"),
         ("own_mine:Mine(k='a')", "k of own_mine:Mine must be a number, got 'a'"),
         ("own_mine:Mine(k=true)", "k of own_mine:Mine must be a number, got True"),
