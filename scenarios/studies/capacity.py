@@ -77,12 +77,14 @@ STUDY = CapacityStudy(
 
 
 class Capacity(NamedTuple):
-    """The capacity of a point."""
+    """The capacity of a point.
+
+    For each seed, its bracket is the highest demand that was served and the lowest that was not
+    [veh/h/lane]: 0 if none was served, infinite if all were.
+    """
 
     series: str  # the controller
     arms: int  # of the junction
-    #: For each seed, the highest demand that was served and the lowest that was not [veh/h/lane];
-    #: 0 if none was served, infinite if all were.
     brackets: tuple[tuple[float, float], ...]
 
     @property
