@@ -36,6 +36,9 @@ CONTROLLERS = {
 #: Columns of a sweep that are averaged over seeds.
 METRICS = ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 
+#: Of the table.
+HEADINGS = ("veh/h/lane", "controller", *map(heading, METRICS), "collisions")
+
 PROFILE = "fair"
 
 
@@ -127,7 +130,7 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The points as a table for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, title in enumerate(_headings()):
+    for k, title in enumerate(HEADINGS):
         table.add_column(title, justify="left" if k == 1 else "right")
     for _, rows in itertools.groupby(_cells(points), key=lambda row: row[0]):
         for row in rows:
@@ -139,12 +142,8 @@ def demo_table(points: pd.DataFrame) -> Table:
 def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
     """Write demo.csv and demo.md; raises `FileError`."""
     write_table(points, folder / "demo.csv")
-    table = markdown_table(_headings(), _cells(points), words=(1,))
+    table = markdown_table(HEADINGS, _cells(points), words=(1,))
     write_text(folder / "demo.md", f"{demo_title(tour)}. minisim {__version__}.\n\n{table}\n")
-
-
-def _headings() -> list[str]:
-    return ["veh/h/lane", "controller", *map(heading, METRICS), "collisions"]
 
 
 def _cells(points: pd.DataFrame) -> list[list[str]]:

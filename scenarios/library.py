@@ -109,9 +109,8 @@ def from_bearings(
 ) -> Scenario:
     """A junction with arms at these bearings [degrees clockwise from north].
 
-    Raises:
-        InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
-            profile, impossible demand, a demand beside recorded arrivals, horizon ≤ 0.
+    `InputError` for an unknown keyword (with the nearest one), arms closer than 30°, an unknown
+    profile, impossible demand, a demand beside recorded arrivals, or a horizon ≤ 0.
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
@@ -138,9 +137,8 @@ def from_bearings(
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
     """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
 
-    Raises:
-        InputError: an unknown name (with the nearest one), or one of `custom` and bearings without
-            the other.
+    `InputError` for an unknown name (with the nearest one), or for one of `custom` and bearings
+    without the other.
     """
     instance("scenario", name, str)
     if name == "custom":

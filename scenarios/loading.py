@@ -30,9 +30,8 @@ _texts: dict[Path, bytes] = {}
 def load_class(module: str, name: str) -> type:
     """A class, given its own name and the name of its module or the path of its file.
 
-    Raises:
-        InputError: no such module or class, or one that cannot be imported; the message names the
-            file and line if they are known.
+    `InputError` for no such module or class, or one that cannot be imported; it names the file and
+    line if they are known.
     """
     loaded = _module(*_place(module))
     kind = getattr(loaded, name, None)

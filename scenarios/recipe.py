@@ -35,8 +35,7 @@ def _controller(title: str, value: Any) -> Any:
 class Recipe:
     """One run: what is simulated, which controller decides, and the seed.
 
-    Raises:
-        InputError: a value that is not allowed, or humans with a controller other than DIM.
+    `InputError` for a value that is not allowed, or humans with a controller other than DIM.
     """
 
     scenario: Scenario = part("what is simulated", Scenario)

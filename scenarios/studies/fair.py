@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
-from minisim.errors import InputError, items, numbers
+from minisim.errors import InputError, numbers
 from scenarios.controllers import RIVALS
 from scenarios.statistics import mean_interval
 from scenarios.studies.shared.points import fair_grid
@@ -82,14 +82,11 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
     maps two or more demands [veh/h/lane] to one difference per seed, at least two.
     """
     densities = sorted(numbers("demands", list(differences)))
-    if len(densities) < 2:
-        raise InputError("a crossing needs differences at two demands or more")
-    bands = []
-    for density in densities:
-        values = items(f"differences at {density:g}", differences[density], "numbers")
-        if len(values) < 2:
-            raise InputError(f"a crossing needs two differences or more at {density:g} veh/h/lane")
-        bands.append(mean_interval(values))
+    bands = [mean_interval(differences[density]) for density in densities]
+    few = [density for density, band in zip(densities, bands, strict=True) if band.size < 2]
+    if few or len(densities) < 2:
+        where = f"{few[0]:g} veh/h/lane" if few else "two demands or more"
+        raise InputError(f"a crossing needs two differences or more at {where}")
     start, until = _first_rise(densities, [band.mean for band in bands])
     low, _ = _first_rise(densities, [band.mean + band.half_width for band in bands])
     high, _ = _first_rise(densities, [band.mean - band.half_width for band in bands])
