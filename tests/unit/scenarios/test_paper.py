@@ -199,16 +199,6 @@ def test_the_names_of_arms_decide_which_lane_is_first() -> None:
     assert controller_of("4:3:2:1", 200, 4) == AsRunDim()
 
 
-def test_phases_come_in_the_given_order() -> None:
-    what = scenario("balanced", 150, 4, "fts")
-    program = controller_of("balanced", 150, 4, "fts").start(what.site())._program  # type: ignore[attr-defined]
-    assert tuple(program._order) == (2, 1, 0, 3)
-    with pytest.raises(InputError, match="order must be the lanes a … d"):
-        FixedTime(order=(0, 1, 2)).start(what.site())
-    with pytest.raises(InputError, match="lane in order"):
-        FixedTime(order=(0, 1.5, 2, 3))  # type: ignore[arg-type]
-
-
 # --- replays -------------------------------------------------------------------------------------
 
 

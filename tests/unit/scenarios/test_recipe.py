@@ -103,9 +103,3 @@ def test_a_controller_needs_a_name_that_can_be_printed(name: Any) -> None:
     nameless: Any = SimpleNamespace(name=name, start=Unregulated().start)
     with pytest.raises(InputError, match=r"the name of controller .* must be a text"):
         Recipe(four_way(), nameless)
-
-
-def test_a_misspelt_density_gets_the_nearest_keyword() -> None:
-    misspelt: Any = {"densty": 300}
-    with pytest.raises(InputError, match=r"'densty'; allowed: density, .*; did you mean 'density'"):
-        four_way(**misspelt)
