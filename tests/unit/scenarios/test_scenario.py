@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -86,13 +84,6 @@ def test_the_horizon_is_exclusive() -> None:
     assert (run.summary()["trips"], run.summary()["unfinished"]) == (1, 0)
     assert run.counted.columns.demand_time.tolist() == [0.0]
     assert len(run.trips) == 1
-
-
-def test_scenarios_are_values() -> None:
-    scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND)
-    again = pickle.loads(pickle.dumps(scenario))
-    assert again == scenario
-    assert hash(again) == hash(scenario)
 
 
 @pytest.mark.parametrize(
