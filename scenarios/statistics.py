@@ -9,7 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, integer, number, numbers
+from minisim.errors import InputError, integer, numbers
+
+#: Of every interval here.
+CONFIDENCE = 0.95
 
 #: A queue is growing if its increase exceeds this many standard deviations of chance; a normal
 #: variable does so in 1 % of cases.
@@ -32,48 +35,44 @@ class Interval(NamedTuple):
         return f"{self.mean:.1f}{half_width}"
 
 
-def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
-    """Mean and Student-t confidence interval of independent values, t·s/√n (Student 1908).
+def mean_interval(values: Iterable[float]) -> Interval:
+    """Mean and 95 % confidence interval of independent values, t·s/√n (Student 1908).
 
-    `InputError` for no values, one that is not finite, or a confidence outside (0, 1).
+    `InputError` for no values, or for one that is not finite.
     """
-    mean, half_width, count = prediction_interval(values, confidence)
+    mean, half_width, count = prediction_interval(values)
     return Interval(mean, half_width / math.sqrt(count + 1.0), count)
 
 
-def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
+def prediction_interval(values: Iterable[float]) -> Interval:
     """Interval for one more independent value, t·s·√(1 + 1/n) about the mean of n values.
 
-    It contains the next normally distributed value with probability `confidence` (Hahn & Meeker
-    1991, Statistical Intervals, §4.7). Compare a single published run with it. Raises `InputError`
-    as `mean_interval` does.
+    It contains the next normally distributed value with probability 0.95 (Hahn & Meeker 1991,
+    Statistical Intervals, §4.7), such as a single published run. Raises as `mean_interval`.
     """
     from scipy.special import stdtrit  # takes a tenth of a second to import
 
     data = numbers("values", values)
-    number("confidence", confidence, above=0, below=1)
     if not (count := len(data)):
         raise InputError("a mean needs at least one value")
     mean = math.fsum(data) / count
     if count == 1:
         return Interval(mean, math.nan, 1)
     variance = math.fsum((value - mean) ** 2 for value in data) / (count - 1)
-    t = float(stdtrit(count - 1, (1.0 + confidence) / 2.0))
+    t = float(stdtrit(count - 1, (1.0 + CONFIDENCE) / 2.0))
     return Interval(mean, t * math.sqrt(variance * (1.0 + 1.0 / count)), count)
 
 
-def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact confidence interval for the mean of a Poisson variable, from a single value.
+def poisson_interval(count: int) -> tuple[float, float]:
+    """Exact 95 % confidence interval for the mean of a Poisson variable, from a single value.
 
-    At the upper end, `count` or fewer events have probability (1−confidence)/2; at the lower end,
-    `count` or more do (Garwood 1936). After 0 events the upper end is 3.7 for 0.95. `InputError`
-    for a negative count or a confidence outside (0, 1).
+    At the upper end, `count` or fewer events have probability 2.5 %; at the lower end, `count` or
+    more do (Garwood 1936). After 0 events the upper end is 3.7. `InputError` for a negative count.
     """
     from scipy.special import gammainccinv, gammaincinv
 
     integer("count", count, low=0)
-    number("confidence", confidence, above=0, below=1)
-    tail = (1.0 - confidence) / 2.0
+    tail = (1.0 - CONFIDENCE) / 2.0
     low = float(gammaincinv(count, tail)) if count else 0.0
     return low, float(gammainccinv(count + 1, tail))
 

@@ -94,11 +94,6 @@ class Results:
         )  # fmt: skip
 
     @property
-    def missing(self) -> tuple[Point, ...]:
-        """Points without a successful run."""
-        return tuple(point for point, runs in self.runs.items() if not runs.made)
-
-    @property
     def good(self) -> pd.DataFrame:
         """The rows of runs that did not fail."""
         return self.rows[self.rows["error"].isna()]
