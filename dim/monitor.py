@@ -5,27 +5,23 @@ It belongs to one vehicle, uses what that vehicle sees, and watches the others t
 longer stop:
 
 - *What another may do*: the intent that was read, as long as the motion does not contradict it.
-  If the other is off every path of that reading, or was read differently at different times, it may
-  do whatever its position still allows.
+  If the other leaves every path of that reading, or was read differently before, it may do whatever
+  its position still allows.
 - *Where it matters*: in the forbidden region of the two paths (`minisim.junction.coordination`).
-  The ego must be able to stop before that region, however far the other goes, unless it leaves the
-  region in good time.
+  The ego must be able to stop before that region, unless it leaves the region in good time.
 - *When it brakes*: as soon as stopping takes at least comfortable braking, and as hard as needed.
-  Where it is too late to stop, the monitor checks whether the two would touch if the ego goes on,
-  and if it brakes.
+  If it is too late to stop, it brakes unless only going on avoids a touch.
 
-Vehicles that cross by unanimous decisions are in harmony with each other (proved in
-`dim.proofs.protocol`). So with exact perception and `commit="stoppable"` a monitor never sees
-another vehicle in the way. It never brakes, and a run is the same as without it.
+Vehicles that cross by unanimous decisions are in harmony (proved in `dim.proofs.protocol`). So with
+exact perception and `commit="stoppable"` a monitor never brakes, and a run is the same without it.
 
-Two vehicles that brake for each other must not stand for ever. Of two that stand, the one further
-in goes first (if equal, the one from the first lane), unless the other stands in its way. Both can
-see which one that is.
+Two vehicles must not brake for each other for ever. Of two that stand, the one further in goes
+first (if equal, the one from the first lane), unless the other stands in its way. Both can see
+which one that is.
 
-Nor may vehicles that do not cross wait for each other for ever. Where they read each other
-differently, each may conclude that it is not its turn. But some vehicle always has the right of
-way. So if no vehicle crosses and all have stood for a while, some have misread. Then the first lane
-goes alone, since that takes no knowledge of intents (`Patience`).
+Nor may vehicles before the junction wait for each other for ever. If they misread each other, each
+may conclude that it is not its turn. But some vehicle always has the right of way. So if no vehicle
+crosses and all have stood for a while, the first lane goes alone (`Patience`).
 """
 
 from __future__ import annotations
@@ -157,8 +153,8 @@ class Monitors:
         return allowed
 
     def _asked_by(self, ego: Observed, mine: int, other: Observed, theirs: int) -> float:
-        shared = region(self._site.intersection, self._site.vehicle, mine, theirs)
-        mirrored = region(self._site.intersection, self._site.vehicle, theirs, mine)
+        place = self._site.intersection, self._site.vehicle
+        shared, mirrored = region(*place, mine, theirs), region(*place, theirs, mine)
         if shared is None or mirrored is None:
             return 0.0
         x, y = -ego.distance, -other.distance
@@ -215,10 +211,10 @@ class Monitors:
 
 
 class Patience:
-    """What ends a deadlock in which all vehicles stand and wait for each other.
+    """Ends a deadlock in which all stand and wait: after some `time` [s] the first goes alone.
 
-    After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
-    junction on; `deceleration` is comfortable braking [m/s²].
+    Vehicles take part from `sight` [m] before the junction on; `deceleration` is comfortable
+    braking [m/s²].
     """
 
     def __init__(self, time: float, sight: float, deceleration: float) -> None:

@@ -1,11 +1,11 @@
 """Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
 The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20, two-way stop
-control, base values for a two-lane major street. They are for drivers that have stopped at a stop
-sign on the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
-right-hand traffic. At an unsignalised junction of equal roads, an all-way stop (HCM chapter 21),
-all drivers stop and none accepts gaps. Drivers here do both: among themselves, the first
-to stop goes first, and they accept gaps between vehicles that need not stop.
+control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
+in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
+junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
+Drivers here do both: among themselves, the first to stop goes first, and they accept gaps between
+vehicles that need not stop.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class Humans:
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A vehicle with the right of way moves off within a few steps. A driver must look for
-    # longer than that to see it coming.
+    # (AASHTO). A driver must look for longer than a vehicle with the right of way takes to move
+    # off, which is a few steps.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
@@ -81,10 +81,7 @@ class Driver(NamedTuple):
 
 
 class Drivers:
-    """The drivers of one run, by lane and rank in it. They depend on seed and share only.
-
-    A vehicle with a human driver at some share has one at every larger share.
-    """
+    """The drivers of a run, by lane and rank in it; a human at one share is one at any larger."""
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
         self._share = share
@@ -105,7 +102,7 @@ class Drivers:
 class Readings:
     """The ways that a vehicle's indicator and motion leave open to it, as others see them.
 
-    Where two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
+    If two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
     """
 
     def __init__(self, humans: Humans, site: Site, drivers: Drivers) -> None:
