@@ -122,10 +122,7 @@ class DecisionTable:
     """
 
     def __init__(
-        self,
-        matrix: HarmonyMatrix,
-        order: str = "size",
-        priorities: Sequence[int] | None = None,
+        self, matrix: HarmonyMatrix, order: str = "size", priorities: Sequence[int] | None = None
     ) -> None:
         instance("matrix", matrix, HarmonyMatrix)
         self.matrix = matrix

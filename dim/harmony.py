@@ -108,11 +108,6 @@ class HarmonyMatrix:
         """Whether both can be driven together; raises `InputError` for an unknown movement."""
         return bool(self.values[self.index(first), self.index(second)])
 
-    def __getitem__(self, pair: tuple[Movement | str, Movement | str]) -> bool:
-        if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InputError(f"a harmony matrix is indexed by two movements, got {show(pair)}")
-        return self.harmony(*pair)
-
     def disagreements(self, other: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
         """The unordered pairs on which two matrices differ; raises `InputError` if n differs."""
         instance("other", other, HarmonyMatrix)

@@ -176,7 +176,7 @@ class _Humans:
         commands: list[Command] = []
         waiting: list[Observed] = []
         for vehicle in queue:
-            free = self._is_free(vehicle, waiting, crossing, rolling)
+            free = self._is_free(vehicle, (*waiting, *crossing), rolling)
             if free and self._is_ready(vehicle, now):
                 commands.append(Go(vehicle.id))
                 self._gone.add(vehicle.id)
@@ -194,11 +194,7 @@ class _Humans:
         return now + self._dt / 2.0 >= max(looked, followed)
 
     def _is_free(
-        self,
-        vehicle: Observed,
-        waiting: Iterable[Observed],
-        crossing: Iterable[Observed],
-        rolling: Iterable[Observed],
+        self, vehicle: Observed, there: Iterable[Observed], rolling: Iterable[Observed]
     ) -> bool:
         """Whether no vehicle is in the way of a driver at the line, or comes too soon."""
         own = self._readings.index(vehicle)
@@ -210,6 +206,6 @@ class _Humans:
         # The distances are minus infinity where ways do not conflict.
         return not any(
             clearing[way] + min(other.distance, 0.0) > 0.0
-            for other in (*waiting, *crossing, *comes)
+            for other in (*there, *comes)
             for way in self._readings.possible(other, trust)
         )

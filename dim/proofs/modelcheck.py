@@ -119,8 +119,8 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
                 if _waits(after, lane):
                     graph.add_edge(state, after, event=event)
     for part in list(nx.strongly_connected_components(graph)):
-        within = tuple((s, e) for s, _, e in graph.subgraph(part).edges(data="event"))
-        if not is_fair(protocol, within):
+        steps = graph.subgraph(part).edges(data=True)
+        if not is_fair(protocol, tuple((state, data["event"]) for state, _, data in steps)):
             graph.remove_nodes_from(part)
     return _shortest(protocol, graph, reached, lane) if graph else None
 

@@ -151,7 +151,8 @@ class Protocol:
             foes = self._foes[rows[lane][front.manoeuvre]]
             if front.phase != COMMITTED and not foes & occupied:
                 case += front.manoeuvre * n**lane
-        chosen = 0 if frozen else self._table(state).lanes(case)
+        table = _table(self.matrix, self.order, self.priorities, state.turn, state.came)
+        chosen = 0 if frozen else table.lanes(case)
         fronts = list(state.fronts)
         for lane, (manoeuvre, phase, went) in there:
             goes = phase == COMMITTED or (went if frozen else bool(chosen >> lane & 1))
@@ -183,9 +184,6 @@ class Protocol:
         """For each movement, the movements of other arms that conflict with it, as bits."""
         conflicts = ~self.matrix.values & self.matrix.movements.apart
         return tuple(sum(1 << k for k, foe in enumerate(row) if foe) for row in conflicts)
-
-    def _table(self, state: State) -> DecisionTable:
-        return _table(self.matrix, self.order, self.priorities, state.turn, state.came)
 
 
 @lru_cache(maxsize=4096)

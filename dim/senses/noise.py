@@ -155,9 +155,9 @@ class _Senses:
                 yield ego
                 continue
             body = at[vehicle.id]
-            others = [b for v, b in at.items() if v != ego.id and v != vehicle.id]
-            hidden = self._recipe.occlusion and self._bodies.hidden(eye, body, others)
-            if not hidden and math.hypot(body.x - eye.x, body.y - eye.y) <= reach:
+            near = math.hypot(body.x - eye.x, body.y - eye.y) <= reach
+            others = (b for v, b in at.items() if v != ego.id and v != vehicle.id)
+            if near and not (self._recipe.occlusion and self._bodies.hidden(eye, body, others)):
                 yield vehicle
 
     def _key(self, lane: int, rank: int) -> int:
