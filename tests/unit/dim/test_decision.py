@@ -1,14 +1,12 @@
-"""The decision: the paper's example, all cases against an oracle, and the offline table."""
+"""The decision: the paper's example, and the offline table (all cases: tests/verification)."""
 
 from __future__ import annotations
 
 import os
-import random
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import combinations, product
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -20,53 +18,17 @@ from dim.decision import ORDERS, decision_table
 from minisim.errors import InputError
 from minisim.junction.movements import Movement
 
-Clique = tuple[Movement, ...]
-
-#: How many there are of 3, 4, 5 arms.
-CASES = {3: 26, 4: 255, 5: 3124}
-
 
 def text(movements: Iterable[Movement]) -> str:
     return " ".join(map(str, movements))
 
 
-def all_cases(n: int) -> Iterator[Clique]:
-    """Every choice of no vehicle or one manoeuvre for each lane, but the empty one."""
-    for digits in product(range(n), repeat=n):
-        if any(digits):
-            yield tuple(Movement(lane, j) for lane, j in enumerate(digits) if j)
-
-
-def oracle(participants: Clique, matrix: HarmonyMatrix, order: str, ranks: Sequence[int]) -> Clique:
-    """The definition, by trying every subset: no graph library, no shared code."""
-    together = [
-        subset
-        for size in range(1, len(participants) + 1)
-        for subset in combinations(participants, size)
-        if all(matrix.values[matrix.index(a), matrix.index(b)] for a, b in combinations(subset, 2))
-    ]
-    if order == "size":
-        largest = max(len(subset) for subset in together)
-        eligible = [subset for subset in together if len(subset) == largest]
-    else:
-        eligible = [s for s in together if not any(set(s) < set(other) for other in together)]
-    return min(eligible, key=lambda subset: sorted(ranks[m.origin] for m in subset))
-
-
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("n", [3, 4, 5])
-def test_table_online_and_oracle_agree_on_every_case(n: int, order: str) -> None:
-    matrix = HarmonyMatrix.paper(n)
-    for ranks in (None, random.Random(n).sample(range(n), n)):
-        table = DecisionTable(matrix, order, ranks)
-        table.complete()
-        count = 0
-        for participants in all_cases(n):
-            count += 1
-            expected = oracle(participants, matrix, order, ranks or range(n))
-            assert decide(participants, matrix, order, ranks) == expected, text(participants)
-            assert table.decide(participants) == expected, text(participants)
-        assert count == len(table) == CASES[n]
+def test_the_table_and_the_function_agree(order: str) -> None:
+    matrix, ranks = HarmonyMatrix.paper(4), (2, 0, 3, 1)
+    table = DecisionTable(matrix, order, ranks)
+    for participants in table:
+        assert table.decide(participants) == decide(participants, matrix, order, ranks)
 
 
 def test_the_papers_example() -> None:
@@ -112,9 +74,7 @@ def test_without_participants_no_vehicle_goes() -> None:
     assert decide([], matrix) == ()
     assert DecisionTable(matrix).lanes(0) == 0
     assert DecisionTable(matrix).decide([]) == ()
-    with pytest.raises(
-        InputError, match=r"^a decision needs at least one participant, such as a1$"
-    ):
+    with pytest.raises(InputError, match="needs at least one participant, such as a1$"):
         explain([], matrix)
 
 
@@ -148,7 +108,6 @@ def test_cases_are_the_integers_from_one() -> None:
     table = DecisionTable(HarmonyMatrix.paper(3))
     cases = list(table)
     assert len(cases) == len(set(cases)) == len(table) == 26
-    assert sorted(cases) == sorted(all_cases(3))
     for number, participants in enumerate(cases, start=1):
         assert table.case(participants) == number
         assert table.participants(number) == participants
@@ -171,9 +130,7 @@ def test_an_entry_is_computed_once_and_kept() -> None:
 def test_tables_are_shared() -> None:
     matrix = HarmonyMatrix.paper(4)
     same = HarmonyMatrix(4, np.array(matrix.values))
-    assert decision_table(matrix, "size", (0, 1, 2, 3)) is decision_table(
-        same, "size", (0, 1, 2, 3)
-    )
+    assert decision_table(matrix, "size") is decision_table(same, "size")
     assert decision_table(matrix, "lanes") is not decision_table(matrix, "size")
 
 
@@ -228,11 +185,7 @@ def test_other_arguments_are_checked() -> None:
 @pytest.mark.parametrize(
     ("priorities", "message"),
     [
-        (
-            (0, 1, 2, 2),
-            r"priorities of 4 lanes are the ranks 0 … 3, each once, got \(0, 1, 2, 2\)$",
-        ),
-        ((0, 1, 2), "priorities of 4 lanes"),
+        ((0, 1, 2, 2), r"priorities of 4 lanes are .* 0 … 3, each once, got \(0, 1, 2, 2\)$"),
         ((0, 1, 2, 3, 4), "priorities of 4 lanes"),
         ("abcd", "priorities must be a sequence of lane ranks"),
         (4, "priorities must be a sequence of lane ranks"),

@@ -71,9 +71,6 @@ def braking(
     return {command.vehicle: command.deceleration for command in commands}
 
 
-# What another may do.
-
-
 def test_a_reading_holds_as_long_as_motion_does_not_contradict_it() -> None:
     """a3 is read as a2, in harmony with c2, until it is 0.3 m beside that path."""
     shows = showing(SITE.intersection, 0.3)[2, 1]
@@ -109,9 +106,6 @@ def test_a_vehicle_that_is_not_seen_is_not_braked_for() -> None:
 def test_a_vehicle_that_can_stop_before_the_junction_endangers_none() -> None:
     true = view(car(1, "a3", 2.0, 6.0), car(2, "c2", -4.0, 5.0))
     assert braking(started(), true, going=set()) == {}
-
-
-# How hard.
 
 
 def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
@@ -229,9 +223,6 @@ def test_it_is_needed_where_two_lanes_may_meet() -> None:
         assert monitors.needed is needed, (cars, going)
 
 
-# Which vehicle goes on.
-
-
 def conflicting() -> list[tuple[int, int]]:
     m = MATRIX.movements
     return [
@@ -269,14 +260,6 @@ def test_where_all_stand_and_wait_the_first_lane_goes_alone() -> None:
         assert going == [False, tick >= 20, False], "b has rank 0"
     inside = view(*cars, car(9, "d2", 1.0, 5.0), time=4.0)
     assert not monitors.patience.goes(inside, inside, cars[1], False, ranks), "its turn is over"
-
-
-def test_no_vehicle_goes_alone_where_another_moves_or_crosses() -> None:
-    for moving in (car(9, "d2", -6.0, 2.0), car(9, "d2", 3.0, 0.0)):
-        monitors = started(patience=1.0)
-        for tick in range(30):
-            seen = view(car(0, "a2", -2.25, 0.0), moving, time=tick / 10)
-            assert not monitors.patience.goes(seen, seen, seen.vehicles[0], False, (0, 1, 2, 3))
 
 
 def stands(monitors: Monitors, seen: View, vehicle: int, decided: bool = False) -> bool:
@@ -321,9 +304,6 @@ def test_a_vehicle_that_went_alone_goes_on_once_it_is_inside() -> None:
     assert stands(monitors, view(ego._replace(distance=-1.0, speed=3.0), other, time=1.5), 0)
     assert not stands(monitors, view(ego._replace(distance=2.0, speed=0.5), other, time=1.6), 0)
     assert not stands(monitors, view(ego, time=1.7), 0), "it gave it back"
-
-
-# Whether it helps.
 
 
 def wrong(read: dict[int, int], reader: int | None = None) -> Reading:

@@ -66,7 +66,8 @@ def test_readings_follow_the_confusion(kind: str, unsignalled: tuple[float, floa
 @pytest.mark.parametrize("kind", KINDS)
 def test_who_is_misread_at_a_small_error_is_at_a_larger_one(kind: str) -> None:
     def misread(error: float) -> set[int]:
-        return {v for v in range(500) if lane(error, kind).read(DRAWS, 1, v) != 1}
+        subject = lane(error, kind)
+        return {v for v in range(500) if subject.read(DRAWS, 1, v) != 1}
 
     assert not misread(0.0)
     assert misread(0.05) < misread(0.15) < misread(0.25)
