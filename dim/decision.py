@@ -24,8 +24,7 @@ from minisim.junction.movements import ARM_NAMES, Movement
 #: paper words it). "lanes": of all maximal cliques, the latter (as in its published runs).
 ORDERS = ("size", "lanes")
 
-#: `DecisionTable.complete` refuses more cases than this: 7 arms have 823,542, 8 arms 17 million.
-MAX_CASES = 1_000_000
+MAX_CASES = 1_000_000  #: more are not tried: 7 arms have 823,542 cases, 8 arms 17 million
 
 Movements = tuple[Movement, ...]
 
@@ -51,11 +50,8 @@ def decide(
 ) -> Movements:
     """The right of way among participants: a pure function of the set of their movements.
 
-    Args:
-        movements: those of the participants, at most one per lane, in any order.
-        matrix: harmony of the movements.
-        order: "size" or "lanes", see `ORDERS`.
-        priorities: rank of each lane, 0 first; by default the lanes' own order.
+    There is at most one participant per lane. `order` is one of `ORDERS`; `priorities` are the
+    ranks of the lanes, 0 first, by default in their own order.
 
     Returns the movements that may cross, by lane; empty only when there are no participants. Raises
     `InputError`: unknown movement or order, two movements of one lane, or priorities that are not

@@ -26,8 +26,7 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.vehicle import VehicleType
 
-#: Arm counts for which the authors published a matrix.
-PAPER_ARMS = (3, 4, 5)
+PAPER_ARMS = (3, 4, 5)  #: arm counts for which the authors published a matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,10 +56,7 @@ class HarmonyMatrix:
         vehicle: VehicleType | None = None,
         clearance: float = CLEARANCE,
     ) -> HarmonyMatrix:
-        """Harmony if swept corridors of different arms stay more than `clearance` (0 … 10 m) apart.
-
-        The vehicle whose body sweeps is `VehicleType()` by default.
-        """
+        """Harmony if the corridors that a vehicle sweeps stay over `clearance` (0 … 10 m) apart."""
         instance("intersection", intersection, Intersection)
         vehicle = VehicleType() if vehicle is None else vehicle
         instance("vehicle", vehicle, VehicleType)

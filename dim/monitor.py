@@ -47,8 +47,7 @@ from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
-#: The gap that a stopping vehicle leaves before the place where it must not be [m].
-ROOM = 0.25
+ROOM = 0.25  #: the gap that a stopping vehicle leaves before the place where it must not be [m]
 
 
 @declared
@@ -146,11 +145,8 @@ class Monitors:
         row = self._rows[other.lane]
         shown = self._shows[row[other.manoeuvre]]
         allowed = [k for k in row[1:] if -other.distance < shown[k]]
-        if len(readings) == 1 and UNKNOWN not in readings:
-            (reading,) = readings
-            if row[reading] in allowed:
-                return [row[reading]]
-        return allowed
+        certain = len(readings) == 1 and UNKNOWN not in readings
+        return [k for k in allowed if certain and k in {row[r] for r in readings}] or allowed
 
     def _asked_by(self, ego: Observed, mine: int, other: Observed, theirs: int) -> float:
         place = self._site.intersection, self._site.vehicle
@@ -211,11 +207,7 @@ class Monitors:
 
 
 class Patience:
-    """Ends a deadlock in which all stand and wait: after some `time` [s] the first goes alone.
-
-    Vehicles take part from `sight` [m] before the junction on; `deceleration` is comfortable
-    braking [m/s²].
-    """
+    """Ends a deadlock: after all have stood for some `time` [s], the first goes alone."""
 
     def __init__(self, time: float, sight: float, deceleration: float) -> None:
         self._time, self._sight, self._deceleration = time, sight, deceleration
@@ -225,10 +217,7 @@ class Patience:
     def goes(
         self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
     ) -> bool:
-        """Whether a vehicle goes, either as it `decided`, or alone where all stand and wait.
-
-        Only positions and speeds of the others are taken from `view`, the true one.
-        """
+        """Whether it goes, as `decided` or alone; of the true `view` it uses only motion."""
         alone = ego.id in self._alone
         if not alone and (decided or ego.speed >= HALTING):
             self._since.pop(ego.id, None)

@@ -18,11 +18,8 @@ from minisim.parameters import declared
 #: longer stop it before the junction. "paper": when it is past the middle of the green zone.
 COMMITS = ("stoppable", "paper")
 
-#: A host's rounding error [m]: a front bumper that has just passed a mark may seem to be before it.
-ROUNDING = 1e-6
-
-#: The manoeuvre that an ego sees if it does not know the intent, which may be any.
-UNKNOWN = 0
+ROUNDING = 1e-6  #: by how much a vehicle that has passed a mark may seem to be before it [m]
+UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent, which may be any
 
 #: Turns a view and an ego in it into the view that the ego sees. The ego sees itself exactly.
 See = Callable[[View, Observed], View]

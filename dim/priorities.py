@@ -24,8 +24,7 @@ from dim.zones import Zones
 from minisim.control import Observed, Site, View
 from minisim.errors import InputError
 
-#: Priorities that change with time.
-CHANGING = ("rotating", "waiting")
+CHANGING = ("rotating", "waiting")  #: priorities that change with time
 
 #: How long each lane comes first [s]. No vehicle takes that long to cross: from a standstill 2 m
 #: before the junction, 22 m at 2.6 m/s² take 4.1 s. So every lane's turn includes a decision.
@@ -36,8 +35,7 @@ TURN_TIME = 10.0
 #: prediction", IEEE IV 2017).
 SENSOR_RANGE = 100.0
 
-#: Times that differ by less than this count as the same [s]: hosts round their clocks.
-SAME_TIME = 1e-6
+SAME_TIME = 1e-6  #: times that differ by less count as the same [s]: hosts round their clocks
 
 
 class Ranking(NamedTuple):

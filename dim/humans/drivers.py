@@ -25,17 +25,14 @@ from minisim.streams import Draws
 #: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
-#: What a draw is for.
-_HUMAN, _CARELESS, _GAP = range(3)
+_HUMAN, _CARELESS, _GAP = range(3)  # what a draw is for
 
 
 @declared(kw_only=True)
 class Humans:
-    """How people drive. Triples are for the near turn, straight on, and the far turn.
+    """How people drive. Triples are for the near turn, straight on, and the far turn."""
 
-    Sources: critical gaps HCM exhibit 20-17, follow-up times exhibit 20-18.
-    """
-
+    # Critical gaps: HCM exhibit 20-17; follow-up times: exhibit 20-18.
     critical_gaps: tuple[float, float, float] = reals(
         "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
         count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
@@ -44,9 +41,8 @@ class Humans:
         "shortest time between two drivers of one lane", "s",
         count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
     )  # fmt: skip
-    # Log-normal over drivers, as in the usual maximum-likelihood estimate (Tian et al. 1999,
-    # Transp. Res. A 33:187). In the HCM all drivers are alike; we know of no published value for
-    # these junctions.
+    # Log-normal over drivers, as usual (Tian et al. 1999, Transp. Res. A 33:187). In the HCM all
+    # drivers are alike; we know of no published value for these junctions.
     deviation: float = real(
         "standard deviation of a driver's critical gap over its mean; 0 makes all alike",
         low=0, high=1, default=0.0, label="deviation of critical gaps",
@@ -100,16 +96,14 @@ class Drivers:
 
 
 class Readings:
-    """The ways that a vehicle's indicator and motion leave open to it, as others see them.
-
-    If two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
-    """
+    """The ways that a vehicle's indicator and place leave open to it, as others see them."""
 
     def __init__(self, humans: Humans, site: Site, drivers: Drivers) -> None:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self.drivers = drivers
         self._rows = site.intersection.movements.rows
+        # Beyond the parting of two ways, a vehicle's place shows which of them it takes.
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:

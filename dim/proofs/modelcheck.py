@@ -40,10 +40,7 @@ class Exploration:
 
 @dataclass(frozen=True)
 class Lasso:
-    """How a lane's front vehicle waits forever: the events that lead there, then the repeated ones.
-
-    All vehicles look after each event, and a vehicle that can go on eventually does.
-    """
+    """How a lane's front vehicle waits forever: the events that lead there, then those repeated."""
 
     lane: int
     stem: Path
@@ -53,10 +50,7 @@ class Lasso:
 def explore(
     protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
 ) -> Exploration:
-    """Visit every reachable state, nearest first, or stop after the nearest unsafe ones.
-
-    Raises `InputError` if there are more than `max_states`.
-    """
+    """Visit states, nearest first, up to the first unsafe ones; `InputError` beyond the limit."""
     instance("protocol", protocol, Protocol)
     integer("max_states", max_states, low=1)
     reached: Reached = {protocol.start: None}

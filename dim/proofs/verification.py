@@ -94,10 +94,7 @@ def analyse(
     priorities: Sequence[int] | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
-    """Try all cases of a matrix; 6 arms (46,655 cases) take about 20 s.
-
-    Raises `InputError`: unknown order, not a permutation, or too many cases (8 arms).
-    """
+    """Try all cases (20 s for 6 arms); `InputError` as `DecisionTable`, and from 8 arms on."""
     table = DecisionTable(matrix, order, priorities)
     n, total = matrix.n, len(table)
     if total > MAX_CASES:
@@ -161,10 +158,9 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """What remains of tied cliques by the paper's wording; `by_priority` lists the lanes.
+    """What remains of tied cliques by the paper's wording, with the lanes by priority.
 
-    "The clique with the highest priority lanes" is one that holds the first lane, if any does, then
-    the second, and so on.
+    "The clique with the highest priority lanes" holds the first lane, if any does, then the second…
     """
     left = tuple(cliques)
     for lane in by_priority:

@@ -22,8 +22,7 @@ KINDS = ("missed", "symmetric")
 #: Error probabilities worth comparing, from zero to that of a missing turn signal.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
 
-#: What a draw is for.
-_SIGNAL, _READ, _SURE, _MISTAKEN = range(4)
+_SIGNAL, _READ, _SURE, _MISTAKEN = range(4)  # what a draw is for
 
 Table = tuple[tuple[float, ...], ...]
 

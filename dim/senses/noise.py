@@ -197,10 +197,7 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 
 
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """Vehicles by lane and in their true order, without the overtaking that noise has caused.
-
-    No vehicle is put ahead of one that it follows. The ego keeps its place.
-    """
+    """Vehicles without the overtaking that noise has caused; the ego keeps its place."""
     ordered: list[Observed] = []
     at = next(k for k, v in enumerate(vehicles) if v.id == ego.id)
     for k, vehicle in enumerate(vehicles):

@@ -168,7 +168,7 @@ def harmony_table(arms: int) -> Table:
     different = {pair for a, b in ours.disagreements(paper) for pair in ((a, b), (b, a))}
     rows = tuple(
         (str(row), *(
-            f"{int(paper[row, column])}{'≠' if (row, column) in different else ''}"
+            f"{int(paper.harmony(row, column))}{'≠' if (row, column) in different else ''}"
             for column in paper.movements
         ))
         for row in paper.movements

@@ -74,7 +74,7 @@ def test_without_participants_no_vehicle_goes() -> None:
     assert decide([], matrix) == ()
     assert DecisionTable(matrix).lanes(0) == 0
     assert DecisionTable(matrix).decide([]) == ()
-    with pytest.raises(InputError, match="needs at least one participant, such as a1$"):
+    with pytest.raises(InputError, match=r"needs at least one participant, such as a1$"):
         explain([], matrix)
 
 
@@ -151,11 +151,9 @@ def test_a_table_of_many_arms_is_filled_on_demand_only() -> None:
         (["a1", "a2"], "one participant per lane: lane a has a1 and a2"),
         (["b1", "b1"], "lane b has b1 and b1"),
         (["e1"], "no movement 'e1'"),
-        (["a4"], "no movement 'a4'"),
         ([5], "no movement 5"),
         ([10**5000], "no movement a int too large"),
         ("a1", "^participants must be a sequence of movements such as a1, b2"),
-        (7, "must be a sequence"),
     ],
 )
 def test_participants_are_checked(movements: object, message: str) -> None:

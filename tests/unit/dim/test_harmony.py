@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from dim import HarmonyMatrix
 from minisim.errors import FileError, InputError
 from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
-from scenarios import PAPER, four_way
+from scenarios import PAPER
 from scenarios.library import MAKERS
 
 #: The paper's table "Harmony matrix for a four-way intersection", row by row.
@@ -204,16 +203,3 @@ def test_a_path_is_text(path: object) -> None:
         HarmonyMatrix.from_csv(path)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^path of a harmony matrix must be"):
         HarmonyMatrix.paper(3).to_csv(path)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("four-way",), "intersection must be an Intersection"),
-        ((four_way().intersection, 5), "vehicle must be a VehicleType"),
-        ((four_way().intersection, None, -1), "clearance"),
-    ],
-)
-def test_from_geometry_checks_its_arguments(arguments: tuple[Any, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        HarmonyMatrix.from_geometry(*arguments)

@@ -123,14 +123,6 @@ def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
             assert needed < b
 
 
-def test_it_brakes_no_harder_than_told() -> None:
-    for weak in (2.0, 5.0):
-        true = view(car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0))
-        told = braking(started(deceleration=weak), true)
-        assert told
-        assert max(told.values()) <= weak
-
-
 def test_a_vehicle_that_is_out_in_good_time_goes_on() -> None:
     """Leaving at its speed, the other coming at full acceleration: the margin is between."""
     shared, mirrored = regions(A2, B2)
@@ -340,15 +332,6 @@ def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
     assert not any(
         isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*WAITING, time=t))
     )
-
-
-def test_a_vehicle_that_arrives_at_the_yellow_zone_ends_the_wait() -> None:
-    """As above, with c3, which is in conflict with all; 8 m before the junction it takes part."""
-    for past, goes in ((-8.0, False), (-8.001, True)):
-        session = Dim(perception=wrong({3: 2}, reader=1), monitor=Monitor()).start(SITE)
-        for time in (0.0, 9.0):
-            commands = list(session.decide(view(*WAITING, car(3, "c3", past, 1.0), time=time)))
-        assert (Go(1) in commands) is goes
 
 
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:

@@ -15,7 +15,6 @@ from dim.controller import DimSession
 from dim.humans.drivers import Drivers
 from minisim.control import Go, Observed, Session, View, Wake
 from minisim.junction.movements import Movement
-from minisim.results.run import Run
 from scenarios import four_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import outcome_of
@@ -215,23 +214,6 @@ def test_without_humans_runs_are_those_of_dim(gate: str) -> None:
     run, alone = (minisim.simulate(scenario, c, 4, record="junction") for c in (rare, rare.dim))
     assert set(run.kinds) == {"automated"}
     assert digest(run) == digest(alone)
-
-
-def test_who_is_human_depends_on_no_other_lane_and_not_on_the_horizon() -> None:
-    def kinds(run: Run) -> dict[int, list[str]]:
-        trips = run.trips
-        return {lane: trips.loc[trips["lane"] == lane, "kind"].tolist() for lane in "ac"}
-
-    road = four_way(100, profile="fair", horizon=300.0)
-    half = replace(road, demand=replace(road.demand, density=50.0, split=(1, 0, 1, 0)))
-    whole, longer, alone = (
-        kinds(minisim.simulate(it, Mixed(share=0.5), 4))
-        for it in (road, replace(road, horizon=400.0), half)
-    )
-    assert alone == whole
-    for lane, found in whole.items():
-        assert set(found) == {"human", "automated"}
-        assert longer[lane][: len(found)] == found
 
 
 def test_one_driver_alone_loses_what_stopping_costs() -> None:

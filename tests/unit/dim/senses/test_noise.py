@@ -171,14 +171,6 @@ def test_an_unsure_intent_is_unknown() -> None:
     assert set(read.values()) == {1, UNKNOWN}
 
 
-def test_out_of_range_is_out_of_sight() -> None:
-    """Held vehicles' centres: neighbours 16.3 m or 13.1 m apart, opposite ones 23.4 m."""
-    near = NoisyPerception(sensor_range=20.0).start(SITE)
-    assert {v.id for v in near(WAITING, WAITING.vehicles[0]).vehicles} == {1, 5, 2, 4}
-    far = NoisyPerception(sensor_range=24.0).start(SITE)
-    assert {v.id for v in far(WAITING, WAITING.vehicles[0]).vehicles} == {1, 5, 2, 3, 4}
-
-
 def test_at_the_end_of_its_range_a_vehicle_is_seen() -> None:
     ego, other = WAITING.vehicles[0], WAITING.vehicles[3]
     bodies = Bodies(SITE)
