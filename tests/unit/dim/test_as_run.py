@@ -66,6 +66,7 @@ def test_a_lone_vehicle_never_stops() -> None:
     for driven in (485.0, 487.9, 488.0, 490.0, 492.0, 506.0, 507.0):
         assert step(rule, car("v1.a_1", driven)) == {1: GO_SPEED}
     assert step(rule, car("v1.a_1", 508.01)) == {1: EXIT_SPEED}
+    assert step(rules(exit_speed=14.0), car("v1.a_1", 508.01)) == {1: 14.0}, "as_run.md, no. 15"
 
 
 def test_the_movement_breaks_a_tie_of_seconds() -> None:
@@ -257,12 +258,6 @@ def test_the_plan_wakes_where_a_zone_begins_or_ends() -> None:
     assert plan.lanes_open
     long = AsRunDim().start(four_way(profile="as_run", arm_length=700.0).site()).plan
     assert long.reach == 0.0
-
-
-def test_the_exit_speed_can_be_that_of_the_signals() -> None:
-    """as_run.md, discrepancy 15."""
-    assert step(rules(exit_speed=14.0), car("v1.a_1", 508.01)) == {1: 14.0}
-    assert AsRunDim(exit_speed=0.5).name == "dim-as-run:exit_speed=0.5"
 
 
 def test_names_and_sites_that_the_rules_do_not_fit() -> None:

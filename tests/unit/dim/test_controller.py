@@ -139,7 +139,6 @@ def test_lanes_by_inflow() -> None:
     dim = Dim(priorities="inflow")
     for split, ranks in [
         (None, (0, 1, 2, 3)),
-        ((4, 3, 2, 1), (0, 1, 2, 3)),
         ((4, 1, 4, 1), (0, 2, 1, 3)),  # ties by lane
         ((1, 2, 3, 4), (3, 2, 1, 0)),
         ((3, 1, 4, 2), (1, 3, 0, 2)),
@@ -177,7 +176,6 @@ def test_sites_that_it_cannot_serve() -> None:
         ("inflows", r"unknown priorities 'inflows'.*did you mean 'inflow'"),
         ((0, 2), "priorities of 2 lanes are the ranks 0 … 1"),
         (3, "priorities must be a sequence of ranks .*, got 3"),
-        (("a", "b"), "lane rank"),
         ((0, 10**5000), "priorities of 2 lanes"),
     ],
 )
