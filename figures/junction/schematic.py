@@ -135,7 +135,7 @@ def harmony_table(arms: int) -> Table:
     different = {pair for a, b in ours.disagreements(paper) for pair in ((a, b), (b, a))}
 
     def entry(pair: tuple[Movement, Movement]) -> str:
-        return f"{int(paper[pair])}{'≠' if pair in different else ''}"
+        return f"{int(paper.harmony(*pair))}{'≠' if pair in different else ''}"
 
     every = paper.movements
     rows = tuple((str(row), *(entry((row, column)) for column in every)) for row in every)
