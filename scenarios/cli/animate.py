@@ -46,7 +46,7 @@ def animate(
     arrivals: options.Arrivals = None,
     start: options.Start = None,
 ) -> None:  # fmt: skip
-    """Write an animation of a run: which vehicles wait, have the right of way, and cross."""
+    """Write an animation of a run: which vehicles wait, have right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
@@ -64,9 +64,8 @@ def animate(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    recipe = Recipe(
-        junction, controller_named(controller, profile), seed, humans, on_collision="record"
-    )
+    who = controller_named(controller, profile)
+    recipe = Recipe(junction, who, seed, humans, on_collision="record")
     end = begin + seconds
     result = recipe.run(simulate, until=end, record="all", record_window=(begin, end))
     with bar("drawing") as progress:

@@ -26,10 +26,10 @@ TOLD = 10
 
 
 @app.command(
-    epilog="Writes crossval.md (the report), crossval.csv (one row a cell, lane and metric) and "
+    epilog="Writes crossval.md (the report), crossval.csv (one row per cell, lane and metric) and "
     "the figures. A cell whose controller cannot serve its scenario is refused before anything "
     "runs; a run that fails is a row with its error. SUMO's runs are kept in the folder sumo "
-    "beside them and used again by the same version; remove it to run them anew.\n\n"
+    "beside them, and the same version uses them again; remove it to repeat them.\n\n"
     "[bold]Examples[/bold]\n\n"
     "minisim crossval --quick\n\n"
     "minisim crossval four-way five-way -c dim -c dim:gate=harmonious -d 250 --seeds 5\n\n"
@@ -47,13 +47,13 @@ def crossval(
     ] = None,
     controller: Annotated[
         list[str] | None,
-        option("Who decides, as for minisim run; repeat it for more. dim and fixed-time by "
-               "default. With --replay whose published runs: dim (the default), fixed-time, "
+        option("What decides, as for minisim run; repeat it for more. dim and fixed-time by "
+               "default. With --replay that of the published runs: dim (the default), fixed-time, "
                "adaptive or v2ic.", "NAME", "--controller", "-c"),
     ] = None,
     density: Annotated[
         list[float] | None,
-        option("Mean inflow a lane; repeat it for more. 150, 250 and 350 by default, with "
+        option("Mean inflow per lane; repeat it for more. 150, 250 and 350 by default, with "
                "--replay all that were published.", "VEH/H", "--density", "-d"),
     ] = None,
     split: Annotated[
@@ -67,7 +67,7 @@ def crossval(
                "--replay those of the published runs by default.", "NAME", "--profile", "-p"),
     ] = None,
     seeds: Annotated[
-        int | None, option("Runs a cell, 1 … 1000; 3 by default, 2 with --quick.")
+        int | None, option("Runs per cell, 1 … 1000; 3 by default, 2 with --quick.")
     ] = None,
     horizon: Annotated[
         float | None, option("Simulated time; 3600 by default, 300 with --quick.", "S")
@@ -111,9 +111,8 @@ def crossval(
             density or (QUICK_DENSITIES if quick else DENSITIES),
         )  # fmt: skip
         cases = [Case(make(name, density=q, split=shares), who) for name, shares, who, q in cells]
-    if seeds is None:
-        seeds = 2 if quick else 3
-    numbers = range(1, 1 + integer("--seeds", seeds, low=1, high=1000))
+    count = (2 if quick else 3) if seeds is None else integer("--seeds", seeds, low=1, high=1000)
+    numbers = range(1, 1 + count)
     workers = options.processes(jobs)
     sumo_home()
     with bar("checking"):

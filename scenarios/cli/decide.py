@@ -23,7 +23,7 @@ def decide(
         typer.Argument(
             metavar="MOVEMENTS...",
             help="What the front vehicle of each lane wants, such as a1 b2 c2 d2: lane a to the "
-            "1st exit clockwise, and so on; at most one a lane.",
+            "1st exit clockwise, and so on; at most one per lane.",
         ),
     ],
     order: options.Order = "size",

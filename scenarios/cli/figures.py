@@ -27,7 +27,7 @@ def figures(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME...]", help="Which ones; every one that there are runs for by default."
+            metavar="[NAME...]", help="Which ones; by default all that there are runs for."
         ),
     ] = None,
     out: options.Folder = Path("out/figures"),
@@ -36,7 +36,7 @@ def figures(
     ] = None,
     seeds: Annotated[
         int | None,
-        option("Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with --quick."),
+        option("Runs per case to look for: seeds 1 to this one; 10 by default, 2 with --quick."),
     ] = None,
     quick: Annotated[
         bool, option("Look for the runs of minisim reproduce --quick.", None, "--quick")
@@ -80,8 +80,6 @@ def figures(
                 progress(done, len(items))
     typer.echo(f"wrote {len(items) - len(missing)} figures and tables to {folder}")
     if left:
-        typer.echo(
-            f"  not {len(left)} others, which need runs: name a store with --store", err=True
-        )
+        missing.append(f"{len(left)} others, which need runs: name a store with --store")
     for why in missing:
         typer.echo(f"  not {why}", err=True)

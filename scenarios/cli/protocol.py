@@ -38,8 +38,8 @@ def protocol(
         str,
         typer.Option(
             metavar="stoppable|paper",
-            help="When a vehicle is committed: once it cannot stop any more, or past half of the "
-            "green zone.",
+            help="When a vehicle is committed: once it cannot stop any more, or halfway through "
+            "the green zone.",
         ),
     ] = "stoppable",
     gate: Annotated[
@@ -69,10 +69,7 @@ def protocol(
     profile: options.ProfileName = "paper",
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
-    """Visit every state of arrivals, decisions, commitments and clearings (3 and 4 arms).
-
-    Is it safe? Can it get stuck? Which lanes can wait for ever?
-    """
+    """Visit every state: is DIM safe, can it get stuck, which lanes starve? (3 and 4 arms)"""
     from dim.proofs.modelcheck import explore, starvation
     from dim.proofs.protocol import Protocol
 
@@ -80,10 +77,8 @@ def protocol(
         check_file(counterexample, ".csv")
     what, matrix = junction(scenario, bearings, side, profile)
     if matrix.n > MAX_ARMS:
-        raise InputError(
-            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and too many "
-            "states"
-        )
+        only = "the protocol is searched for 3 and 4 arms"
+        raise InputError(f"{only}; {what.name} has {matrix.n}, and too many states")
     rules = Protocol(matrix, order, gate, commit, priorities)
     with bar("visiting all states") as progress:
         search = explore(rules, progress=lambda states: progress(states, states))

@@ -43,13 +43,10 @@ def verify(
         "cases": analysis.cases,
         "claims": [
             {
-                "name": claim.name,
-                "statement": claim.statement,
-                "holds": claim.holds,
-                "failures": claim.failures,
-                "smallest_counterexample": None if claim.holds else names(claim.example or ()),
+                **{key: getattr(it, key) for key in ("name", "statement", "holds", "failures")},
+                "smallest_counterexample": None if it.holds else names(it.example or ()),
             }
-            for claim in analysis.claims
+            for it in analysis.claims
         ],
         "cases_by_vehicles_that_go": analysis.sizes,
         "cases_by_cliques_tied": analysis.ties,

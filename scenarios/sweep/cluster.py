@@ -13,7 +13,7 @@ from typing import Any
 from minisim.errors import InputError, MissingExtraError, instance
 from scenarios.sweep.keys import results_version
 
-#: Of a scheduler; the protocols are Dask's.
+#: The address of a scheduler; the protocols are Dask's.
 ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,9})", re.ASCII)
 
 #: How long to wait for a scheduler, and then for its first worker [s].
@@ -53,16 +53,14 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
 
 
 def _check_address(address: str) -> None:
-    """Raise `InputError` for what is no address, since Dask would hang while it cleans up."""
+    """Raise `InputError` for what is not an address: Dask would hang while it cleans up."""
     instance("scheduler", address, str)
     form = ADDRESS.fullmatch(address)
-    if form is None:
-        why = "an address has the form tcp://host:port"
-    elif not 1 <= int(form["port"]) <= 65535:
-        why = f"a port is 1 … 65535, got {form['port']}"
-    else:
-        return
-    raise InputError(f"no Dask scheduler at {address!r}: {why}")
+    if form is None or not 1 <= int(form["port"]) <= 65535:
+        raise InputError(
+            f"no Dask scheduler at {address!r}: an address has the form tcp://host:port, with a "
+            "port 1 … 65535"
+        )
 
 
 def _check_workers(client: Any, address: str, patience: float) -> None:
@@ -75,8 +73,6 @@ def _check_workers(client: Any, address: str, patience: float) -> None:
     except ImportError as error:
         raise InputError(f"the workers of {address} lack minisim: {error}") from error
     ours = results_version()
-    for worker, version in versions.items():
-        if version != ours:
-            raise InputError(
-                f"worker {worker} has version {version} of the results, here it is {ours}"
-            )
+    for worker, it in versions.items():
+        if it != ours:
+            raise InputError(f"worker {worker} has version {it} of the results, here it is {ours}")

@@ -44,7 +44,7 @@ Plot = Annotated[
 def junction(
     name: str, bearings: str | None, side: str, profile: str, clearance: float = CLEARANCE
 ) -> tuple[Scenario, HarmonyMatrix]:
-    """A scenario and the harmony matrix of its movements; raises `MinisimError`."""
+    """A scenario and the harmony matrix of its movements."""
     from dim import HarmonyMatrix
 
     scenario = build_scenario(name, bearings, profile=profile, side=side)
@@ -70,7 +70,7 @@ def names(things: Iterable[object]) -> list[str]:
 
 
 def claims_table(name: str, analysis: Analysis) -> Table:
-    """Each claim, with the number of cases in which it was tested and in which it is false."""
+    """Each claim, and the numbers of cases in which it was tested and in which it is false."""
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"{name}, {analysis.n} arms: all {analysis.cases} cases, order {analysis.order}",
@@ -79,12 +79,8 @@ def claims_table(name: str, analysis: Analysis) -> Table:
     for heading in ("claim", "cases", "false", "smallest counterexample"):
         table.add_column(heading, justify="right" if heading in ("cases", "false") else "left")
     for claim in analysis.claims:
-        table.add_row(
-            claim.statement,
-            str(claim.cases),
-            Text(str(claim.failures), style="bold green" if claim.holds else "bold red"),
-            "" if claim.example is None else _spaced(claim.example),
-        )
+        failures = Text(str(claim.failures), style="bold green" if claim.holds else "bold red")
+        table.add_row(claim.statement, str(claim.cases), failures, _spaced(claim.example or ()))
     return table
 
 
@@ -119,18 +115,19 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
         f"{search.states}, with {search.transitions} transitions",
         "" if search.complete else " up to the nearest unsafe ones",
     )
+    yes, no = ("yes", "bold green"), ("no", "bold red")
     text.append("\nsafe         ", "dim")
     if search.unsafe:
         first = search.unsafe[0]
-        text.append("no", "bold red").append(f": {_listed(first)}")
-        text.append(f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)")
+        paths = f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)"
+        text.append(*no).append(f": {_listed(first)}{paths}")
     else:
-        text.append("yes", "bold green").append(": movements in conflict are never inside at once")
+        text.append(*yes).append(": movements in conflict are never inside at once")
     text.append("\nlive         ", "dim")
     if search.stuck is not None:
-        text.append("no", "bold red").append(f": {_listed(search.stuck)}")
+        text.append(*no).append(f": {_listed(search.stuck)}")
     elif search.complete:
-        text.append("yes", "bold green").append(": in every state a vehicle can go on")
+        text.append(*yes).append(": in every state a vehicle can go on")
     else:
         text.append("not stuck in the states visited")
     for lane, lasso in zip(ARM_NAMES, lassos, strict=False):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from figures.studies.shared.section import Item
     from scenarios.recipe import Recipe
 
-#: The closest calls that the command line shows for every run.
+#: The closest calls, which are printed for every run.
 CLOSEST = ("min_ttc_s", "min_pet_s")
 
 #: Columns of the tables of a run and of a sweep, unless others are asked for.
@@ -29,7 +29,7 @@ CELL_COLUMNS = (
     "waiting_time_s", "complete_waiting_time_s", "travel_time_s", "complete_depart_delay_s",
 )  # fmt: skip
 
-#: What else may tell cells of a sweep apart.
+#: Further columns that may tell cells of a sweep apart.
 APART = ("side", "turns", "horizon_s", "warmup_s")
 
 
@@ -40,10 +40,8 @@ def run_parts(
 
     The counts are from `dim.senses.tally`: the effects of wrong perception.
     """
-    yield Text.assemble(
-        (f"{summary['scenario']}, {summary['controller']}", "bold"),
-        f": {conditions(summary)}",
-    )
+    what = f"{summary['scenario']}, {summary['controller']}"
+    yield Text.assemble((what, "bold"), f": {conditions(summary)}")
     yield _run_table(summary, metrics, by)
     yield _safety(summary)
     if counts:
@@ -96,14 +94,10 @@ def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
 
 def _safety(summary: Mapping[str, Any]) -> Text:
     collisions = summary["collisions"]
-    line = Text.assemble(
-        "  collisions ", (str(collisions), "bold red" if collisions else "bold green")
-    )
-    for name in CLOSEST:
-        if name in summary:
-            metric = METRICS[name]
-            line.append(f"   {metric.title} ")
-            line.append(_seconds(summary[name], f" {metric.unit}"), "bold")
+    line = Text("  collisions ").append(str(collisions), "bold red" if collisions else "bold green")
+    for metric in (METRICS[name] for name in CLOSEST if name in summary):
+        value = _seconds(summary[metric.name], f" {metric.unit}")
+        line.append(f"   {metric.title} ").append(value, "bold")
     return line
 
 
@@ -120,8 +114,7 @@ def gallery_table(items: Iterable[Item]) -> Table:
 def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
     """One line per cell: means over seeds with 95 % confidence intervals.
 
-    The columns are the usual ones or the metrics that the experiments ask for, and whatever tells
-    cells apart.
+    The columns are the usual ones, or else the metrics asked for, and whatever tells cells apart.
     """
     asked = {it.name: it for recipe in experiments for it in asked_metrics(recipe.metrics)}
     columns = _columns(asked.values(), CELL_COLUMNS)
@@ -156,17 +149,13 @@ def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
 
 def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know about the table: growing queues, capped signals, the first failure."""
-    notes = []
-    if "too_short" in cells and cells["too_short"].eq(True).any():
-        notes.append(
-            "too short: the roads were still filling, so that nothing can be said of queues; "
-            f"simulate {FILLING:g} travel times or more."
-        )
-    if "growing" in cells and cells["growing"].eq(True).any():
-        notes.append(
-            "growing: queues had not settled by the horizon; a mean delay there says how long was "
-            "simulated."
-        )
+    meanings = {
+        "too_short": "too short: the roads were still filling, so nothing can be said of queues; "
+        f"simulate {FILLING:g} travel times or more.",
+        "growing": "growing: queues had not settled by the horizon; a mean delay there says how "
+        "long was simulated.",
+    }
+    notes = [text for key, text in meanings.items() if key in cells and cells[key].eq(True).any()]
     text = Text("\n").join(Text(f"  {note}") for note in (*notes, *_capped(experiments)))
     failures = rows[rows["error"].notna()]
     if len(failures):
@@ -181,7 +170,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
 
 
 def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
-    """A line for each signal whose demand exceeds what Webster's formula can handle."""
+    """A line for each signal whose demand exceeds Webster's capacity."""
     from baselines import FixedTime
 
     return dict.fromkeys(
