@@ -75,10 +75,7 @@ def _meaning(make: Callable[..., Any]) -> str:
 
 
 def _parameters(make: Callable[..., Any], made: object) -> Iterator[dict[str, Any]]:
-    """What is declared about each parameter, or else what its signature says.
-
-    The values are those of `made`, or the defaults if it is None.
-    """
+    """What is declared of each parameter, or else its signature; values are those of `made`."""
     from minisim.parameters import parameters
 
     declared = {it.name: it.parameter for it in parameters(make)}

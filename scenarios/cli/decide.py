@@ -48,9 +48,7 @@ def decide(
         "scenario": what.name,
         "order": order,
         "participants": names(explanation.participants),
-        "edges": list(map(names, explanation.edges)),
-        "cliques": list(map(names, explanation.cliques)),
-        "tied": list(map(names, explanation.tied)),
+        **{k: list(map(names, getattr(explanation, k))) for k in ("edges", "cliques", "tied")},
         "right_of_way": names(explanation.right_of_way),
         "reason": explanation.reason,
     }

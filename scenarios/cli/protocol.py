@@ -38,16 +38,14 @@ def protocol(
         str,
         typer.Option(
             metavar="stoppable|paper",
-            help="When a vehicle is committed: once it cannot stop any more, or halfway through "
-            "the green zone.",
+            help="A vehicle is committed once it cannot stop, or halfway through the green zone.",
         ),
     ] = "stoppable",
     gate: Annotated[
         str,
         typer.Option(
             metavar="clear|harmonious",
-            help="Which vehicles may enter while others cross: none, or those in harmony with "
-            "them.",
+            help="Which vehicles may enter while others cross: none, or those in harmony.",
         ),
     ] = "clear",
     order: options.Order = "size",
@@ -87,9 +85,7 @@ def protocol(
         _write_counterexample(what, search, counterexample)
     facts = {
         "scenario": what.name, "order": order, "gate": gate, "commit": commit,
-        "priorities": priorities,
-        "states": search.states,
-        "transitions": search.transitions,
+        "priorities": priorities, "states": search.states, "transitions": search.transitions,
         "all_states": search.complete,
         "unsafe": list(map(names, search.unsafe)),
         "stuck": None if search.stuck is None else names(search.stuck),

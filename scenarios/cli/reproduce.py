@@ -42,9 +42,7 @@ def reproduce(
             f"Only this study and its figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"
         ),
     ] = None,
-    quick: Annotated[
-        bool, option("Two demands, 150 s each: a smoke test.", None, "--quick")
-    ] = False,
+    quick: Annotated[bool, option("A smoke test: two demands, 150 s.", None, "--quick")] = False,
 ) -> None:
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.reproduction_report import write_report

@@ -53,13 +53,12 @@ STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
     "a stored one is not repeated, whether a file, a study or [bold]minisim reproduce[/bold] asked "
     "for it.\n\n"
     "[bold]Examples[/bold]\n\n"
-    "minisim sweep paper --seeds 10 --out paper.db\n\n"
     "minisim sweep fair --seeds 3 --out fair.db --export fair.csv\n\n"
     "minisim sweep mine.toml --jobs 2 --out mine.db --export mine.csv\n\n"
     "minisim sweep mine.toml --scheduler tcp://10.0.0.1:8786 --out mine.db\n\n"
     "[bold]Exit codes[/bold]\n\n"
-    "0 done; 1 some runs failed (their rows say why); 2 bad input, or a store that cannot be "
-    "written, as on a full disk; 130 interrupted; 143 terminated. Finished runs are in the store."
+    "0 done; 1 some runs failed (their rows say why); 2 bad input or a store that cannot be "
+    "written; 130 interrupted; 143 terminated. Finished runs are in the store."
 )
 def sweep(
     what: Annotated[
@@ -82,9 +81,7 @@ def sweep(
     scheduler: Annotated[
         str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
     ] = None,
-    export: Annotated[
-        Path | None, option("Write one row per run (.csv or .parquet).", "FILE")
-    ] = None,
+    export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
     horizon: Annotated[
         float | None, option("Simulated time; as the file says, or 3600.", "S")
     ] = None,

@@ -48,11 +48,9 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
     made = []
     for names, group in _checked(rows).groupby(list(CELL), sort=False):
         good = group[group["error"].isna()]
-        cell: dict[str, object] = dict(zip(CELL, names, strict=True))
-        cell |= {"runs": len(good), "failed": len(group) - len(good)}
-        if len(good):
-            cell |= _averaged(good)
-        made.append(cell)
+        counts = {"runs": len(good), "failed": len(group) - len(good)}
+        means = _averaged(good) if len(good) else {}
+        made.append({**dict(zip(CELL, names, strict=True)), **counts, **means})
     return pd.DataFrame(made)
 
 
@@ -67,10 +65,8 @@ def _checked(rows: pd.DataFrame) -> pd.DataFrame:
         first = group.iloc[0]
         what = f"{first['controller']} on {first['scenario']} at {first['density']:g} veh/h/lane"
         if "recipe" in group and group["recipe"].nunique() > 1:
-            raise InputError(
-                f"different controllers or scenarios are called {what}; give each its own label or "
-                "name"
-            )
+            advice = "give each its own label or name"
+            raise InputError(f"different controllers or scenarios are called {what}; {advice}")
         if not group["seed"].is_unique:
             twice = group["seed"][group["seed"].duplicated()].iloc[0]
             raise InputError(f"{what} has several runs of seed {twice}; keep one of them")
@@ -122,13 +118,7 @@ def pairs(
 
     Runs are paired by seed, so that the variation of the arrivals cancels. A difference is the
     first controller's value less the second's; failed runs and missing values are left out.
-
-    Args:
-        rows: the rows of a sweep.
-        metric: a column.
-        column: the one that holds `names`, such as "controller".
-        names: the names of both controllers.
-        by: columns that name a cell.
+    `column`, such as "controller", has the names, and the columns `by` name a cell.
 
     Raises:
         InputError: two runs of one seed whose arrivals differ, or two of one controller and seed.
@@ -168,8 +158,8 @@ def saturated(good: pd.DataFrame) -> bool:
 def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
-    The travel time on a free road is travel time less time loss, taken over the trips that ended
-    or, if none did, over what was driven.
+    The travel time on a free road is travel time less time loss, of the trips that ended or, if
+    none did, of what was driven.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

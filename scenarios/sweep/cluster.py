@@ -25,19 +25,19 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     """An executor on the cluster of the scheduler at `address`, such as tcp://10.0.0.1:8786.
 
     Dask repeats the tasks of a lost worker on others, and gives up a run that has cost three
-    workers. All workers need the same version of minisim.
-
-    Raises:
-        MissingExtraError: without the extra `dask`.
-        InputError: no scheduler there, no workers, or workers with another version.
+    workers. Raises `MissingExtraError` without the extra `dask`, and `InputError` if there is no
+    scheduler, or if it has no workers or one with another version of minisim.
     """
-    _check_address(address)
+    instance("scheduler", address, str)
+    form = ADDRESS.fullmatch(address)
+    if form is None or not 1 <= int(form["port"]) <= 65535:  # Dask would hang while it cleans up
+        need = "an address has the form tcp://host:port, with a port 1 … 65535"
+        raise InputError(f"no Dask scheduler at {address!r}: {need}")
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        raise MissingExtraError(
-            "--scheduler needs the package distributed: pip install 'minisim[dask]'"
-        ) from None
+        need = "--scheduler needs the package distributed: pip install 'minisim[dask]'"
+        raise MissingExtraError(need) from None
     # The sweep itself reports a lost connection in one line. Each logger has its own level.
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":
@@ -50,17 +50,6 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     with client:
         _check_workers(client, address, patience)
         yield client.get_executor()
-
-
-def _check_address(address: str) -> None:
-    """Raise `InputError` for what is not an address: Dask would hang while it cleans up."""
-    instance("scheduler", address, str)
-    form = ADDRESS.fullmatch(address)
-    if form is None or not 1 <= int(form["port"]) <= 65535:
-        raise InputError(
-            f"no Dask scheduler at {address!r}: an address has the form tcp://host:port, with a "
-            "port 1 … 65535"
-        )
 
 
 def _check_workers(client: Any, address: str, patience: float) -> None:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import product
@@ -32,6 +32,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from minisim import hosting
 from minisim.arrivals import MAX_TIME
 from minisim.errors import (
     FileError,
@@ -44,8 +45,6 @@ from minisim.errors import (
     show,
 )
 from minisim.files import read_file
-from minisim.hosting import ON_COLLISION
-from minisim.hosting import start as started
 from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
@@ -82,9 +81,8 @@ def read_experiments(
     except (ValueError, RecursionError) as error:
         raise FileError(f"{place} is not valid TOML: {error}") from error
     blocks = table.pop("experiment", [{}])
-    overrides = {
-        key: value for key, value in (("seeds", seeds), ("horizon", horizon)) if value is not None
-    }
+    given = {"seeds": seeds, "horizon": horizon}
+    overrides = {key: value for key, value in given.items() if value is not None}
     with _at(place):
         _check_keys("key", table, [*AXES, *SINGLE, "experiment"])
         if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
@@ -117,7 +115,7 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
     for recipe in first.values():
         scenario = recipe.scenario
         try:
-            started(recipe.driven, scenario.site(recipe.seed))
+            hosting.start(recipe.driven, scenario.site(recipe.seed))
         except MinisimError as error:
             raise InputError(
                 f"{recipe.name} cannot serve {scenario.name} at {scenario.density:g} veh/h/lane, "
@@ -133,11 +131,10 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     if "min_headway" in block and "shifted" not in axes["model"]:
         raise InputError("min_headway goes with the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
-    count = prod(map(len, axes.values()))
-    if count > MAX_RUNS:
+    if (count := prod(map(len, axes.values()))) > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
-    reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
+    reaction = choice("on_collision", single.pop("on_collision"), hosting.ON_COLLISION)
     metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
@@ -159,8 +156,8 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
         del chosen["min_headway"]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
-        _check_keys("key of a scenario", junction, JUNCTION)
         label = junction.pop("label", "")
+        _check_keys("key of a scenario", junction, JUNCTION)
         if junction["name"] == "custom" and "bearings" not in junction:
             raise InputError(f"custom needs bearings, such as scenario = {CUSTOM}")
     made = scenario_named(**junction, **chosen)
@@ -224,5 +221,4 @@ def _at(place: str) -> Iterator[None]:
     try:
         yield
     except (InputError, FileError) as error:
-        kind: Callable[[str], MinisimError] = type(error)
-        raise kind(f"{place}: {error}") from error
+        raise type(error)(f"{place}: {error}") from error

@@ -103,10 +103,7 @@ def canonical(value: object) -> Any:
 
 
 def _rule(function: FunctionType) -> str:
-    """A digest of a function's instructions, its constants and the plain globals that it reads.
-
-    It tells apart two functions of one name in one file, such as lambdas.
-    """
+    """A digest of a function's instructions, constants and plain globals: lambdas share a name."""
 
     def told(code: CodeType) -> list[Any]:
         known = {name: function.__globals__.get(name) for name in code.co_names}

@@ -63,8 +63,7 @@ def given(
     with closing(_results(function, todo, executor, len(todo))) as results:
         for k, result in results:
             left.discard(k)
-            if isinstance(result, BaseException):
-                reason = result
+            reason = result if isinstance(result, BaseException) else reason
             yield k, result
     for k in sorted(left):
         yield k, reason
@@ -119,7 +118,7 @@ def _until_given_up(pool: Executor) -> Iterator[Executor]:
 
 
 def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-    """Hand one task over, while Ctrl-C is delayed and hidden from processes that start meanwhile.
+    """Hand one task over, with Ctrl-C delayed and hidden from new processes.
 
     Raises `BrokenExecutor`.
     """
@@ -135,9 +134,9 @@ def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -
 
 
 class _Processes(ProcessPoolExecutor):
-    """Spawned processes, since forking beside the threads of a progress bar can hang.
+    """Processes that end when their parent dies or lets them go.
 
-    They end when their parent has died or lets them go.
+    They are spawned, since forking beside the threads of a progress bar can hang.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -186,7 +185,7 @@ def _results(
     """
     done: SimpleQueue[int] = SimpleQueue()
     running: dict[int, Future[Answer]] = {}
-    waiting = iter(list(todo.items()))  # a copy, since the caller removes finished tasks
+    waiting = iter([*todo.items()])  # a copy, since the caller removes finished tasks
     broken = False
 
     def hand_over(count: int) -> Iterator[tuple[int, BaseException]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from contextlib import closing
 from dataclasses import replace
@@ -40,13 +40,12 @@ def sweep(
 ) -> pd.DataFrame:
     """Run all recipes and return one row each, in their order.
 
-    Only the column `cpu_s` depends on the executor and the number of its workers.
-
     Args:
         recipes: what to run.
         executor: any `concurrent.futures.Executor`, such as
             `dask.distributed.Client.get_executor()`; it stays open. None is a pool of processes
-            for this call. They are spawned, so a script needs `if __name__ == "__main__":`.
+            for this call. They are spawned, so a script needs `if __name__ == "__main__":`. Only
+            the column `cpu_s` depends on the executor.
         progress: called in this process with the numbers of finished runs and of all runs.
         jobs: processes of the pool, one per core by default; 1 runs in this process.
         store: keeps each row as it comes; rows that it has are not computed again.
@@ -61,17 +60,19 @@ def sweep(
         `version`; `error`, why a run failed; and `recipe` (`scenarios.sweep.keys.content_of`).
 
     Raises:
-        InputError: something other than a `Recipe` or a `Store`, or a controller or metric that
-            cannot go to another process.
+        InputError: not a `Recipe` or `Store`, or a controller or metric that cannot go to another
+            process.
         FileError: the store cannot be written; what it has stays.
-        ExecutorError: an executor of yours gave runs up, such as a cluster whose scheduler died.
-            Finished runs are in the store. Without a store, the rows of the others say so.
+        ExecutorError: your executor gave runs up, such as a cluster whose scheduler died. Finished
+            runs are in the store. Without a store, the rows of the others say so.
     """
     import pandas as pd
 
-    todo = _checked(recipes)
-    if added := metrics_named(metrics):
-        todo = [replace(recipe, metrics=(*recipe.metrics, *added)) for recipe in todo]
+    added = metrics_named(metrics)
+    todo: list[Recipe] = []
+    for recipe in recipes:
+        instance("recipe", recipe, Recipe)
+        todo.append(replace(recipe, metrics=(*recipe.metrics, *added)) if added else recipe)
     rows: dict[int, Row] = {}
     with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
         for k, row in results:
@@ -82,17 +83,13 @@ def sweep(
 
 
 def finished(
-    recipes: Iterable[Recipe],
+    todo: Sequence[Recipe],
     executor: Executor | None = None,
     *,
     jobs: int | None = None,
     store: Store | None = None,
 ) -> Generator[tuple[int, Row]]:
-    """Position and row of each run as it finishes; rows of the store come first.
-
-    Arguments and errors are those of `sweep`. Close it to give up.
-    """
-    todo = _checked(recipes)
+    """Position and row of each run as it finishes, as for `sweep`; close it to give up."""
     jobs = integer("jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
     missing = dict(enumerate(todo))
     if store is not None:
@@ -126,13 +123,6 @@ def finished(
             f"the executor gave up {lost} of {len(todo)} runs; the others are in {store.path}, "
             "and the same sweep goes on from there"
         )
-
-
-def _checked(recipes: Iterable[Recipe]) -> list[Recipe]:
-    todo = list(recipes)
-    for recipe in todo:
-        instance("recipe", recipe, Recipe)
-    return todo
 
 
 def _check_portable(recipes: Iterable[Recipe]) -> None:

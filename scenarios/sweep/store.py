@@ -43,20 +43,16 @@ COLUMNS = ("key", "version", "error", "experiment", "provenance", "row")
 _CREATE = f"""
 BEGIN EXCLUSIVE;
 CREATE TABLE IF NOT EXISTS runs (
-    key TEXT PRIMARY KEY,
-    version TEXT NOT NULL,
-    error TEXT,
-    experiment TEXT NOT NULL,
-    provenance TEXT NOT NULL,
-    row TEXT NOT NULL
+    key TEXT PRIMARY KEY, version TEXT NOT NULL, error TEXT, experiment TEXT NOT NULL,
+    provenance TEXT NOT NULL, row TEXT NOT NULL
 ) WITHOUT ROWID;
 PRAGMA application_id = {APPLICATION};
 PRAGMA user_version = {SCHEMA};
 COMMIT;
 """
 
-#: SQLite keeps these at bytes 60 and 68 of the file, 4 bytes each, big endian; the file begins
-#: with the magic text (SQLite, "Database File Format", 1.3).
+#: The file begins with it. The layout is at byte 60, the mark at byte 68, 4 bytes each, big endian
+#: (SQLite, "Database File Format", 1.3).
 _MAGIC = b"SQLite format 3\0"
 
 
@@ -92,9 +88,8 @@ class Store:
     def put(self, recipe: Recipe, outcome: Outcome) -> None:
         """Store an outcome, in place of an earlier one of the same recipe.
 
-        Raises:
-            FileError: the disk is full, another process holds the store, …; stored rows stay.
-            InputError: a recipe that cannot be described (`canonical`).
+        Raises `FileError`, for example if the disk is full or another process holds the store, and
+        `InputError` as `canonical`. Earlier rows stay.
         """
         description, row = description_of(recipe), outcome.row
         provenance, text = json.dumps(outcome.provenance), json.dumps(row, allow_nan=False)
@@ -118,13 +113,12 @@ class Store:
     def outdated(self) -> str:
         """How many rows of other versions of the results there are, in words; empty if none."""
         ((count,),) = self._select("count(*)", "WHERE version != ?")
-        if not count:
-            return ""
         rows = "1 row" if count == 1 else f"{count} rows"
-        return f"{self.path} also keeps {rows} of another version of minisim, not used here"
+        told = f"{self.path} also keeps {rows} of another version of minisim, not used here"
+        return told if count else ""
 
     def frame(self) -> pd.DataFrame:
-        """All rows but outdated ones, with the columns of `sweep`, sorted by `ORDER`."""
+        """The rows of this version, with the columns of `sweep`, sorted by `ORDER`."""
         import pandas as pd
 
         rows = [self._row(row) for (row,) in self._select("row", "WHERE version = ?")]

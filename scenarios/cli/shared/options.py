@@ -53,7 +53,7 @@ Order = Annotated[
     str,
     typer.Option(
         metavar="size|lanes",
-        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
+        help="Prefer the largest clique (the paper's text) or the lanes of highest priority "
         "(its published runs).",
     ),
 ]
@@ -81,7 +81,7 @@ Start = Annotated[
 
 
 def processes(jobs: int | None) -> int:
-    """The number of processes that --jobs asks for; one per core if it is not given."""
+    """The number of processes that --jobs asks for, or one per core."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
@@ -115,14 +115,12 @@ def build_scenario(
         return made
     n = made.intersection.n
     recorded = read_arrivals(arrivals, n, start or 0.0)
-    if len(recorded) >= ENOUGH:
-        # At a junction with fewer arms its manoeuvres mean other exits.
-        arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
-        if arms < n:
-            raise InputError(
-                f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from "
-                f"lane {ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-            )
+    arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
+    if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
+        raise InputError(
+            f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from lane "
+            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+        )
     return replace(made, recorded=recorded)
 
 

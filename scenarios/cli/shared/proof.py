@@ -14,7 +14,7 @@ from rich.text import Text
 from minisim.files import check_file
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.movements import ARM_NAMES
-from scenarios.cli.shared.options import build_scenario
+from scenarios.cli.shared.options import build_scenario, option
 from scenarios.cli.shared.terminal import show, show_json
 
 if TYPE_CHECKING:
@@ -35,9 +35,7 @@ def _check_figure(path: Path | None) -> Path | None:
 
 Plot = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE", callback=_check_figure, help="Draw the result (.png, .pdf or .svg)."
-    ),
+    option("Draw the result (.png, .pdf or .svg).", "FILE", callback=_check_figure),
 ]
 
 
@@ -88,13 +86,14 @@ def analysis_text(analysis: Analysis) -> Text:
     """Sizes, ties and the worst cases."""
     from dim.proofs.verification import most_cliques
 
-    sizes = "  ".join(f"{size}: {cases}" for size, cases in analysis.sizes.items())
-    ties = "  ".join(f"{tied}: {cases}" for tied, cases in analysis.ties.items())
-    share = analysis.tied / analysis.cases
+    def counts(cases: Mapping[int, int]) -> str:
+        return "  ".join(f"{key}: {count}" for key, count in cases.items()) + "\n"
+
     text = Text.assemble(
-        ("cases by vehicles that go    ", "dim"), f"{sizes}\n",
-        ("cases by largest cliques     ", "dim"), f"{ties}\n",
-        ("cases with a tie             ", "dim"), f"{analysis.tied} ({share:.0%})\n",
+        ("cases by vehicles that go    ", "dim"), counts(analysis.sizes),
+        ("cases by largest cliques     ", "dim"), counts(analysis.ties),
+        ("cases with a tie             ", "dim"),
+        f"{analysis.tied} ({analysis.tied / analysis.cases:.0%})\n",
         ("worst case                   ", "dim"), f"{analysis.most_tied} cliques tie "
         f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
     )  # fmt: skip
@@ -145,13 +144,18 @@ def harmony_table(matrix: HarmonyMatrix) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)
+
+    def mark(harmony: bool, manoeuvre: int) -> Text:
+        text = f"{'●' if harmony else '·':<{len(str(manoeuvre)) + 2}}"
+        return Text(text, style="green" if harmony else "dim")
+
     for lane in ARM_NAMES[: matrix.n]:
         table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
     for movement, values in zip(matrix.movements, matrix.values, strict=True):
         cells = [Text(str(movement), style="bold")]
         for first in range(0, len(values), matrix.n - 1):
             part = values[first:].tolist()
-            cells.append(Text("").join(map(_mark, part, manoeuvres)))
+            cells.append(Text("").join(map(mark, part, manoeuvres)))
         table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
     return table
 
@@ -181,8 +185,3 @@ def _spaced(things: Iterable[object]) -> str:
 
 def _listed(things: Iterable[object]) -> str:
     return ", ".join(names(things))
-
-
-def _mark(harmony: bool, manoeuvre: int) -> Text:
-    width = len(str(manoeuvre)) + 2
-    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")

@@ -36,10 +36,7 @@ APART = ("side", "turns", "horizon_s", "warmup_s")
 def run_parts(
     summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
 ) -> Iterator[Text | Table]:
-    """What was run, its table, and the metrics with one number per run.
-
-    The counts are from `dim.senses.tally`: the effects of wrong perception.
-    """
+    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run."""
     what = f"{summary['scenario']}, {summary['controller']}"
     yield Text.assemble((what, "bold"), f": {conditions(summary)}")
     yield _run_table(summary, metrics, by)
@@ -81,7 +78,7 @@ def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -
 def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
     """Column of a group of trips -> heading, of metrics with their percentiles or the usual ones.
 
-    Tables have a column for unfinished trips anyway.
+    Unfinished trips have a column in any case.
     """
     columns = {}
     for metric in metrics:
@@ -130,20 +127,15 @@ def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
         parts = (cell[name] for name in ("scenario", "profile", "split", *apart, "density"))
         named = [part if isinstance(part, str) else f"{part:g}" for part in parts]
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
-        if cell["runs"]:
-            collisions = int(cell["collisions"])
-            unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
-            table.add_row(
-                *named,
-                cell["controller"],
-                f"{cell['runs']}{failed}",
-                *(_interval(cell, column) for column in columns),
-                f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
-                Text(str(collisions), style="bold red" if collisions else ""),
-                Text(unsettled, style="yellow"),
-            )
-        else:
-            table.add_row(*named, cell["controller"], f"0{failed}", style="red")
+        named += [cell["controller"], f"{cell['runs']}{failed}"]
+        if not cell["runs"]:
+            table.add_row(*named, style="red")
+            continue
+        means = (_interval(cell, column) for column in columns)
+        unfinished = f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–"
+        collisions = Text(f"{cell['collisions']:.0f}", "bold red" if cell["collisions"] else "")
+        unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
+        table.add_row(*named, *means, unfinished, collisions, Text(unsettled, "yellow"))
     return table
 
 
@@ -160,12 +152,10 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
     failures = rows[rows["error"].notna()]
     if len(failures):
         first = failures.iloc[0]
-        text.append("\n" if text else "").append(
-            f"  {len(failures)} of {len(rows)} runs failed; the first "
-            f"({first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane, seed "
-            f"{first['seed']}): {first['error']}",
-            "red",
-        )
+        what = f"{first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane"
+        told = f"the first ({what}, seed {first['seed']}): {first['error']}"
+        text.append("\n" if text else "")
+        text.append(f"  {len(failures)} of {len(rows)} runs failed; {told}", "red")
     return text
 
 

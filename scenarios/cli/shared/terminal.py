@@ -32,8 +32,7 @@ class Bar:
     """Progress: a bar on a terminal, or else a line now and then."""
 
     def __init__(self, label: str, progress: Progress | None) -> None:
-        self._label = label
-        self._progress = progress
+        self._label, self._progress = label, progress
         self._task = progress.add_task(label, total=None) if progress else None
         self._said = time.monotonic()
 
