@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import os
 import signal
@@ -115,11 +114,9 @@ def test_run_json_is_the_summary_and_safety(capsys: Captured) -> None:
     printed = answer(capsys, "run", "four-way", *SHORT, "--seed", "3")
     run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
     assert set(printed) >= RUN_KEYS
-    safety = {name: printed.pop(name) for name in SAFETY}
+    assert all(printed.pop(name) > 0 for name in SAFETY)
     assert printed == run.summary()
     assert set(printed["lanes"]) == set("abcd")
-    assert safety["min_ttc_s"] > 0
-    assert safety["min_pet_s"] > 0
 
 
 def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
@@ -128,8 +125,8 @@ def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
     served = [int(rows[lane][0]) for lane in "abcde"]
     assert int(rows["all"][0]) == sum(served)
     assert rows["collisions"][0] == "0"
-    for word in ("waiting [s]", "travel [s]", "departure delay [s]", "minimum TTC", "minimum PET"):
-        assert word in out
+    heads = ("waiting [s]", "travel [s]", "departure delay [s]", "minimum TTC", "minimum PET")
+    assert all(word in out for word in heads)
 
 
 def test_run_tells_humans_from_the_others(capsys: Captured) -> None:
@@ -165,9 +162,8 @@ def test_run_writes_trips_trajectories_and_fcd(capsys: Captured, tmp_path: Path)
         "--trajectories", str(table), "--fcd", str(fcd),
     )  # fmt: skip
     assert plain == full, "what is written changes no result"
-    with trips.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == TRIP_COLUMNS
+    rows = pd.read_csv(trips)
+    assert tuple(rows) == TRIP_COLUMNS
     assert len(rows) == json.loads(full)["trips"]
     assert pd.read_parquet(table)["time_s"].max() == pytest.approx(240.0)
     assert ET.parse(fcd).getroot().tag == "fcd-export"
@@ -193,18 +189,16 @@ def test_split_turns_and_side_reach_the_scenario(capsys: Captured) -> None:
 def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: Path) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
-    said = fails(capsys, *arguments, code=1)
-    assert "touched" in said
-    assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
+    advice = f"{trips} not written; --on-collision record notes collisions and goes on"
+    assert advice in fails(capsys, *arguments, code=1)
     assert list(tmp_path.iterdir()) == []
     assert main([*arguments, "--json"]) == 1
     printed = capsys.readouterr()
     facts = json.loads(printed.out)
     assert (facts["controller"], facts["seed"], facts["collisions"]) == ("unregulated", 0, 1)
     assert len(facts["touched"][0]["vehicles"]) == 2
-    assert f"minisim: {facts['error']}; {trips} not written" in printed.err
-    out = ok(capsys, *arguments, "--on-collision", "record")
-    assert " touched" in out
+    assert f"minisim: {facts['error']}; {advice}" in printed.err
+    assert " touched" in ok(capsys, *arguments, "--on-collision", "record")
     assert trips.exists()
 
 
@@ -235,8 +229,7 @@ def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     expected = [means[f"time_loss_s{what}"] for what in ("", "_p50", "_p95", "_max")]
     shown = [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
     assert lines_of(out)["a1"][2:] == shown
-    for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"):
-        assert word in out
+    assert all(word in out for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"))
 
 
 def test_each_number_is_printed_once(capsys: Captured) -> None:
@@ -297,8 +290,7 @@ def test_metrics_of_your_own(capsys: Captured, here: Path) -> None:
     asked = 'metrics = ["own_metrics:delay", "own_metrics:twice"]\n'
     (here / "e.toml").write_text(f"horizon = 60\nseeds = 2\n{asked}")
     out = ok(capsys, "sweep", "e.toml", "--out", "s.db", "--jobs", "2")
-    for word in ("delay [s]", "p95", "twice"):
-        assert word in out
+    assert all(word in out for word in ("delay [s]", "p95", "twice"))
     del sys.modules["own_metrics"]
 
 
@@ -332,11 +324,10 @@ def test_harmony_of_twelve_arms_is_not_cut(capsys: Captured) -> None:
 
 
 def test_clearance_only_removes_harmony(capsys: Captured) -> None:
-    def pairs(clearance: str) -> int:
-        printed = answer(capsys, "harmony", "five-way", "--clearance", clearance)
-        return sum(map(sum, printed["harmony"]))
-
-    assert pairs("0") >= pairs("0.5") > pairs("3")
+    harmony = ("harmony", "five-way", "--clearance")
+    found = [answer(capsys, *harmony, clearance)["harmony"] for clearance in ("0", "0.5", "3")]
+    none, usual, wide = (sum(map(sum, values)) for values in found)
+    assert none >= usual > wide
 
 
 def test_decide_answers_as_the_paper(capsys: Captured) -> None:
@@ -410,12 +401,6 @@ def test_a_film_shows_the_run_of_the_same_options(
         pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
 
 
-def test_a_film_lies_within_the_run(capsys: Captured, tmp_path: Path) -> None:
-    film = ("animate", "four-way", "-o", str(tmp_path / "film.gif"), "--from", "280")
-    assert "--seconds must be" in fails(capsys, *film, "--horizon", "300")
-    assert "--from [s] must be" in fails(capsys, *film, "--horizon", "200")
-
-
 def test_animate_checks_before_it_simulates(
     capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -424,7 +409,8 @@ def test_animate_checks_before_it_simulates(
     for file, more, said in (
         ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
-        ("f.gif", ("--from", "1e300"), "--from"), ("f.gif", ("--seconds", "1e300"), "seconds"),
+        ("f.gif", ("--from", "280", "--horizon", "300"), "--seconds must be"),
+        ("f.gif", ("--from", "280", "--horizon", "200"), "--from [s] must be"),
     ):  # fmt: skip
         assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
     recorded = tmp_path / "f.gif"
@@ -438,12 +424,12 @@ def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
+    assert "DIM, paper's gate" in out
     points = pd.read_csv(folder / "demo.csv")
     assert {*points["controller"]} == {"dim", "dim:gate=harmonious", "fixed-time"}
     assert {*points["density"]} == {150.0, 350.0}
     assert (points["waiting_time_s_ci95"] > 0).all()
     assert (points["collisions"] == 0).all()
-    assert "DIM, paper's gate" in out
     assert (folder / "demo.md").read_text().count("\n|") == 2 + len(points)
     with Image.open(folder / "demo.gif") as film:
         assert film.n_frames == 100
@@ -481,7 +467,6 @@ BAD = [
     (("run", "four-way", "--trips", "trips.csv", "--fcd", "none/fcd.xml"), "no folder"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
-    (("decide", "four-way"), "MOVEMENTS"),
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
@@ -516,7 +501,6 @@ BAD = [
     (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
     (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
-    (("sweep",), "Missing argument"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),
     (("figures", "webster", "--store", "runs.sqlite"), "there is no store"),
@@ -572,15 +556,8 @@ def test_ctrl_c_is_130(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> Non
     assert capsys.readouterr().err == "minisim: interrupted\n"
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
-    command = "from scenarios.cli import main; raise SystemExit(main(['harmony', 'four-way']))"
-    with subprocess.Popen(
-        [sys.executable, "-c", command], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.close()
-        assert process.stderr.read() == b""
+def test_a_reader_that_goes_away_is_not_an_error() -> None:
+    assert shell("minisim harmony four-way | true").stderr == ""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
@@ -596,7 +573,7 @@ def test_a_full_disk_is_one_line(command: str) -> None:
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
-def test_closed_streams_are_no_error(closed: str) -> None:
+def test_closed_streams_are_not_an_error(closed: str) -> None:
     for command in ("harmony three-way --csv", "--help"):
         done = shell(f"minisim {command} {closed}")
         assert (done.returncode, done.stderr) == (0, "")
@@ -606,18 +583,17 @@ def test_closed_streams_are_no_error(closed: str) -> None:
 def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
     table = shell("minisim harmony three-way", **plain)
-    assert (table.returncode, table.stderr) == (0, "")
-    assert "x harmony, . conflict" in table.stdout
     decision = shell("minisim decide four-way a1 b2", PYTHONIOENCODING="ascii")
-    assert (decision.returncode, decision.stderr) == (0, "")
-    assert "a1-b2" in decision.stdout
+    for done, words in ((table, "x harmony, . conflict"), (decision, "a1-b2")):
+        assert (done.returncode, done.stderr) == (0, "")
+        assert words in done.stdout
 
 
 def test_verify_tells_what_all_cases_showed_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "verify", "four-way")
-    assert "four-way, 4 arms: all 255 cases, order size" in text
-    assert "130 (51%)" in text
-    assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
+    tie = "4 cliques tie (no graph of 4 nodes has more than 4)"
+    for words in ("four-way, 4 arms: all 255 cases, order size", "130 (51%)", tie):
+        assert words in text
     printed = answer(capsys, "verify", "three-way")
     assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
     assert all(claim["holds"] for claim in printed["claims"])
@@ -635,11 +611,10 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
 
 def test_protocol_tells_what_it_visited_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "protocol", "three-way", "--order", "lanes")
-    assert "872, with 3259 transitions\n" in text
-    assert "safe         yes" in text
-    assert "live         yes" in text
-    assert "lane a       never starves" in text
-    assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
+    cycle = "lane c       starves: arrive a1, arrive c2; then again and again commit a1,"
+    sizes = "872, with 3259 transitions\n"
+    for words in (sizes, "safe         yes", "live         yes", "a       never starves", cycle):
+        assert words in text
     rules = ("--order", "lanes", "--priorities", "waiting")
     printed = answer(capsys, "protocol", "three-way", *rules)
     assert printed["all_states"] is True

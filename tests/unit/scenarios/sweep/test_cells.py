@@ -50,9 +50,6 @@ def test_real_runs(scenario: Scenario, controller: str, expected: str) -> None:
         assert cell[word] is (word == expected)
 
 
-# --- cells -----------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def rows() -> pd.DataFrame:
     todo = [
@@ -198,9 +195,6 @@ def test_a_metric_that_fails_is_a_failed_run(of: Callable[[Run], Any], message: 
     assert error.startswith(message)
 
 
-# --- experiments -----------------------------------------------------------------------------
-
-
 def test_equal_numbers_are_one_experiment() -> None:
     assert key_of(Recipe(four_way(350), Dim())) == key_of(Recipe(four_way(350.0), Dim()))
     assert canonical(2**60 + 1) != canonical(2**60)
@@ -241,9 +235,6 @@ def test_changed_results_need_another_version(
     assert RESULTS == 5
 
 
-# --- growing queues -------------------------------------------------------------------------
-
-
 def quiet(trips: int) -> dict[str, int]:
     """Columns of three lanes with so many trips each, and no queue."""
     lanes = {f"lanes_{k}_{key}": 0 for k in "abc" for key in ("trips", "queue_growth")}
@@ -273,9 +264,6 @@ def test_saturated_sums_over_runs_and_lanes() -> None:
     assert saturated(pd.DataFrame([one, one]))
     lane = {**one, "queue_growth": 0.0, "lanes_c_queue_growth": 0.9 * limit}
     assert saturated(pd.DataFrame([lane])), "1/√3 of the junction's limit is a lane's"
-
-
-# --- what must not be pooled -----------------------------------------------------------------
 
 
 def refused(todo: Sequence[Recipe], first: str, second: str, told: str) -> None:

@@ -49,9 +49,7 @@ def test_a_row_comes_back_as_it_was(tmp_path: Path, outcome: Outcome) -> None:
 def test_the_file_tells_how_to_run_it_again(tmp_path: Path, outcome: Outcome) -> None:
     with Store(tmp_path / "s.db") as store:
         store.put(recipe_of(), outcome)
-    database = sqlite3.connect(tmp_path / "s.db")
-    description, provenance = database.execute("SELECT experiment, provenance FROM runs").fetchone()
-    database.close()
+        ((description, provenance),) = store._select("experiment, provenance", "")
     recipe = json.loads(description)
     assert recipe["scenario"]["demand"]["density"] == 200.0
     assert recipe["controller"]["class"] == "dim.controller.Dim"
@@ -69,27 +67,20 @@ def test_only_what_is_missing_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr("scenarios.sweep.runner.outcome_of", watched)
     with Store(tmp_path / "s.db") as store:
-        first = sweep([recipe_of(1), recipe_of(2)], jobs=1, store=store)
-        again = sweep([recipe_of(1), recipe_of(2)], jobs=1, store=store)
+        first = sweep([recipe_of(2), recipe_of(1)], jobs=1, store=store)
+        again = sweep([recipe_of(2), recipe_of(1)], jobs=1, store=store)
         pd.testing.assert_frame_equal(first, again)
-        assert ran == [1, 2]
+        assert ran == [2, 1]
+        assert store.frame()["seed"].tolist() == [1, 2], "by what was run"
         store.put(recipe_of(2), failed(recipe_of(2), MemoryError()))
         sweep([recipe_of(1), recipe_of(2), recipe_of(3)], jobs=1, store=store)
-        assert ran == [1, 2, 2, 3], "what failed, and what is new"
+        assert ran == [2, 1, 2, 3], "what failed, and what is new"
         monkeypatch.setattr(keys, "RESULTS", keys.RESULTS + 1)
         sweep([recipe_of(1)], jobs=1, store=store)
-        assert ran == [1, 2, 2, 3, 1], "what another version computed"
+        assert ran == [2, 1, 2, 3, 1], "what another version computed"
         assert len(store) == 3
         assert store.frame()["seed"].tolist() == [1]
         assert "also keeps 2 rows of another version of minisim, not used" in store.outdated
-
-
-def test_order_is_by_what_was_run(tmp_path: Path, outcome: Outcome) -> None:
-    with Store(tmp_path / "s.db") as store:
-        for seed in (3, 1, 2):
-            row = {**outcome.row, "seed": seed}
-            store.put(recipe_of(seed), Outcome(row, outcome.provenance))
-        assert store.frame()["seed"].tolist() == [1, 2, 3]
 
 
 def run_sql(path: Path, script: str) -> None:

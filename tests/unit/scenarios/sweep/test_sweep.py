@@ -51,7 +51,9 @@ def recipes() -> list[Recipe]:
 
 
 def test_rows_are_the_flat_summaries_in_order() -> None:
-    rows = sweep(recipes(), ThreadPoolExecutor(1))
+    calls: list[tuple[int, int]] = []
+    rows = sweep(recipes(), ThreadPoolExecutor(1), lambda *counts: calls.append(counts))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert list(rows["scenario"]) == ["three-way", "three-way", "four-way", "four-way"]
     assert list(rows["seed"]) == [1, 2, 1, 2]
     summary = minisim.simulate(four_way(300, horizon=120), Dim(), seed=2).summary()
@@ -92,12 +94,6 @@ def test_a_failed_run_is_a_row() -> None:
     assert rows["error"].isna().tolist() == [False, False, True]
     assert rows["density"].tolist() == [300.0] * 3
     assert math.isnan(rows["trips"][0])
-
-
-def test_progress_counts_every_run() -> None:
-    calls: list[tuple[int, int]] = []
-    sweep(recipes(), ThreadPoolExecutor(1), lambda done, total: calls.append((done, total)))
-    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_interrupt_cancels_what_has_not_begun() -> None:

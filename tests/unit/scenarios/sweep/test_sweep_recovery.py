@@ -35,23 +35,18 @@ def quick(count: int) -> list[Recipe]:
     return [Recipe(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
 
 
-def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
-    once = Recipe(EMPTY, Deadly(str(tmp_path / "killed")))
-    todo = [*quick(3), once, *quick(6)[3:]]
-    rows = sweep(todo, jobs=2)
-    assert (tmp_path / "killed").exists()
-    assert rows["error"].isna().all()
-    pd.testing.assert_frame_equal(repeatable(rows), repeatable(sweep(todo, jobs=1)))
-
-
-def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
-    todo = [*quick(6)[:2], Recipe(EMPTY, Deadly()), *quick(6)[2:]]
+def test_only_the_run_that_kills_its_worker_every_time_fails(tmp_path: Path) -> None:
+    once, always = (Recipe(EMPTY, Deadly(name)) for name in (str(tmp_path / "killed"), ""))
+    good = [*quick(3), once, *quick(6)[3:]]
     with Store(tmp_path / "s.db") as store:
-        rows = sweep(todo, jobs=2, store=store)
-        assert len(store) == 7
-    assert rows["error"].isna().tolist() == [True, True, False, True, True, True, True]
-    assert rows["error"][2].startswith("BrokenProcessPool: ")
-    assert rows["controller"][2] == "deadly"
+        rows = sweep([*good, always], jobs=2, store=store)
+        assert len(store) == 8
+    assert (tmp_path / "killed").exists()
+    assert rows["error"].isna().tolist() == [True] * 7 + [False]
+    assert rows["error"][7].startswith("BrokenProcessPool: ")
+    assert rows["controller"][7] == "deadly"
+    alone = repeatable(sweep(good, jobs=1))
+    pd.testing.assert_frame_equal(repeatable(rows[:7]), alone, check_dtype=False)
 
 
 def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
