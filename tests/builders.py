@@ -34,6 +34,7 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
@@ -44,6 +45,7 @@ from scenarios.paper import Cell, reference_rows
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import identity_of
+from scenarios.sweep.store import Store
 from tests import ROOT
 
 
@@ -359,3 +361,13 @@ def python(
         [sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
     )  # fmt: skip
+
+
+def stored(path: Path) -> int:
+    """The number of rows in a store, even while a process makes it."""
+    try:
+        with Store(path, create=False) as store:
+            return len(store)
+    except FileError:
+        assert not path.exists() or not path.stat().st_size, "never a broken store"
+        return 0

@@ -63,8 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(told, 1 if isinstance(error, CollisionError) else 2)
     except _USAGE_ERROR as error:
         message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
-        help_of = [name for name in given[:1] if name in COMMANDS]
-        see = shlex.join(["minisim", *help_of, "--help"])
+        command = [name for name in given[:1] if name in COMMANDS]
+        see = shlex.join(["minisim", *command, "--help"])
         return _fail(f"{message} (typed: {shlex.join(given)}; see {see})")
     except (KeyboardInterrupt, typer.Abort):
         code = 130

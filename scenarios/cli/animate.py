@@ -15,8 +15,7 @@ from scenarios.cli.shared.terminal import bar
 
 
 @app.command(
-    epilog="[bold]Examples[/bold]\n\n"
-    "minisim animate four-way -c dim -d 350 -o dim.gif\n\n"
+    epilog="[bold]Example[/bold]\n\n"
     "minisim animate five-way -c fixed-time -d 300 --from 600 --seconds 120 -o signal.html"
 )
 def animate(

@@ -12,9 +12,7 @@ from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, na
 
 
 @app.command(
-    epilog="[bold]Examples[/bold]\n\n"
-    "minisim decide four-way a1 b2 c2 d2\n\n"
-    "minisim decide five-way a1 b3 c4 d2 e1 --plot decision.png"
+    epilog="[bold]Example[/bold]\n\nminisim decide five-way a1 b3 c4 d2 e1 --plot decision.png"
 )
 def decide(
     scenario: options.ScenarioName,

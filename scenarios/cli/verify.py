@@ -12,9 +12,7 @@ from scenarios.cli.shared.terminal import bar
 
 @app.command(
     epilog="Exit code 1 if a claim is false. 6 arms take about 20 s.\n\n"
-    "[bold]Examples[/bold]\n\n"
-    "minisim verify four-way\n\n"
-    "minisim verify five-way --order lanes --plot verification.png"
+    "[bold]Example[/bold]\n\nminisim verify five-way --order lanes --plot verification.png"
 )
 def verify(
     scenario: options.ScenarioName,

@@ -118,10 +118,8 @@ def pairs(
 
     Runs are paired by seed, so that the variation of the arrivals cancels. A difference is the
     first controller's value less the second's; failed runs and missing values are left out.
-    `column`, such as "controller", has the names, and the columns `by` name a cell.
-
-    Raises:
-        InputError: two runs of one seed whose arrivals differ, or two of one controller and seed.
+    `column`, such as "controller", has the names, and the columns `by` name a cell. Raises
+    `InputError` if arrivals of one seed differ, or a controller has two runs of one seed.
     """
     good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
     one, other = (good[good[column] == name] for name in names)

@@ -118,10 +118,7 @@ def _until_given_up(pool: Executor) -> Iterator[Executor]:
 
 
 def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-    """Hand one task over, with Ctrl-C delayed and hidden from new processes.
-
-    Raises `BrokenExecutor`.
-    """
+    """Hand one task over; Ctrl-C is delayed, and hidden from processes that start meanwhile."""
     whole = partial(_ending, function)
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         return executor.submit(whole, task)

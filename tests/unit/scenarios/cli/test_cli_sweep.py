@@ -20,6 +20,7 @@ from scenarios.studies.shared.effort import Effort
 from scenarios.sweep import keys
 from scenarios.sweep.store import Store
 from tests import ROOT
+from tests.builders import stored
 from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
@@ -140,13 +141,9 @@ def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + 60
-    kept = 0
-    while not kept:
+    while not stored(path):
         assert time.monotonic() < deadline
         time.sleep(0.05)
-        if path.exists() and path.stat().st_size:
-            with Store(path) as store:
-                kept = len(store)
     process.send_signal(number)
     out, error = process.communicate(timeout=30)
     assert (process.returncode, out) == (code, "")

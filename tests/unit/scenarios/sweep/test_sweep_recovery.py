@@ -15,7 +15,6 @@ import pandas as pd
 import pytest
 
 from dim import Dim
-from minisim.errors import FileError
 from scenarios import three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
@@ -24,7 +23,7 @@ from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
 from scenarios.sweep.store import Store
 from tests import ROOT
-from tests.builders import Deadly, killing, python, repeatable
+from tests.builders import Deadly, killing, python, repeatable, stored
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
 
@@ -115,15 +114,6 @@ def sweep_of(folder: Path, jobs: int, seeds: int, horizon: int) -> tuple[list[st
     )
     run = [sys.executable, "-m", "minisim", "sweep", str(file), "--out", str(store)]
     return [*run, "--jobs", str(jobs)], file, store
-
-
-def stored(path: Path) -> int:
-    try:
-        with Store(path, create=False) as store:
-            return len(store)
-    except FileError:
-        assert not path.exists() or not path.stat().st_size, "never a broken store"
-        return 0
 
 
 def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, horizon: int) -> None:
