@@ -44,10 +44,7 @@ def key_of(recipe: Recipe) -> str:
 
 
 def content_of(recipe: Recipe) -> str | None:
-    """A digest of what runs, whatever its label; None if it cannot be described.
-
-    It is equal for runs that differ only in their seed and their recorded arrivals.
-    """
+    """A digest of all but label, seed and recorded arrivals; None if it cannot be described."""
     scenario = replace(recipe.scenario, recorded=None)
     try:
         return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]

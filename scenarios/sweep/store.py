@@ -59,8 +59,8 @@ _MAGIC = b"SQLite format 3\0"
 class Store:
     """Rows in a file; close it, or use it in a `with` statement.
 
-    `create` says whether to make the file if there is none. Raises `FileError` if it is missing, not
-    a store, of another layout or damaged; the file stays as it was.
+    `create` makes the file if there is none. Raises `FileError` if it is missing, not a store, of
+    another layout or damaged; the file stays as it was.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, create: bool = True) -> None:

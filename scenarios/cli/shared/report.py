@@ -160,7 +160,7 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
 
 
 def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
-    """A line for each signal whose demand exceeds Webster's capacity."""
+    """A line for each signal with a demand over Webster's capacity."""
     from baselines import FixedTime
 
     return dict.fromkeys(
