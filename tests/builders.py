@@ -7,6 +7,8 @@ import hashlib
 import math
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +34,7 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
@@ -42,6 +45,8 @@ from scenarios.paper import Cell, reference_rows
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import identity_of
+from scenarios.sweep.store import Store
+from tests import ROOT
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -346,3 +351,23 @@ def share(part: float) -> settings:
 def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
     """One published mean [s]."""
     return float(reference_rows(cell, metric, lane)["value"].item())
+
+
+def python(
+    *arguments: str, cwd: Path = ROOT, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with the project's code in a process of its own, and wait for it."""
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+    )  # fmt: skip
+
+
+def stored(path: Path) -> int:
+    """The number of rows in a store, even while a process makes it."""
+    try:
+        with Store(path, create=False) as store:
+            return len(store)
+    except FileError:
+        assert not path.exists() or not path.stat().st_size, "never a broken store"
+        return 0

@@ -131,7 +131,7 @@ def test_other_processes_find_it() -> None:
 def test_a_sweep_says_what_a_plain_class_lacks() -> None:
     recipe = Recipe(four_way(), "own_mine:Plain(k=3)")  # type: ignore[arg-type]
     with pytest.raises(
-        InputError, match=r"Plain is no dataclass.*make it a frozen dataclass"
+        InputError, match=r"Plain is not a dataclass.*make it a frozen dataclass"
     ) as it:
         key_of(recipe)
     assert "0x" not in str(it.value)
