@@ -1,16 +1,12 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
-movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.names` and
-`minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
-numbers), and `minisim.laws` with `minisim.carfollowing` and `minisim.jit` (how vehicles move, for
-prediction). None of these imports the engine, the hosts or the results; `make lint` checks this.
+Controllers import this module and others that lead to no engine, host or result, such as
+`minisim.junction`, `minisim.vehicle`, `minisim.parameters` and `minisim.laws`; `make lint` checks.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
 The host then advances alone until one of the plan's wake-ups, shows the session a `View`, and
-carries out the commands that the session returns. No session is called every step unless its plan
-has a period.
+carries out the commands that the session returns. Only a plan with a period wakes it regularly.
 """
 
 from __future__ import annotations
@@ -28,13 +24,13 @@ from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
 from minisim.vehicle import MODELS, VehicleType
 
-#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
-#: `--junctions.limit-turn-speed`, so that turn speeds are comparable with SUMO's.
+#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default of
+#: `--junctions.limit-turn-speed`, for turn speeds like SUMO's.
 LATERAL_ACCELERATION = 5.5
 
-#: A vehicle counts as able to stop only with this distance to spare [m]. A held vehicle keeps more
-#: before its line (`minisim.engine.state.STOP_MARGIN`), so one braking for the junction entry is
-#: never committed. The margin exceeds rounding errors, so a vehicle that can stop always does.
+#: A vehicle counts as able to stop only with this distance to spare [m]. It exceeds rounding errors,
+#: and a held vehicle keeps more before its line (`minisim.laws.STOP_MARGIN`), so one that brakes
+#: for the junction entry never counts as unable to stop.
 COMMIT_MARGIN = 0.1
 
 #: A vehicle no faster than this stands or waits [m/s]: SUMO's `SUMO_const_haltingSpeed`.
@@ -56,9 +52,8 @@ class Site:
 
     def __post_init__(self) -> None:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
-            raise InputError(
-                f"demand must be {self.intersection.n} numbers ≥ 0 [veh/h], got {self.demand}"
-            )
+            wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
+            raise InputError(f"demand must be {wanted}, got {self.demand}")
         if entry_room(self.intersection, self.vehicle) <= 0.0:
             raise InputError(
                 f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
@@ -68,36 +63,24 @@ class Site:
 
     @cached_property
     def conflicts(self) -> Bools:
-        """Whether two movements from different arms must not be driven at once, shape (m, m).
-
-        Movements from one arm share their lane: one follows the other, which is no conflict here.
-        """
+        """Whether two movements from different arms must not be driven at once, shape (m, m)."""
         return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
 
 
 class Observed(NamedTuple):
     """One vehicle in a view.
 
-    Attributes:
-        id: of the vehicle; the same in every view of a run.
-        lane: index of its approach lane.
-        manoeuvre: 1 … n−1.
-        distance: from its front bumper to the junction entry [m]; negative inside.
-        speed: [m/s].
-        length: [m].
-        demand_time: when it wanted to enter the road [s].
-        rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
-            rank: its id depends on the arrivals on other lanes.
+    Draw what chance makes of a vehicle by its lane and rank: its id depends on other lanes.
     """
 
-    id: int
-    lane: int
-    manoeuvre: int
-    distance: float
-    speed: float
-    length: float
-    demand_time: float = 0.0
-    rank: int = 0
+    id: int  # the same in every view of a run
+    lane: int  # index of its approach lane
+    manoeuvre: int  # 1 … n−1
+    distance: float  # from its front bumper to the junction entry [m]; negative inside
+    speed: float  # [m/s]
+    length: float  # [m]
+    demand_time: float = 0.0  # when it wanted to enter the road [s]
+    rank: int = 0  # its place among the vehicles of its lane, from 0
 
     @property
     def movement(self) -> Movement:
@@ -113,26 +96,22 @@ def stopping_distance(speed: float, deceleration: float) -> float:
 def can_stop(vehicle: Observed, deceleration: float) -> bool:
     """Whether comfortable braking still stops the vehicle before the junction.
 
-    Position and speed alone decide it, so every observer comes to the same answer.
+    Only position and speed count, so every observer comes to the same answer.
     """
-    needed = stopping_distance(vehicle.speed, deceleration)
-    return needed + COMMIT_MARGIN <= vehicle.distance or (
-        vehicle.speed == 0.0 and vehicle.distance >= 0.0
-    )
+    stands = vehicle.speed == 0.0 and vehicle.distance >= 0.0
+    needed = stopping_distance(vehicle.speed, deceleration) + COMMIT_MARGIN
+    return stands or needed <= vehicle.distance
 
 
 class View(NamedTuple):
     """What the session is shown at a wake-up.
 
-    Attributes:
-        time: [s].
-        vehicles: every vehicle from `Plan.sight` before the junction until its rear bumper has
-            left it (and its front is `Plan.reach` past the entry); ordered by lane, then front to
-            back (vehicles inside the junction first).
+    It has every vehicle from `Plan.sight` before the junction until its rear bumper has left it
+    and its front is `Plan.reach` past the entry.
     """
 
-    time: float
-    vehicles: tuple[Observed, ...]
+    time: float  # [s]
+    vehicles: tuple[Observed, ...]  # by lane, then front to back
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +125,8 @@ class Go:
 class Hold:
     """Take away one vehicle's right of way: it stops at its hold line.
 
-    If comfortable braking can no longer stop it at the hold line, it stops before the junction if
-    its brakes can; inside the junction, a hold has no effect.
+    If it is too late for comfortable braking, the vehicle stops before the junction if its brakes
+    can; inside the junction, a hold has no effect.
     """
 
     vehicle: int
@@ -179,9 +158,8 @@ class Advise:
 class Brake:
     """Make one vehicle brake at `deceleration` [m/s²] or harder until told otherwise; 0 lifts this.
 
-    It acts everywhere, even inside the junction, and never exceeds what the brakes can do. A
-    standing vehicle stays put. The command ends when the vehicle leaves the view for good, since no
-    session could lift it after that.
+    It acts everywhere, even inside the junction, within what the brakes can do. A standing vehicle
+    stays put. It ends when the vehicle leaves the view for good: no session could lift it then.
     """
 
     vehicle: int
@@ -290,7 +268,7 @@ class Kinds(Session, Protocol):
 
 @dataclass(frozen=True)
 class Cover:
-    """The vehicles with which a controller promises: none collides, and each is served.
+    """The vehicles for which a controller promises that none collides and each is served.
 
     Attributes:
         laws: names of their car-following models (`minisim.vehicle.MODELS`).
@@ -316,7 +294,7 @@ class Cover:
             )
 
 
-#: What a controller covers that says nothing else, and what one does that may collide.
+#: What a controller covers by default, and what one that may collide covers.
 ORDINARY, NOTHING = Cover(), Cover(laws=())
 
 
@@ -330,8 +308,8 @@ def cover_of(controller: object) -> Cover:
 class Controller(Protocol):
     """A recipe for sessions: hashable, picklable, never changed by a run.
 
-    It promises that no vehicles collide and each is served wherever it starts, if the vehicles are
-    `ORDINARY`. One that promises less or more says so by an attribute `covers`, a `Cover`.
+    It promises that no `ORDINARY` vehicles collide and that each is served. A controller that
+    promises less or more has an attribute `covers`, a `Cover`.
     """
 
     @property
@@ -356,10 +334,7 @@ def as_controller(what: str, value: object) -> Controller:
 
 @dataclass(frozen=True)
 class Unregulated:
-    """All vehicles go at once: what happens without any rule.
-
-    For tests of the host and for teaching. It collides as soon as there is cross traffic.
-    """
+    """All vehicles go at once, for tests of the host and for teaching: cross traffic collides."""
 
     name = Name("unregulated")
     covers = NOTHING

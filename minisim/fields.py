@@ -1,4 +1,4 @@
-"""The fields of recipes: what a parameter is, and a function for each kind of it."""
+"""What a parameter of a recipe is, and a function to declare each kind of parameter."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from minisim.errors import (
     instance,
     integer,
     kind_word,
+    limits,
     number,
     numbers,
     printable,
@@ -24,8 +25,8 @@ from minisim.errors import (
 )
 from minisim.spelling import read
 
-#: Returns the value of a field, perhaps in another form, or raises `InputError`. Its arguments are
-#: what messages call the field, and the field's value.
+#: Returns a field's value, perhaps in another form, or raises `InputError`. It takes what messages
+#: call the field, and the value.
 Check = Callable[[str, Any], Any]
 
 KEY = "parameter"
@@ -47,7 +48,7 @@ class Parameter:
         label: what messages call it; if empty, the name of the field.
         optional: whether None is allowed too.
         words: the words allowed, for a field that takes one of several.
-        kinds: word -> what makes the value of that name, for a field that holds another recipe.
+        kinds: word -> what makes the recipe of that name, for a field that holds another recipe.
     """
 
     meaning: str
@@ -204,11 +205,8 @@ def _field(
         none = value is None or (isinstance(value, str) and value.lower() == "none")
         return None if none else check(title, value)
 
-    if optional:
-        allowed = f"{allowed} | none"
-    it = Parameter(
-        meaning, unit, allowed, unless_none if optional else check, label, optional, words, kinds
-    )
+    said, tested = (f"{allowed} | none", unless_none) if optional else (allowed, check)
+    it = Parameter(meaning, unit, said, tested, label, optional, words, kinds)
     return dataclasses.field(default=default, default_factory=default_factory, metadata={KEY: it})
 
 
@@ -223,12 +221,6 @@ def _unchanged(test: Callable[[str, Any], object]) -> Check:
 
 
 def _range(low: float, high: float, above: float = -math.inf, below: float = math.inf) -> str:
-    least = f"≥ {low:g}" if math.isfinite(low) else ""
-    most = f"≤ {high:g}" if math.isfinite(high) else ""
-    if math.isfinite(above) and above >= low:
-        least = f"> {above:g}"
-    if math.isfinite(below) and below <= high:
-        most = f"< {below:g}"
-    if least.startswith("≥") and most.startswith("≤"):
+    if above < low > -math.inf and below > high < math.inf:
         return f"{low:g} … {high:g}"
-    return ", ".join(filter(None, (least, most))) or "number"
+    return ", ".join(limits(low, high, above, below, ("≥", "≤", ">", "<"))) or "number"

@@ -55,7 +55,7 @@ NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
 )  # fmt: skip
 
-#: Commands grouped by what they address. Building a union of types at each check would be slow.
+#: Commands by what they address. Building a union of types at each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
@@ -63,7 +63,7 @@ AFTERMATH = 2.0
 
 
 class Alarm:
-    """When the clock wakes a session: periodically, as its plan says, and once whenever it asks."""
+    """When the clock wakes a session: by the period of its plan, and once whenever it asks."""
 
     def __init__(self, period: float | None, dt: float) -> None:
         self._dt = dt
@@ -109,15 +109,14 @@ class Hosted:
         """Show the session its view at `tick` and return its commands.
 
         Raises:
-            ControllerError: the session raised an error of its own, which it names with file and
-                line, or answered with something that cannot be carried out.
+            ControllerError: the session raised an error, named with its file and line, or its
+                answer cannot be carried out.
         """
         try:
             answer = self.session.decide(view)
             if not isinstance(answer, Iterable):
-                raise InputError(
-                    f"decide() must return commands, such as [Go(3)] or [], got {show(answer)}"
-                )
+                wanted = "commands, such as [Go(3)] or []"
+                raise InputError(f"decide() must return {wanted}, got {show(answer)}")
             commands = list(answer)
             if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
                 self.before.update(self.session.counts)
@@ -141,11 +140,9 @@ class Hosted:
         try:
             counts = dict(session.counts) if isinstance(session, Counting) else {}
             counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
-            kinds = (
-                tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
-                if isinstance(session, Kinds)
-                else ()
-            )
+            kinds: tuple[str, ...] = ()
+            if isinstance(session, Kinds):
+                kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
         except Exception as error:
             raise _blamed(self.controller, error, session) from error
         return Run(
@@ -174,10 +171,8 @@ def begin(
 ) -> Hosted:
     """Check the arguments, draw the arrivals and start the controller's session.
 
-    Raises:
-        InputError: an argument is not allowed (`reactions` are those to a collision), or the
-            controller cannot serve the scenario.
-        ControllerError: as `start`.
+    Raises what `start` raises, and `InputError` for an argument that is not allowed; `reactions`
+    are the possible values of `on_collision`.
     """
     if record is not None:
         choice("record", record, RECORDS)
@@ -200,7 +195,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
 
     Raises:
         InputError: the controller cannot serve the site.
-        ControllerError: it raised another error, returned no session, or has a plan with a period
+        ControllerError: it raised another error, returned no session, or its plan has a period
             below the step or a distance beyond the approach lanes.
     """
     try:
@@ -222,7 +217,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
         marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
         marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}
-        # The default sight is no wish, so a road may be shorter.
+        # The road may be shorter than the default sight, which no one has asked for.
         marks |= {"sight": plan.sight if plan.sight != Plan.sight else 0.0}
         for name, distance in marks.items():
             number(f"{name} [m] of the plan, on these roads,", distance, high=road)
@@ -234,7 +229,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
 def _blamed(
     controller: Controller, error: Exception, code: object, when: str = ""
 ) -> ControllerError:
-    """What to raise for an error of a controller's own code: where it arose, and what it was."""
+    """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):
         raise error
     module = sys.modules.get(type(code).__module__)

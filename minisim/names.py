@@ -1,4 +1,4 @@
-"""Names of recipes: what rows, figures and messages call them, as command lines have it."""
+"""Names of recipes: what rows, figures and messages call them, spelled as on command lines."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from numbers import Integral, Real
 from typing import Any
 
-from minisim.parameters import SWITCH, default_of, parameters
+from minisim.fields import SWITCH
+from minisim.parameters import default_of, parameters
 
 _NO_KINDS: Mapping[str, Callable[..., Any]] = {}
 
@@ -36,9 +37,9 @@ class Name:
 
 
 def name_of(controller: Any) -> str:
-    """A controller's name; with its parameters, where it is one constant for the whole class.
+    """A controller's name, with its parameters if the whole class has one constant name.
 
-    So two recipes of a dataclass have different names, even if their author gave them only one.
+    So recipes that differ have different names, even if their author gave them only one.
     """
     name: str = controller.name
     same = inspect.getattr_static(type(controller), "name", None) == name
@@ -54,7 +55,7 @@ def _arguments(recipe: Any) -> str:
 
 
 def _fields(recipe: Any) -> Iterator[tuple[str, Mapping[str, Callable[..., Any]], Any]]:
-    """Name, kinds (as in `part`) and default of what the constructor of a recipe takes."""
+    """Name, kinds (as in `part`) and default of each parameter of a recipe."""
     known = {name: it.kinds for name, it, _ in parameters(recipe.__class__)}
     for field in dataclasses.fields(recipe) if dataclasses.is_dataclass(recipe) else ():
         if field.init and (field.name in known or not known):

@@ -5,7 +5,7 @@
 Values are numbers, words, quoted texts, lists in brackets, and nested recipes. `true`, `false` and
 `none` may be upper or lower case. Text is parsed as Python source and never evaluated. A table, as
 in TOML, means the same: `{name = "dim", gate = "harmonious", perception = {name = "noisy",
-intent_error = 0.15}}`. What a value means is for the parameter to say (`minisim.parameters`).
+intent_error = 0.15}}`. The parameter says what a value means (`minisim.parameters`).
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def call_of(value: Mapping[str, Any]) -> Call:
 def read(
     title: str, value: Any, kinds: Mapping[str, Callable[..., Any]], nothing: Sequence[str] = ()
 ) -> Any:
-    """What a value means where a recipe is wanted; anything but a text or table is its own.
+    """The recipe that a text or table stands for; any other value is returned unchanged.
 
     Args:
         title: what messages call the recipe.
@@ -153,7 +153,7 @@ def _hints(make: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _check_simple(title: str, hint: Any, value: Any) -> None:
-    """Check a value if its annotation is float, int, str or bool, or an optional one of these."""
+    """Check a value that is annotated as float, int, str or bool, or as a union of these."""
     if isinstance(value, Call):
         raise InputError(f"{title} has no recipe {value}; a text that looks like one needs quotes")
     union = typing.get_origin(hint) in (typing.Union, types.UnionType)
@@ -186,7 +186,6 @@ def _call(name: str, node: ast.Call, source: str) -> Call:
 
 
 def _parsed(name: str, node: ast.expr, source: str) -> Any:
-    """The value of a piece of source."""
     match node:
         case ast.Constant(value=bool() | int() | float() | str() | None as value):
             return value
@@ -204,7 +203,6 @@ def _parsed(name: str, node: ast.expr, source: str) -> Any:
 
 
 def _written(node: ast.AST, source: str) -> str:
-    """A piece of the source as it is written."""
     return ast.get_source_segment(source, node) or ""
 
 
