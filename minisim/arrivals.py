@@ -174,8 +174,8 @@ class Demand:
         adds arrivals, and a lane's arrivals do not depend on the rates of the others.
 
         Manoeuvres are drawn independently. (The authors drew them without replacement within a
-        second, which ends the run when more vehicles come than there are manoeuvres; at 350
-        veh/h/lane that affects 0.4 % of the lane-seconds.)
+        second, which ends the run if more vehicles come than there are manoeuvres: at 350
+        veh/h/lane, in 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")

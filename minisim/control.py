@@ -28,9 +28,9 @@ from minisim.vehicle import MODELS, VehicleType
 #: `--junctions.limit-turn-speed`, for turn speeds like SUMO's.
 LATERAL_ACCELERATION = 5.5
 
-#: A vehicle counts as able to stop only with this distance to spare [m]. It exceeds rounding errors,
-#: and a held vehicle keeps more before its line (`minisim.laws.STOP_MARGIN`), so one that brakes
-#: for the junction entry never counts as unable to stop.
+#: A vehicle counts as able to stop only with this distance to spare [m], more than rounding errors.
+#: A held vehicle keeps more before its line (`minisim.laws.STOP_MARGIN`), so it always counts as
+#: able to stop while it brakes for the junction entry.
 COMMIT_MARGIN = 0.1
 
 #: A vehicle no faster than this stands or waits [m/s]: SUMO's `SUMO_const_haltingSpeed`.
@@ -46,9 +46,7 @@ class Site:
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
-    seed: int = whole(
-        "of the run, for controllers that draw random numbers (`minisim.streams`)", default=0, low=0
-    )
+    seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
 
     def __post_init__(self) -> None:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
@@ -207,11 +205,9 @@ class Plan:
     """What a session needs from its host."""
 
     hold_distance: float = real(
-        "the hold line's distance before the junction entry", "m", default=0.0, low=0, high=1000
+        "of the hold line from the junction entry", "m", default=0.0, low=0, high=1000
     )
-    markings: tuple[Marking, ...] = checked(
-        "on every approach lane", _markings, "markings", default=()
-    )
+    markings: tuple[Marking, ...] = checked("on every lane", _markings, "markings", default=())
     marks: tuple[float, ...] = reals(
         "wake when a front bumper passes one of these distances before the junction entry; 0 is "
         "the entry itself, negative is past it",
@@ -225,13 +221,11 @@ class Plan:
         "how far before the junction entry a view reaches, on the road", "m", default=50.0, low=0
     )
     reach: float = real(
-        "a view holds a vehicle until its front is at least this far past the junction entry, even "
-        "when its rear has left the junction before that",
+        "a view keeps a vehicle until its front is this far past the junction entry, even after "
+        "its rear has left the junction",
         "m", default=0.0, low=0, high=1000,
     )  # fmt: skip
-    lanes_open: bool = switch(
-        "lanes start open; otherwise vehicles are held until told to go", default=False
-    )
+    lanes_open: bool = switch("lanes start open; otherwise vehicles are held", default=False)
 
 
 @runtime_checkable
@@ -268,15 +262,10 @@ class Kinds(Session, Protocol):
 
 @dataclass(frozen=True)
 class Cover:
-    """The vehicles for which a controller promises that none collides and each is served.
+    """The vehicles for which a controller promises that none collides and each is served."""
 
-    Attributes:
-        laws: names of their car-following models (`minisim.vehicle.MODELS`).
-        alike: whether their drivers must be alike, which is a `speed_deviation` of 0.
-    """
-
-    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")
-    alike: bool = False
+    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")  # of car following
+    alike: bool = False  # whether their drivers must be alike: a `speed_deviation` of 0
 
     def __contains__(self, vehicle: VehicleType) -> bool:
         return vehicle.model in self.laws and not (self.alike and vehicle.speed_deviation > 0.0)
@@ -286,12 +275,10 @@ class Cover:
         return laws + (" whose drivers are alike (speed_deviation 0)" if self.alike else "")
 
     def check(self, name: str, vehicle: VehicleType) -> None:
-        """Raise `InputError` for a vehicle that is not covered, for a controller that needs it."""
+        """Raise `InputError` for a vehicle that the controller `name` does not cover."""
         if vehicle not in self:
-            raise InputError(
-                f"{name} is for {self}, got model {vehicle.model!r} with a speed_deviation of "
-                f"{vehicle.speed_deviation:g}"
-            )
+            given = f"{vehicle.model!r} with a speed_deviation of {vehicle.speed_deviation:g}"
+            raise InputError(f"{name} is for {self}, got model {given}")
 
 
 #: What a controller covers by default, and what one that may collide covers.

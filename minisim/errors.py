@@ -129,9 +129,8 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
-    raise InputError(
-        f"unknown {name} {show(value)}; allowed: {', '.join(options)}{nearest(value, options)}"
-    )
+    known = f"{', '.join(options)}{nearest(value, options)}"
+    raise InputError(f"unknown {name} {show(value)}; allowed: {known}")
 
 
 def nearest(value: object, allowed: Iterable[str]) -> str:
@@ -145,7 +144,7 @@ def nearest(value: object, allowed: Iterable[str]) -> str:
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
     """Raise `InputError` unless `value` is a `kind`.
 
-    A class is refused where an instance belongs, even if it has the methods of a protocol.
+    A class is not an instance of a protocol, even if it has the methods.
     """
     if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
@@ -188,9 +187,8 @@ def items(name: str, value: object, of: str, *, ordered: bool = True) -> list[An
 
 def numbers(name: str, value: object) -> tuple[float, ...]:
     """Return `value`, any sequence of finite numbers, as a tuple of floats, or raise."""
-    return tuple(
-        number(f"{name}[{i}]", item) for i, item in enumerate(items(name, value, "numbers"))
-    )
+    given = items(name, value, "numbers")
+    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(given))
 
 
 def show(value: object) -> str:

@@ -38,26 +38,16 @@ _SWITCHES = {"true": True, "on": True, "false": False, "off": False}
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is declared about a field.
+    """What is declared about a field."""
 
-    Attributes:
-        meaning: what it means, in a few words.
-        unit: such as "m"; empty if it has none.
-        allowed: the values that it takes, in words.
-        check: see `Check`.
-        label: what messages call it; if empty, the name of the field.
-        optional: whether None is allowed too.
-        words: the words allowed, for a field that takes one of several.
-        kinds: word -> what makes the recipe of that name, for a field that holds another recipe.
-    """
-
-    meaning: str
-    unit: str
-    allowed: str
+    meaning: str  # in a few words
+    unit: str  # such as "m"; empty if it has none
+    allowed: str  # the values that it takes, in words
     check: Check
-    label: str = ""
-    optional: bool = False
-    words: tuple[str, ...] = ()
+    label: str = ""  # what messages call it; if empty, the name of the field
+    optional: bool = False  # whether None is allowed, too
+    words: tuple[str, ...] = ()  # those allowed, for a field that takes one of several
+    #: Word -> what makes the recipe of that name, for a field that holds another recipe.
     kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
 
     def title(self, name: str) -> str:
@@ -101,7 +91,7 @@ def whole(
 def word(meaning: str, among: Sequence[str], **common: Unpack[Common]) -> Any:
     """One of several words."""
     check = partial(choice, allowed=among)
-    return _field(meaning, check, " | ".join(among), words=tuple(among), **common)
+    return checked(meaning, check, " | ".join(among), words=tuple(among), **common)
 
 
 def switch(meaning: str, **common: Unpack[Common]) -> Any:
@@ -112,7 +102,7 @@ def switch(meaning: str, **common: Unpack[Common]) -> Any:
         instance(title, said, bool)
         return said
 
-    return _field(meaning, check, " | ".join(SWITCH), words=SWITCH, **common)
+    return checked(meaning, check, " | ".join(SWITCH), words=SWITCH, **common)
 
 
 def text(meaning: str, *, empty: bool = False, **common: Unpack[Common]) -> Any:
@@ -153,13 +143,13 @@ def part(
 ) -> Any:
     """Another object, of the class or protocol `kind`.
 
-    A text, or a table as in TOML, names it by a word in `kinds`, which maps each word to what makes
+    A text, or a table as in TOML, gives it by a word in `kinds`, which maps each word to what makes
     it: `on`, `noisy(delay=0.1)`. `off` means none.
     """
     classes = kind if isinstance(kind, tuple) else (kind,)
     if not kinds:
         check = _unchanged(partial(instance, kind=kind))
-        return _field(meaning, check, " | ".join(one.__name__ for one in classes), **common)
+        return checked(meaning, check, " | ".join(one.__name__ for one in classes), **common)
     nothing = ("off", "none") if common.get("optional") else ()
     wanted = f"{', '.join((*kinds, *nothing))} or {' or '.join(map(kind_word, classes))}"
 
@@ -170,7 +160,9 @@ def part(
             raise InputError(f"{title} must be {wanted}, got {show(made)}")
         return made
 
-    return _field(meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common)
+    return checked(
+        meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common
+    )
 
 
 def _form(kind: tuple[str, Callable[..., Any]]) -> str:
@@ -182,13 +174,6 @@ def _form(kind: tuple[str, Callable[..., Any]]) -> str:
 
 
 def checked(
-    meaning: str, check: Check, allowed: str, unit: str = "", **common: Unpack[Common]
-) -> Any:
-    """A field with a check of its own; `allowed` says in words which values pass."""
-    return _field(meaning, check, allowed, unit, **common)
-
-
-def _field(
     meaning: str,
     check: Check,
     allowed: str,
@@ -201,6 +186,8 @@ def _field(
     words: tuple[str, ...] = (),
     kinds: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
 ) -> Any:
+    """A field with a check of its own; `allowed` says in words which values pass."""
+
     def unless_none(title: str, value: Any) -> Any:
         none = value is None or (isinstance(value, str) and value.lower() == "none")
         return None if none else check(title, value)

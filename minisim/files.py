@@ -58,8 +58,8 @@ def read_file(what: str, path: AnyPath, most: int = LARGEST) -> bytes:
 def replacing(path: AnyPath) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, and put it in place at the end.
 
-    If the block raises, `path` stays as it was and the temporary file is removed. A symbolic
-    link stays a link: the file that it points to is replaced.
+    If the block raises, `path` stays as it was and the temporary file is removed. A symbolic link
+    stays: the file that it points to is replaced.
 
     Raises:
         FileError: the folder is not writable, or `path` is not an ordinary file.
@@ -98,10 +98,8 @@ def write_text(path: AnyPath, text: str) -> None:
 def write_table(frame: pd.DataFrame, path: AnyPath) -> None:
     """Write a table, whole or not at all, as CSV or Parquet depending on the suffix of `path`.
 
-    Raises:
-        InputError: `path` has another suffix.
-        MissingExtraError: Parquet without pyarrow.
-        FileError: the file cannot be written; nothing is left behind.
+    Raises `InputError` for another suffix, `MissingExtraError` for Parquet without pyarrow, and
+    `FileError` for a file that cannot be written.
     """
     suffix = _table_suffix(path)
     with replacing(path) as part:
@@ -151,10 +149,7 @@ def check_table(path: AnyPath) -> Path:
 
 
 def check_apart(files: Mapping[str, Path | None]) -> None:
-    """Raise `InputError` if two options (name -> file) name the same file.
-
-    One would overwrite the other. Links are followed.
-    """
+    """Raise `InputError` if two options (name -> file) name the same file, perhaps by links."""
     seen: dict[str, str] = {}
     for option, path in files.items():
         if path is None:

@@ -47,7 +47,7 @@ from minisim.ticks import NEVER, first_tick, time_of
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
-#: What may happen at a collision where SUMO or its cruise control drives.
+#: What may happen at a collision if SUMO or its cruise control drives.
 REACTIONS = (*ON_COLLISION, "teleport")
 
 #: What a scenario must have.
@@ -90,7 +90,7 @@ class Alarm:
 
 @dataclass(frozen=True, eq=False)
 class Hosted:
-    """A run in any host, with its arguments checked and its session started."""
+    """A run in any host: its checked arguments and its started session."""
 
     scenario: ScenarioLike
     controller: Controller
@@ -102,8 +102,7 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
-    #: What the session had counted when the warm-up ended.
-    before: dict[str, float] = field(default_factory=dict)
+    before: dict[str, float] = field(default_factory=dict)  # counts at the end of the warm-up
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
@@ -242,10 +241,8 @@ def checked_window(window: object) -> tuple[float, float]:
     """Return a `record_window`, or raise `InputError`."""
     if not isinstance(window, tuple) or len(window) != 2:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
-    start = number("start of record_window [s]", window[0], low=0)
-    if window[1] == math.inf:
-        return start, math.inf
-    return start, number("end of record_window [s]", window[1], low=start)
+    start, end = number("start of record_window [s]", window[0], low=0), window[1]
+    return start, end if end == math.inf else number("end of record_window [s]", end, low=start)
 
 
 def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:

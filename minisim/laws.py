@@ -72,7 +72,7 @@ def build_law(
     record: str | None = None,
     record_window: tuple[float, float] = (0.0, math.inf),
 ) -> Law:
-    """Collect the scalars of a run."""
+    """The scalars of a run."""
     vehicle = site.vehicle
     entry = site.intersection.approach_length
     near = record == "junction"
@@ -117,7 +117,7 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
-    """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
+    """The distance in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
     The leader stops no sooner than its brakes can stop it, and half the gap at standstill stays
     free, closer than the laws themselves ever come.
@@ -130,7 +130,7 @@ def room_behind(gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
-    """Whether a stop after a step to `v_new` might take more than this room; quick and cautious."""
+    """Whether a stop after a step to `v_new` may take more than this room: quick and cautious."""
     top = v_new if v_new > v else v
     return top * (top + 2.0 * law.b_max * law.dt) > room
 

@@ -19,8 +19,8 @@ _NO_KINDS: Mapping[str, Callable[..., Any]] = {}
 def spelled(name: str, recipe: object) -> str:
     """A recipe's name on command lines and in files: `dim:gate=harmonious,order=lanes`.
 
-    Only parameters that differ from their defaults are spelled. A value that has no text form,
-    such as a matrix, becomes its class and a digest, so different recipes get different names.
+    It has the parameters that differ from their defaults. A value without a text form, such as a
+    matrix, becomes its class and a digest, so different recipes get different names.
     """
     arguments = _arguments(recipe)
     return f"{name}:{arguments}" if arguments else name

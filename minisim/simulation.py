@@ -98,7 +98,7 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether the horizon has been reached or every vehicle has arrived."""
+        """Whether the horizon is reached or every vehicle has arrived."""
         return self._done or self.tick >= self._horizon_tick
 
     @property
@@ -162,19 +162,16 @@ class Simulation:
         match command:
             case Advise(vehicle, speed):
                 self._vehicles["advice"][self._row[vehicle]] = speed
-            case Brake(vehicle, deceleration):
-                self._brake(self._row[vehicle], deceleration)
+            case Brake(vehicle, asked) if not self._vehicles["cleared"][self._row[vehicle]]:
+                limited = min(asked, self._law.b_max)
+                brake = -limited if limited > 0.0 else math.inf
+                self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
             case Wake():
                 self._alarm.set(command)
-
-    def _brake(self, row: int, deceleration: float) -> None:
-        if not self._vehicles["cleared"][row]:
-            limited = min(deceleration, self._law.b_max)
-            self._vehicles["brake"][row] = -limited if limited > 0.0 else math.inf
 
     def _check_collisions(self) -> None:
         now = collisions_now(self._vehicles, self._road, self.site, self.time)
@@ -215,11 +212,9 @@ def simulate(
     """Run a scenario under a controller; see `Simulation` for the arguments and errors.
 
     Example:
-        >>> import minisim
         >>> from minisim.testing import small_scenario
         >>> from minisim.control import Unregulated
-        >>> run = minisim.simulate(small_scenario(density=0), Unregulated())
-        >>> run.summary()["trips"]
+        >>> simulate(small_scenario(density=0), Unregulated()).summary()["trips"]
         0
     """
     return Simulation(

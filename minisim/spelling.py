@@ -50,10 +50,8 @@ def parse_arguments(name: str, text: str) -> Call:
     if not isinstance(tree, ast.Call) or not isinstance(tree.func, ast.Name):
         wrong = "; a digest (#…) stands for a value that only Python can give" * ("#" in text)
         wrong += "; a bracket is missing" * (text.count("(") != text.count(")"))
-        raise InputError(
-            f"cannot read {show(text)}, the parameters of {name}: they are written key=value, with "
-            f"commas between them and paths in quotes{wrong}"
-        )
+        wanted = f"key=value, with commas between them and paths in quotes{wrong}"
+        raise InputError(f"cannot read {show(text)}, the parameters of {name}: write {wanted}")
     return _call(name, tree, source)
 
 
@@ -74,11 +72,8 @@ def read(
     Args:
         title: what messages call the recipe.
         value: such as "noisy(delay=0.1)"; a table needs no name if there is only one kind.
-        kinds: word -> what makes the recipe of that name.
+        kinds: word -> what makes the recipe of that name. Another word is an `InputError`.
         nothing: words that mean None.
-
-    Raises:
-        InputError: an unknown word (with the nearest one), or as `build`.
     """
     if isinstance(value, Mapping):
         value = call_of({**({"name": next(iter(kinds))} if len(kinds) == 1 else {}), **value})
@@ -92,16 +87,10 @@ def read(
 
 
 def build(title: str, make: Callable[..., Any], call: Call) -> Any:
-    """Call `make` with the arguments of `call`.
+    """Call `make`, a class or function, with the arguments of `call`; messages call it `title`.
 
-    Args:
-        title: what messages call the recipe.
-        make: a class or function. Declared parameters (`minisim.parameters`) take words and nested
-            recipes; the values of others must fit a simple annotation.
-        call: the arguments.
-
-    Raises:
-        InputError: no such parameter (with the nearest one), or a value that is not allowed.
+    Declared parameters (`minisim.parameters`) take words and nested recipes; other values must fit
+    a simple annotation. `InputError` tells of an unknown parameter or a value that is not allowed.
     """
     try:
         signature = inspect.signature(make)
@@ -123,7 +112,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
 def bound(
     title: str, signature: inspect.Signature, places: Sequence[Any], named: Mapping[str, Any]
 ) -> inspect.BoundArguments:
-    """The arguments by parameter; raises `InputError` for an unknown, missing or surplus one."""
+    """The arguments by parameter; `InputError` for an unknown, missing or surplus one."""
     taken = [it for it in signature.parameters.values() if it.kind not in _VARIABLE]
     names = [it.name for it in taken]
     if inspect.Parameter.VAR_KEYWORD not in {it.kind for it in signature.parameters.values()}:
@@ -145,9 +134,8 @@ def bound(
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:
     """Annotations by parameter; empty if one of them cannot be resolved."""
     try:
-        return typing.get_type_hints(
-            vars(make).get("__init__", make) if isinstance(make, type) else make
-        )
+        of = vars(make).get("__init__", make) if isinstance(make, type) else make
+        return typing.get_type_hints(of)
     except Exception:  # the annotations are the caller's own, and may be anything
         return {}
 

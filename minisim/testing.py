@@ -65,9 +65,7 @@ class SmallScenario:
     bearings: tuple[float, ...] = reals(
         "of the arms, clockwise from north", "deg", default=(0.0, 90.0, 180.0, 270.0)
     )
-    side: Literal["left", "right"] = word(
-        "on which vehicles drive", ("left", "right"), default="left"
-    )
+    side: Literal["left", "right"] = word("of driving", ("left", "right"), default="left")
     density: float = real(
         "mean inflow while demand lasts", "veh/h/lane", default=350.0, low=0, high=MAX_DENSITY
     )
@@ -95,19 +93,13 @@ class SmallScenario:
 
     @cached_property
     def intersection(self) -> Intersection:
-        """The geometry."""
+        """Its geometry."""
         return Intersection(self.bearings, side=self.side, arm_length=self.arm_length)
 
     def site(self, seed: int) -> Site:
         """What a controller may know about it."""
-        return Site(
-            intersection=self.intersection,
-            vehicle=self.vehicle,
-            speed_limit=self.speed_limit,
-            demand=Demand(density=self.density).rates(self.intersection.n),
-            dt=self.dt,
-            seed=seed,
-        )
+        demand = Demand(density=self.density).rates(self.intersection.n)
+        return Site(self.intersection, self.vehicle, self.speed_limit, demand, self.dt, seed)
 
     def arrivals(self, seed: int) -> Arrivals:
         """Arrivals in the first `demand_time` seconds."""
@@ -206,9 +198,7 @@ def check_commands(commands: Iterable[Command], view: View, site: Site) -> None:
 
 def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | None:
     match command:
-        case Go(vehicle) | Hold(vehicle) | Advise(vehicle, _) | Brake(vehicle, _) if (
-            vehicle not in ids
-        ):
+        case Go() | Hold() | Advise() | Brake() if command.vehicle not in ids:
             return "this vehicle is not in the view"
         case Open(lane) | Close(lane) if lane not in range(lanes):
             return f"there is no such lane (0 … {lanes - 1})"
@@ -223,7 +213,7 @@ def _problem(command: object, ids: set[int], now: float, lanes: int) -> str | No
 
 @dataclass(frozen=True)
 class _Wrapped:
-    """A controller whose sessions' `decide` is wrapped in something."""
+    """A controller with something wrapped around its sessions' `decide`."""
 
     controller: Controller
     name: str
@@ -279,7 +269,7 @@ def _disturbed(controller: Controller, scenario: SmallScenario, run: Simulate) -
 
 
 def _check_value(controller: Controller) -> Controller:
-    """Check that the controller behaves as a value; returns a pickled copy of it."""
+    """Check that the controller behaves like a value, and return a pickled copy."""
     try:
         hash(controller)
     except TypeError as error:
@@ -288,12 +278,10 @@ def _check_value(controller: Controller) -> Controller:
         copy: Controller = pickle.loads(pickle.dumps(controller))
     except (pickle.PicklingError, TypeError, AttributeError) as error:
         raise _broken(controller, f"it is not picklable: {error}") from error
-    for same, differs in (
-        (copy == controller, "is not equal to it"),
-        (hash(copy) == hash(controller), "has another hash"),
-        (repr(copy) == repr(controller), "prints as something else"),
-    ):
-        _require(same, controller, f"a pickled copy of it {differs}")
+    _require(copy == controller, controller, "a pickled copy of it is not equal to it")
+    _require(hash(copy) == hash(controller), controller, "a pickled copy of it has another hash")
+    other = "a pickled copy of it prints as something else"
+    _require(repr(copy) == repr(controller), controller, other)
     return copy
 
 
@@ -320,12 +308,10 @@ def _check_arrivals(controller: Controller, run: Run) -> None:
 def _check_served(controller: Controller, run: Run) -> None:
     waiting = run.columns.lane[~run.columns.arrived].tolist()
     lanes = ", ".join(sorted({ARM_NAMES[lane] for lane in waiting}))
-    n = run.site.intersection.n
-    _require(
-        not waiting, controller,
-        f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served on {n} arms "
-        f"(lanes {lanes}), {run.scenario.horizon:.0f} s after the first could come",
-    )  # fmt: skip
+    unserved = f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served"
+    where = f"on {run.site.intersection.n} arms (lanes {lanes})"
+    after = f"{run.scenario.horizon:.0f} s after the first could come"
+    _require(not waiting, controller, f"{unserved} {where}, {after}")
 
 
 def _require(condition: bool, controller: Controller, problem: str) -> None:
