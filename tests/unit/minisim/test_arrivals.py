@@ -36,9 +36,6 @@ def chi_square_poisson(counts: np.ndarray, rate: float, classes: int = 4) -> flo
     return float(stats.chisquare(observed, expected).pvalue)
 
 
-# --- the three models --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("density", "classes", "seed"), [(350.0, 4, 1), (350.0, 4, 2), (350.0, 4, 3), (3600.0, 7, 8)]
 )

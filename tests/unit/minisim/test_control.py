@@ -1,4 +1,4 @@
-"""The control room: sites, plans, and what an observer can tell about a vehicle."""
+"""Sites, markings, and whether a vehicle can stop."""
 
 from __future__ import annotations
 

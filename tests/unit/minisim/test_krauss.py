@@ -36,9 +36,6 @@ def follower(dt: float, leader_v: float, seconds: float, gap: float, v: float) -
     return leader - s, v
 
 
-# --- the law ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dt", [0.01, 0.1, 0.5])
 @pytest.mark.parametrize("leader_v", [2.0, 10.0, 14.0])
 def test_the_equilibrium_gap_is_the_headway_at_any_step(dt: float, leader_v: float) -> None:
@@ -85,9 +82,6 @@ def test_it_stops_at_a_standing_obstacle(dt: float, b: float) -> None:
     assert s < 98.0
 
 
-# --- in a run ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("manoeuvre", "length"), [(1, 990.53), (2, 995.9), (3, 995.7)])
 def test_an_isolated_vehicle_takes_as_long_as_in_the_published_runs(
     manoeuvre: int, length: float
@@ -122,9 +116,6 @@ def test_queues_discharge_at_the_saturation_flow_of_the_law() -> None:
     run = minisim.simulate(what, FixedTime(greens=(50.0, 50.0, 50.0, 50.0), order=(1, 2, 3, 0)))
     arrival = np.sort(run.columns.arrival)
     assert np.diff(arrival)[3:].mean() == pytest.approx(1.0 + 6.0 / 14.0, abs=0.05)
-
-
-# --- the vehicle type --------------------------------------------------------------------------
 
 
 def test_its_brakes_need_no_more_than_its_deceleration() -> None:
