@@ -316,7 +316,7 @@ def as_controller(what: str, value: object) -> Controller:
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
     hint = "; make it by scenarios.controllers.controller_named" if named else ""
-    raise InputError(f"{what} is no controller: {why}{hint}")
+    raise InputError(f"{what} is not a controller: {why}{hint}")
 
 
 @dataclass(frozen=True)

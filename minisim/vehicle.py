@@ -23,7 +23,7 @@ class Model(NamedTuple):
     #: A vehicle is inserted this far past its own length, and arrives this far before the end of
     #: the road [m].
     margin: float = 0.0
-    sumo: str = ""  # SUMO's model of the same law, if it has one
+    sumo: str = ""  # SUMO's model of the same law; empty if it has none
     stand_ins: tuple[str, ...] = ("Krauss",)  # SUMO's models of other laws for such vehicles
 
 

@@ -302,8 +302,8 @@ BROKEN = {
     "no session": (Starting(make=str), "must return a Session with a Plan"),
     "no plan": (Starting(make=without_plan), "must return a Session with a Plan"),
     "no name": (Broken(name=""), "the name of .* must be a text"),
-    "no controller": (5, "is no controller"),
-    "a class": (FixedTime, "is no controller"),
+    "no controller": (5, "is not a controller"),
+    "a class": (FixedTime, "is not a controller"),
 }
 
 

@@ -333,8 +333,8 @@ def test_advancing_in_pieces_is_the_same_run() -> None:
     ("arguments", "message"),
     [
         ({"scenario": "four-way"}, "scenario must be"),
-        ({"controller": "dim"}, "is no controller"),
-        ({"controller": Dim}, "is no controller"),
+        ({"controller": "dim"}, "is not a controller"),
+        ({"controller": Dim}, "is not a controller"),
         ({"seed": -1}, "seed"),
         ({"seed": 1.5}, "seed"),
         ({"record": "everything"}, "record"),
