@@ -1,4 +1,4 @@
-"""Car-following laws as pure functions of plain floats, compiled where numba is installed.
+"""Car-following laws as pure functions of plain floats, compiled if numba is installed.
 
 All values are in SI units. Under the IDM a vehicle keeps its acceleration for one step
 (`ballistic`). Krauß's law gives the next speed instead, at which a vehicle drives the whole step
@@ -166,7 +166,7 @@ def stop_within(v: float, distance: float, b: float, dt: float) -> float:
 
 @njit_inline
 def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
-    """Position and speed after one step of constant acceleration, or where its speed reaches zero.
+    """Position and speed after one step of constant acceleration; it ends at a standstill.
 
     Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10.
     """

@@ -198,7 +198,7 @@ def checked(
 
 
 def _unchanged(test: Callable[[str, Any], object]) -> Check:
-    """A check that returns the value as it is, such as an int where a float is allowed."""
+    """A check that returns the value unchanged, such as an int for a float."""
 
     def check(title: str, value: Any) -> Any:
         test(title, value)

@@ -216,7 +216,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
         marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
         marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}
-        # The road may be shorter than the default sight, which no one has asked for.
+        # The road may be shorter than the default sight.
         marks |= {"sight": plan.sight if plan.sight != Plan.sight else 0.0}
         for name, distance in marks.items():
             number(f"{name} [m] of the plan, on these roads,", distance, high=road)

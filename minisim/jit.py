@@ -1,4 +1,4 @@
-"""`njit`: numba's compiler, or plain Python where numba is missing or switched off.
+"""`njit`: numba's compiler, or plain Python if numba is missing or switched off.
 
 The environment variable `MINISIM_JIT=0` switches it off, so that a debugger can follow.
 

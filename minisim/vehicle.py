@@ -110,7 +110,7 @@ class VehicleType:
         return MODELS[self.model].braking(self.acceleration, self.deceleration)
 
     def top_speed(self, limit: float) -> float:
-        """Upper bound on this type's speed where the speed limit is `limit` [m/s]."""
+        """Upper bound on this type's speed on a road with the speed limit `limit` [m/s]."""
         return 2.0 * limit
 
 

@@ -102,7 +102,7 @@ def cases() -> Iterator[Case]:
 
 
 def recipe_of(case: Case) -> Recipe:
-    """What is run; raises `InputError` where the controller does not serve the profile."""
+    """What is run; raises `InputError` if the controller does not serve the profile."""
     extra = dict(case.extra)
     options: dict[str, Any] = {
         "profile": case.profile,

@@ -74,7 +74,7 @@ def test_decide_must_return_commands(answer: object) -> None:
 
 
 class Broken:
-    """A controller, and its session, that raises where it is told to."""
+    """A controller, and its session, that raises an error in one of its methods."""
 
     name = "broken"
     plan = Plan(period=1.0)

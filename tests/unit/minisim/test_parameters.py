@@ -44,7 +44,7 @@ class Bicycle:
 
     gear: str = word("which gear", ("low", "high"), default="low", label="gear name")
     bell: bool = switch("whether it has one", default=True)
-    owner: str = text("who rides it", empty=True, default="")
+    owner: str = text("its rider", empty=True, default="")
     load: float | None = real("what it carries", "kg", low=0, optional=True, default=None)
     stops: tuple[float, ...] = reals("where it stops", "m", low=0, default=())
     front: Wheel = part("the front wheel", Wheel, kinds={"small": Wheel}, default=Wheel(0.3))

@@ -81,7 +81,7 @@ def test_turning_vehicle_takes_the_arc_at_the_lateral_limit() -> None:
 def test_held_vehicle_stands_just_before_its_line(
     hold_distance: float, profile: Profile, spared: float
 ) -> None:
-    """It brakes at b, or up to a tenth less where it slows in whole steps, and not too early."""
+    """It brakes at b, or up to a tenth less if it slows in whole steps, and not too early."""
     scenario = lone(profile, 120.0)
     run = minisim.simulate(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
     line = scenario.intersection.approach_length - hold_distance
@@ -274,7 +274,7 @@ def test_collision_stops_the_run_with_a_replayable_report() -> None:
 
 
 def test_overlap_in_a_lane_is_a_collision_that_no_floor_hides() -> None:
-    """The law does not let it happen, so the follower is put where it must not be."""
+    """The law does not let it happen, so the follower is put into its leader."""
     scenario = replayed(four_way(), (0.0, 0, 2), (5.0, 0, 2), horizon=100.0)
     sim = Simulation(scenario, Unregulated())
     sim.advance(20.0)
