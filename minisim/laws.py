@@ -1,7 +1,8 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
-Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the models in
-`minisim.vehicle`. The hosts move vehicles by these functions; `baselines.prediction` predicts.
+Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the table of
+models in `minisim.vehicle`. The hosts move vehicles by these functions, and `baselines.prediction`
+predicts by them.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
-    """The distance in which a vehicle must be able to stop, times 2·b_max [m²/s²].
+    """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
     The leader stops no sooner than its brakes can stop it, and half the gap at standstill stays
     free, closer than the laws themselves ever come.
@@ -140,9 +141,10 @@ def keep_room(v: float, room: float, law: Law) -> float:
     """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
 
     With it, no vehicle runs into its leader under any law at any step: a vehicle that can stop
-    behind its leader before the step still can after it. No law promises that by itself: the IDM
-    brakes late if the step is long or `acceleration` is large, and Krauß's law assumes that no
-    vehicle brakes harder than b. In ordinary traffic the bound has no effect.
+    behind its leader before the step still can after it, at worst by braking as hard as the leader.
+    No law promises that by itself: the IDM brakes late if the step is long or `acceleration` is
+    large, and Krauß's law assumes that no vehicle brakes harder than b. In ordinary traffic the
+    bound has no effect.
     Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
     for both vehicles and a reaction time of one step.
     """

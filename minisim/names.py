@@ -13,8 +13,6 @@ from typing import Any
 from minisim.fields import SWITCH
 from minisim.parameters import default_of, parameters
 
-_NO_KINDS: Mapping[str, Callable[..., Any]] = {}
-
 
 def spelled(name: str, recipe: object) -> str:
     """A recipe's name on command lines and in files: `dim:gate=harmonious,order=lanes`.
@@ -59,7 +57,7 @@ def _fields(recipe: Any) -> Iterator[tuple[str, Mapping[str, Callable[..., Any]]
     known = {name: it.kinds for name, it, _ in parameters(recipe.__class__)}
     for field in dataclasses.fields(recipe) if dataclasses.is_dataclass(recipe) else ():
         if field.init and (field.name in known or not known):
-            yield field.name, known.get(field.name, _NO_KINDS), default_of(field)
+            yield field.name, known.get(field.name, {}), default_of(field)
 
 
 def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:

@@ -104,7 +104,7 @@ def test_an_error_of_a_controller_is_told_with_its_line(where: str) -> None:
     line = Broken.fail.__code__.co_firstlineno + 2
     told = rf"^controller 'broken'.*: test_hosting.py, line {line}: KeyError: 'lost'$"
     with pytest.raises(ControllerError, match=told) as caught:
-        minisim.simulate(small_scenario(), Broken(where))
+        minisim.simulate(small_scenario(demand_time=20.0), Broken(where))
     assert isinstance(caught.value.__cause__, KeyError), "the traceback is there"
 
 
