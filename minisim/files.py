@@ -67,8 +67,9 @@ def replacing(path: AnyPath) -> Iterator[Path]:
     instance("output file", path, (str, os.PathLike))
     with _refused(f"write {os.fspath(path)!r}"):
         target = Path(path).resolve()
-        if target.exists() and not target.is_file():
-            raise ValueError("it is not an ordinary file")
+        ordinary = target.is_file() or not target.exists()
+    if not ordinary:
+        raise FileError(f"cannot write {path}: it is not an ordinary file")
     temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
     try:
         try:
@@ -82,7 +83,7 @@ def replacing(path: AnyPath) -> Iterator[Path]:
 
 @contextmanager
 def _refused(what: str) -> Iterator[None]:
-    """Raise `FileError` if the block fails; `what` could then not be done."""
+    """If the block fails, raise a `FileError` that says what cannot be done."""
     try:
         yield
     except (OSError, ValueError, RuntimeError) as error:  # a loop of links, a NUL in the name

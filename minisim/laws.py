@@ -142,9 +142,8 @@ def keep_room(v: float, room: float, law: Law) -> float:
 
     With it, no vehicle runs into its leader under any law at any step: a vehicle that can stop
     behind its leader before the step still can after it, at worst by braking as hard as the leader.
-    No law promises that by itself: the IDM brakes late if the step is long or `acceleration` is
-    large, and Krauß's law assumes that no vehicle brakes harder than b. In ordinary traffic the
-    bound has no effect.
+    No law promises that by itself: the IDM brakes late at long steps or a large `acceleration`, and
+    Krauß's law assumes that no vehicle brakes harder than b. Ordinary traffic is not affected.
     Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
     for both vehicles and a reaction time of one step.
     """
