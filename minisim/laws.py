@@ -1,8 +1,8 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
-Everything that depends on `Law.model` is in this module. The equations are in
-`minisim.carfollowing`, and the table of models is in `minisim.vehicle`. The hosts move vehicles by
-these functions, and `baselines.prediction` predicts by them.
+Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the table of
+models in `minisim.vehicle`. The hosts move vehicles by these functions, and `baselines.prediction`
+predicts by them.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from minisim.jit import njit, njit_inline
 from minisim.ticks import NEVER, first_tick
 from minisim.vehicle import MODELS, POSITION_EPS
 
-#: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
-#: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
+#: A held vehicle aims to stop this far before its hold line [m]; at most it stops 0.3 m before it.
+#: The margin exceeds `minisim.control.COMMIT_MARGIN`, so the vehicle never looks unable to stop.
 STOP_MARGIN = 0.25
 
 #: How far a recording of the junction alone reaches before its entry and past its exit [m].
@@ -77,12 +77,11 @@ class Law(NamedTuple):
 def build_law(
     site: Site,
     plan: Plan,
-    *,
-    depart_speed: float | None,
-    record: str | None,
-    record_window: tuple[float, float],
+    depart_speed: float | None = None,
+    record: str | None = None,
+    record_window: tuple[float, float] = (0.0, math.inf),
 ) -> Law:
-    """Collect the scalars of a run."""
+    """The scalars of a run."""
     vehicle = site.vehicle
     entry = site.intersection.approach_length
     near = record == "junction"
@@ -115,11 +114,10 @@ def build_law(
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """How much weight this run's law gives a vehicle ahead: from 0, none at all, to infinity.
+    """The weight that this run's law gives a vehicle ahead, from 0 to infinity; the most decides.
 
-    Under the IDM it is the ratio of the desired gap to the actual one; under Krauß's law it is the
-    inverse of the safe speed. If there are several vehicles ahead, the one with the most weight
-    decides.
+    It is the ratio of the desired gap to the actual one under the IDM, and the inverse of the safe
+    speed under Krauß's law.
     """
     if law.model == KRAUSS:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
@@ -129,10 +127,10 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
-    """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
+    """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader comes to rest no sooner than its brakes can stop it, and half the gap at standstill
-    stays free: the laws themselves never come that near.
+    The leader stops no sooner than its brakes can stop it, and half the gap at standstill stays
+    free, closer than the laws themselves ever come.
     """
     room = gap - 0.5 * law.min_gap
     if law.semi_implicit:
@@ -142,7 +140,7 @@ def room_behind(gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
-    """Whether a stop after a step to `v_new` might take more than this room; quick and cautious."""
+    """Whether a stop after a step to `v_new` may take more than this room: quick and cautious."""
     top = v_new if v_new > v else v
     return top * (top + 2.0 * law.b_max * law.dt) > room
 
@@ -151,10 +149,10 @@ def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
 def keep_room(v: float, room: float, law: Law) -> float:
     """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
 
-    With it no vehicle runs into its leader, under any law and at any step: who could stop behind it
-    before the step still can after it, at worst by braking as hard as the leader. No law promises
-    that by itself: the IDM brakes late where the step is long or `acceleration` large, and Krauß's
-    law takes it that nobody brakes harder than b. In ordinary traffic the bound is idle.
+    With it, no vehicle runs into its leader under any law at any step: a vehicle that can stop
+    behind its leader before the step still can after it, at worst by braking as hard as the leader.
+    No law promises that by itself: the IDM brakes late at long steps or a large `acceleration`, and
+    Krauß's law assumes that no vehicle brakes harder than b. Ordinary traffic is not affected.
     Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
     for both vehicles and a reaction time of one step.
     """
@@ -168,8 +166,7 @@ def keep_room(v: float, room: float, law: Law) -> float:
 def follow(v: float, v0: float, z: float, law: Law) -> float:
     """The acceleration that the car-following law gives.
 
-    At a desired speed of 0, this is what the IDM tends to as the desired speed falls to 0:
-    comfortable braking plus the leader's share.
+    At a desired speed of 0 it is the limit of the IDM: comfortable braking and the leader's share.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
@@ -187,7 +184,7 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
 def insertable(gap: float, v_leader: float, law: Law) -> float:
     """Highest speed at which this run's law allows insertion; negative when there is none.
 
-    A law without a rule of its own allows any speed once the gap is at least the one at standstill.
+    A law without a rule allows any speed if the gap is at least the one at standstill.
     Source: `insertionFollowSpeed` of each of SUMO's models.
     """
     if law.model == IDM or law.model == IIDM:
@@ -231,8 +228,8 @@ def krauss_stop(v: float, room: float, law: Law) -> float:
 def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
-    The hold line is like the end of the road: the vehicle brakes comfortably, and no earlier than
-    it must. If that no longer suffices, it brakes as hard as it must to stop before the junction.
+    The vehicle brakes comfortably for its hold line, no earlier than it must. If that does not
+    suffice, it brakes as hard as it must to stop before the junction.
     """
     to_line = law.hold - s
     if law.sumo and law.model == KRAUSS:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from minisim.control import Unregulated
+from minisim.control import Plan
 from minisim.laws import Law, build_law, closeness, follow, insertable, stop_at_line
 from minisim.testing import small_scenario
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
@@ -14,9 +14,7 @@ from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 
 def law(model: str) -> Law:
     vehicle = CruiseVehicle() if model == "cc" else VehicleType(model=model)
-    site = small_scenario(vehicle=vehicle).site(0)
-    plan = Unregulated().start(site).plan
-    return build_law(site, plan, depart_speed=None, record=None, record_window=(0.0, math.inf))
+    return build_law(small_scenario(vehicle=vehicle).site(0), Plan())
 
 
 @pytest.mark.parametrize("model", MODELS)

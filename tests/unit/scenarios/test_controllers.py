@@ -119,12 +119,12 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("mine:Fast(k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
         ("mine:Fast:k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
         ("one-at-a-time:sight=60", "unknown controller 'one-at-a-time'.*or a class of your own"),
-        ("os:PathLike", "os:PathLike is no controller: it has no name and no start"),
-        ("minisim.control:Controller", "Controller is no controller: it is a class"),
+        ("os:PathLike", "os:PathLike is not a controller: it has no name and no start"),
+        ("minisim.control:Controller", "Controller is not a controller: it is a class"),
         ({"name": 3}, "needs a name"),
         ({"name": "dim", "gate": 3}, "unknown gate 3"),
-        (Dim, "is no controller: it is a class"),
-        (5, "5 is no controller: it has no name and no start"),
+        (Dim, "is not a controller: it is a class"),
+        (5, "5 is not a controller: it has no name and no start"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(spec: Any, message: str) -> None:
@@ -170,7 +170,7 @@ def test_names_that_are_taken_are_listed_as_unused(monkeypatch: pytest.MonkeyPat
 
 def test_a_registered_class_that_is_no_controller(monkeypatch: pytest.MonkeyPatch) -> None:
     plugin(monkeypatch, ("extra", "os:PathLike"))
-    with pytest.raises(InputError, match="extra is no controller: it has no name and no start"):
+    with pytest.raises(InputError, match="extra is not a controller: it has no name and no start"):
         controller_named("extra")
 
 

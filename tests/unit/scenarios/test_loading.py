@@ -148,7 +148,7 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
         ("own_mine:Plain(k=1.5)", "k of own_mine:Plain must be a whole number, got 1.5"),
         ("own_mine:Mine(1,'a',3,4,5)", "own_mine:Mine: too many positional arguments"),
         ("own_mine:Failing", "own_mine:Failing cannot be made: RuntimeError: no luck"),
-        ("own_mine:Nothing", "own_mine:Nothing is no controller: it has no name and no start"),
+        ("own_mine:Nothing", "own_mine:Nothing is not a controller: it has no name and no start"),
         ("own_mine", "cannot read controller 'own_mine'.*'own_mine:Mine' or 'own_mine:Plain' or"),
         ("own_mine:", "cannot read controller 'own_mine:'.*; did you mean 'own_mine:Mine' or"),
         ("own_mine.py", "did you mean 'own_mine.py:Mine' or"),
