@@ -44,10 +44,8 @@ def _html_row(name: str, means: Mapping[str, Any]) -> str:
 
 
 def _what(summary: Mapping[str, Any]) -> str:
-    scenario, controller, profile = (
-        _short(summary[name]) for name in ("scenario", "controller", "profile")
-    )
-    return f"{scenario}, {controller}: {conditions({**summary, 'profile': profile})}"
+    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile")}
+    return "{scenario}, {controller}: ".format_map(short) + conditions({**summary, **short})
 
 
 def conditions(summary: Mapping[str, Any]) -> str:
