@@ -44,6 +44,7 @@ OURS: dict[str, Controller] = {
     "actuated": Actuated(presence=False),
     "all-way-stop": AllWayStop(),
 }
+SIGNALS = ("fixed-time", "adaptive", "actuated")
 DENSITIES = (150.0, 200.0, 250.0, 300.0, 350.0)
 AMBER, REACTION = 2.0, 1.0
 #: How much longer SUMO's IDM takes to stand before a red light, to half a second [s]; tested below.
@@ -55,9 +56,6 @@ class Means(NamedTuple):
 
     waiting: float
     travel: float
-
-
-# SUMO's side.
 
 
 def rival(name: str, scenario: Scenario, seed: int, model: str = "IDM") -> Means:
@@ -101,31 +99,27 @@ def write_network(folder: Path, home: Path, junction: str) -> None:
 def routes(scenario: Scenario, seed: int, model: str) -> Iterator[str]:
     vehicle, arrivals = scenario.profile.vehicle, scenario.arrivals(seed)
     law = {"delta": vehicle.exponent} if model == "IDM" else {"sigma": 0}
-    yield tag(
-        "vType",
-        {
-            "id": "car", "carFollowModel": model, **law, "length": vehicle.length,
-            "width": vehicle.width, "minGap": vehicle.min_gap, "accel": vehicle.acceleration,
-            "decel": vehicle.deceleration, "emergencyDecel": vehicle.max_deceleration,
-            "tau": vehicle.headway, "maxSpeed": 28, "speedFactor": 1, "speedDev": 0,
-            "jmAllwayStopWait": REACTION,
-        },
-    )  # fmt: skip
+    yield tag("vType", {
+        "id": "car", "carFollowModel": model, **law, "length": vehicle.length,
+        "width": vehicle.width, "minGap": vehicle.min_gap, "accel": vehicle.acceleration,
+        "decel": vehicle.deceleration, "emergencyDecel": vehicle.max_deceleration,
+        "tau": vehicle.headway, "maxSpeed": 28, "speedFactor": 1, "speedDev": 0,
+        "jmAllwayStopWait": REACTION,
+    })  # fmt: skip
     for path in scenario.intersection.paths:
         edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
         yield tag("route", {"id": path.movement, "edges": edges})
     movements = scenario.intersection.movements
     for i in range(len(arrivals)):
-        movement = movements[3 * arrivals.lane[i] + arrivals.manoeuvre[i] - 1]
-        yield tag(
-            "vehicle",
-            {"id": i, "type": "car", "route": movement, "depart": f"{arrivals.time[i]:.1f}",
-             "departPos": vehicle.length, "departSpeed": "max"},
-        )  # fmt: skip
+        yield tag("vehicle", {
+            "id": i, "type": "car", "depart": f"{arrivals.time[i]:.1f}",
+            "route": movements[movements.rows[arrivals.lane[i]][arrivals.manoeuvre[i]]],
+            "departPos": vehicle.length, "departSpeed": "max",
+        })  # fmt: skip
 
 
 def program(folder: Path, name: str, site: Site) -> Iterator[str]:
-    """One phase an approach: the same greens, or a rule of SUMO's with the same limits."""
+    """One phase per approach: the same greens, or a rule of SUMO's with the same limits."""
     connections = ET.parse(folder / "x.net.xml").getroot().iter("connection")
     arms = {int(c.attrib["linkIndex"]): c.attrib["from"][0] for c in connections if c.get("tl")}
     kind, limits, parameters = "static", {}, {}
@@ -145,9 +139,6 @@ def program(folder: Path, name: str, site: Site) -> Iterator[str]:
             state = "".join(light if arms[i] == arm else "r" for i in range(len(arms)))
             yield tag("phase", {"duration": f"{seconds:.2f}", **more, "state": state})
     yield "</tlLogic>"
-
-
-# Both sides.
 
 
 def our(name: str, scenario: Scenario, seed: int) -> Means:
@@ -188,9 +179,6 @@ def entering_waits(scenario: Scenario, seed: int) -> float:
     return float(run.summary()["waiting_time_s"])
 
 
-# What differs by nature.
-
-
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
 def test_sumos_idm_creeps_up_to_a_red_light(manoeuvre: int) -> None:
     """The same time on the road, but less of it at a standstill; Krauss brakes as ours do."""
@@ -216,17 +204,12 @@ def test_entering_behind_each_other_makes_sumos_short_waits(
     assert honest > 1.3 * theirs
 
 
-# The comparison.
-
-
 def test_a_quarter_of_an_hour_compares() -> None:
     scenario = four_way(250, profile="fair", horizon=900.0)
     ours = {name: our(name, scenario, 1) for name in OURS}
     theirs = {name: rival(name, scenario, 1) for name in OURS}
     assert order(ours, "waiting") == order(theirs, "waiting")
-    assert alike(ours["fixed-time"], theirs["fixed-time"])
-    assert alike(ours["adaptive"], theirs["adaptive"])
-    assert alike(ours["actuated"], theirs["actuated"])
+    assert all(alike(ours[name], theirs[name]) for name in SIGNALS)
 
 
 @pytest.mark.slow
@@ -242,8 +225,7 @@ def test_hours_compare_at_every_density(monkeypatch: pytest.MonkeyPatch) -> None
             cells = itertools.chain(ours[density][name], theirs[name])
             print(f"{name:<13} {density:4.0f}", *(f"{c:7.2f}" for c in cells))  # noqa: T201
         assert order(ours[density], "waiting") == order(theirs, "waiting")
-        signals = ("fixed-time", "adaptive", "actuated")
-        outside += [(n, density) for n in signals if not alike(ours[density][n], theirs[n])]
+        outside += [(n, density) for n in SIGNALS if not alike(ours[density][n], theirs[n])]
     assert outside == []
     enter_as_sumo_does(monkeypatch)
     for density in DENSITIES:

@@ -59,21 +59,10 @@ def test_there_is_one_object_for_an_arm_count_and_it_is_read_only() -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        Movement(0, 0),
-        Movement(3, 1),
-        Movement(-1, 1),
-        "a3",
-        "",
-        "a",
-        "a0",
-        "A1",
-        "a1 ",
-        "a²",
-        None,
-        ["a1"],
-        np.eye(2),
+        Movement(0, 0), Movement(3, 1), Movement(-1, 1), "a3", "", "a", "a0", "A1", "a1 ", "a²",
+        None, ["a1"], np.eye(2),
     ],
-)
+)  # fmt: skip
 def test_an_unknown_movement_is_refused(wrong: object) -> None:
     with pytest.raises(InputError, match="lane a … c and a manoeuvre 1 … 2, such as a1"):
         movements_of(3).number(wrong)  # type: ignore[arg-type]
