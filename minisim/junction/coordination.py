@@ -23,8 +23,7 @@ from minisim.vehicle import VehicleType
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between two bodies, one of which stands or crawls [m]: the buffer of 0.25 m around one of
-#: them (see `CLEARANCE`).
+#: Room between two bodies of which one stands or crawls [m]: one buffer (see `CLEARANCE`).
 CLOSE = 0.25
 
 #: Least room if two vehicles would otherwise stand for ever, and the step of its measurement [m].
@@ -114,15 +113,14 @@ def _grids(
     intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
     """Whether, near each grid point, bodies come closer than `CLEARANCE`, and than `CLOSE`."""
-    one, other = (_until_clear(intersection.paths[k], vehicle) for k in (first, second))
+
+    def until_clear(path: Path) -> Shapes:
+        past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
+        return bodies(path, path.entry + past, vehicle)
+
+    one, other = (until_clear(intersection.paths[k]) for k in (first, second))
     distance = shapely.distance(one[:, None], other[None, :])
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
-
-
-def _until_clear(path: Path, vehicle: VehicleType) -> Shapes:
-    """The body with its front at each grid point, until its rear has left the junction."""
-    past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
-    return bodies(path, path.entry + past, vehicle)
 
 
 def _widened(near: Bools) -> Bools:

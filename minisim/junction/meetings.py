@@ -24,7 +24,7 @@ from minisim.junction.turns import Turn, turns
 
 Bools = npt.NDArray[np.bool_]
 
-#: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
+#: Lanes this far apart no longer touch [m] (`DIVERGENCE_MIN_WIDTH`).
 DIVERGED = 2.5
 
 #: Ways that cross at a smaller angle count as crossing at one of this sine.

@@ -124,17 +124,16 @@ class Metric:
     def number(self, subject: Run | Trips) -> float | int | None:
         """One number, or None if there is none; raises `InputError` for anything else."""
         given = self._measured(subject)
-        plain = given.item() if isinstance(given, np.generic) else given
-        if plain is None or type(plain) is int:
-            return plain
-        if not isinstance(plain, Real) or math.isinf(plain):
+        if given is None:
+            return None
+        if not isinstance(given, Real | np.bool_) or math.isinf(given):
             hint = '; per="trip" takes an array' if isinstance(given, np.ndarray) else ""
             raise InputError(
                 f"metric {self.name!r} must give one finite number or None, got {show(given)}{hint}"
             )
-        if isinstance(plain, Integral):
-            return int(plain)
-        return None if math.isnan(plain) else float(plain)
+        if isinstance(given, Integral | np.bool_):
+            return int(given)
+        return None if math.isnan(given) else float(given)
 
     def _measured(self, subject: Run | Trips) -> Any:
         try:

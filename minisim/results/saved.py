@@ -90,7 +90,7 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
     head = {
         "mark": MARK,
         "layout": LAYOUT,
-        "provenance": run.provenance,  # for human readers; not read back
+        "provenance": run.provenance,  # for people; not read back
         "scenario": _written_or(run.scenario, SavedScenario),
         "controller": _written_or(run.controller, SavedController),
         **{name: written(getattr(run, name)) for name in _VALUES},
@@ -166,8 +166,7 @@ def written(value: object) -> Any:
         return {type(value).__name__: [written(item) for item in value]}  # type: ignore[attr-defined]  # a collection
     if isinstance(value, Mapping):
         return {"mapping": [[written(key), written(item)] for key, item in value.items()]}
-    kind = type(value)
-    if _is_ours(kind):
+    if _is_ours(kind := type(value)):
         return {
             "class": f"{kind.__module__}:{kind.__qualname__}",
             "fields": {name: written(getattr(value, name)) for name in _fields(kind)},

@@ -59,10 +59,7 @@ def conditions(summary: Mapping[str, Any]) -> str:
 
 
 def _trips(summary: Mapping[str, Any]) -> str:
-    return (
-        f"{summary['trips']} trips, {summary['unfinished']} unfinished, "
-        f"{summary['collisions']} collisions"
-    )
+    return "{trips} trips, {unfinished} unfinished, {collisions} collisions".format_map(summary)
 
 
 def _number(value: float | None) -> str:

@@ -20,6 +20,7 @@ from minisim.sumo.network import NETWORK, tag, write_xml
 from minisim.vehicle import MODELS, CruiseVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
+_ATTRIBUTES = ("depart", "arrival", "waitingTime")
 TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
 
 
@@ -118,6 +119,3 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trip
         depart=np.where(departed, depart, np.nan), arrival=np.where(arrived, arrival, np.nan),
         waiting_time=np.where(departed, waiting, 0.0), time_loss=loss,
     )  # fmt: skip
-
-
-_ATTRIBUTES = ("depart", "arrival", "waitingTime")

@@ -169,9 +169,8 @@ def sumo_home() -> Path:
 
 
 def _check_display() -> None:
-    if sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not shown:
         raise SumoError("sumo-gui needs a display, and there is none here; run without the GUI")
 
 
@@ -255,9 +254,8 @@ def _model(asked: str | None, vehicle: VehicleType) -> str:
 
 
 def _command(gui: bool) -> tuple[str, ...]:
-    if gui:
-        return ("sumo-gui", "-c", CONFIGURATION, "--start", "true", "--quit-on-end", "true")
-    return ("sumo", "-c", CONFIGURATION)
+    options = ("--start", "true", "--quit-on-end", "true") if gui else ()
+    return ("sumo-gui" if gui else "sumo", "-c", CONFIGURATION, *options)
 
 
 def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], list[Command]]:

@@ -18,7 +18,6 @@ import numpy as np
 
 from minisim import laws
 from minisim.engine.state import Records
-from minisim.junction.movements import Movements
 from minisim.laws import STOP_MARGIN, Law
 from minisim.sumo.messages import Job
 
@@ -111,7 +110,9 @@ class Follower(Steering):
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
         super().__init__(law, libsumo)
         self._limits = limits(job)
-        self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
+        apart, exits = job.movements.apart, job.movements.exits
+        crossed = apart & (exits[:, None] != exits)  # sharing neither lane nor exit
+        self._crossing = [frozenset(np.flatnonzero(row).tolist()) for row in crossed]
         self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
         self._branch = job.road.branch
         self._inside: list[Car] = []  # in the order in which they entered the junction
@@ -214,9 +215,3 @@ def limits(job: Job) -> list[tuple[list[float], list[float]]]:
 def near(v: float, distance: float, law: Law) -> bool:
     """Whether a hold line `distance` ahead may matter in this step, with a metre to spare."""
     return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
-
-
-def _crossing(path: int, movements: Movements) -> frozenset[int]:
-    """The paths that share neither lane nor exit with this one."""
-    crossed = movements.apart[path] & (movements.exits != movements.exits[path])
-    return frozenset(np.flatnonzero(crossed).tolist())

@@ -192,45 +192,44 @@ def test_sumos_idm_creeps_up_to_a_red_light(manoeuvre: int) -> None:
     assert creeping.travel == pytest.approx(ours.travel, abs=0.5)
 
 
+LENGTHS = pytest.mark.parametrize(
+    ("densities", "seeds", "horizon"),
+    [((250.0,), (1,), 900.0), pytest.param(DENSITIES, (1, 2, 3), 3600.0, marks=pytest.mark.slow)],
+    ids=["a quarter of an hour", "hours at every density"],
+)
+
+
+@LENGTHS
 def test_entering_behind_each_other_makes_sumos_short_waits(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch: pytest.MonkeyPatch, densities: tuple[float, ...], seeds: tuple[int, ...],
+    horizon: float,
+) -> None:  # fmt: skip
     """With SUMO's moment of setting off, our all-way stop waits as long as SUMO's."""
-    scenario = four_way(250, profile="fair", horizon=900.0)
-    honest = our("all-way-stop", scenario, 1).waiting
+    honest = our("all-way-stop", four_way(250, profile="fair", horizon=horizon), 1).waiting
     enter_as_sumo_does(monkeypatch)
-    theirs = rival("all-way-stop", scenario, 1, "Krauss").waiting
-    assert entering_waits(scenario, 1) == pytest.approx(theirs, rel=0.15)
-    assert honest > 1.3 * theirs
-
-
-def test_a_quarter_of_an_hour_compares() -> None:
-    scenario = four_way(250, profile="fair", horizon=900.0)
-    ours = {name: our(name, scenario, 1) for name in OURS}
-    theirs = {name: rival(name, scenario, 1) for name in OURS}
-    assert order(ours, "waiting") == order(theirs, "waiting")
-    assert all(alike(ours[name], theirs[name]) for name in SIGNALS)
-
-
-@pytest.mark.slow
-def test_hours_compare_at_every_density(monkeypatch: pytest.MonkeyPatch) -> None:
-    seeds = range(1, 4)
-    outside = []
-    ours: dict[float, dict[str, Means]] = {}
-    for density in DENSITIES:
-        scenario = four_way(density, profile="fair")
-        ours[density] = {n: over([our(n, scenario, seed) for seed in seeds]) for n in OURS}
-        theirs = {n: over([rival(n, scenario, seed) for seed in seeds]) for n in OURS}
-        for name in OURS:
-            cells = itertools.chain(ours[density][name], theirs[name])
-            print(f"{name:<13} {density:4.0f}", *(f"{c:7.2f}" for c in cells))  # noqa: T201
-        assert order(ours[density], "waiting") == order(theirs, "waiting")
-        outside += [(n, density) for n in SIGNALS if not alike(ours[density][n], theirs[n])]
-    assert outside == []
-    enter_as_sumo_does(monkeypatch)
-    for density in DENSITIES:
-        scenario = four_way(density, profile="fair")
+    for density in densities:
+        scenario = four_way(density, profile="fair", horizon=horizon)
         entering = statistics.fmean(entering_waits(scenario, seed) for seed in seeds)
-        krauss = over([rival("all-way-stop", scenario, seed, "Krauss") for seed in seeds])
-        print(f"entering      {density:4.0f} {entering:7.2f} {krauss.waiting:7.2f}")  # noqa: T201
-        assert abs(entering - krauss.waiting) <= max(0.15 * krauss.waiting, 0.4)
+        theirs = over([rival("all-way-stop", scenario, seed, "Krauss") for seed in seeds]).waiting
+        print(f"entering      {density:4.0f} {entering:7.2f} {theirs:7.2f}")  # noqa: T201
+        assert abs(entering - theirs) <= max(0.15 * theirs, 0.4)
+        assert density != 250.0 or honest > 1.3 * theirs
+
+
+@LENGTHS
+def test_controllers_compare(
+    densities: tuple[float, ...], seeds: tuple[int, ...], horizon: float
+) -> None:
+    outside = []
+    for density in densities:
+        scenario = four_way(density, profile="fair", horizon=horizon)
+        ours, theirs = (
+            {name: over([run(name, scenario, seed) for seed in seeds]) for name in OURS}
+            for run in (our, rival)
+        )
+        for name in OURS:
+            cells = itertools.chain(ours[name], theirs[name])
+            print(f"{name:<13} {density:4.0f}", *(f"{c:7.2f}" for c in cells))  # noqa: T201
+        assert order(ours, "waiting") == order(theirs, "waiting")
+        outside += [(n, density) for n in SIGNALS if not alike(ours[n], theirs[n])]
+    assert outside == []

@@ -45,9 +45,6 @@ def trace(*rows: tuple[float, int, int], until: float, controller: object = None
     return simulation.result()
 
 
-# --- the law -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("v", "u"), [(0.0, 4.0), (10.0, 4.0), (13.0, 1.0), (14.0, 0.0), (15.0, -1.0), (20.0, -1.5)]
 )
@@ -76,9 +73,6 @@ def test_step_response_of_the_lag_is_geometric() -> None:
 def test_semi_implicit_step_moves_with_the_new_speed_and_never_reverses() -> None:
     assert semi_implicit(5.0, 10.0, -2.0, 0.1) == pytest.approx((5.98, 9.8))
     assert semi_implicit(5.0, 0.1, -2.0, 0.1) == (5.0, 0.0)
-
-
-# --- the vehicle in the kernel -------------------------------------------------------------------
 
 
 def test_a_vehicle_starts_at_rest_as_the_closed_form_says() -> None:
@@ -159,9 +153,6 @@ def test_cruise_control_and_model_go_together() -> None:
         VehicleType(model="cc")
     with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
         CruiseVehicle(model="idm")
-
-
-# --- which vehicle is followed -------------------------------------------------------------------
 
 
 def test_a_vehicle_bound_for_the_same_exit_slows_the_first_of_another_lane() -> None:
@@ -255,9 +246,6 @@ def test_a_vehicle_beside_in_the_exit_lane_holds_no_other_back(
     assert chosen(d2, c3)[0] == pytest.approx(acceleration, abs=1e-6)
 
 
-# --- what the radar of SUMO 1.18 sees, and that of 1.28 does not ----------------------------------
-
-
 def asked(v: float, gap: float, v_leader: float, a: float = 0.0) -> float:
     """Acceleration of the next step behind such a leader [m/s²]."""
     return engine_lag(a, distance_control(v, gap, v_leader, 1.5, 0.1, 2.0), 0.5, DT)
@@ -306,9 +294,6 @@ def test_inside_the_one_that_must_yield_counts_from_its_waiting_position() -> No
     assert against(498.0)[0] == pytest.approx(alone[0], abs=1e-9)
 
 
-# --- the ends of the roads ------------------------------------------------------------------------
-
-
 def departs(leaving: int, back: float) -> float:
     """Delay of a vehicle demanded on an arm that another leaves by, `back` s before its arrival."""
     first = (0.0, (leaving + 2) % 4, 2)
@@ -345,9 +330,6 @@ def test_its_top_speed_holds_up_to_the_junctions_exit_only() -> None:
         what = replace(scenario((4.0, 0, 1)), profile=replace(AS_RUN, vehicle=vehicle))
         run = minisim.simulate(what, V2ICAsRun())
         assert run.columns.travel_time[0] == pytest.approx(travel)
-
-
-# --- given ways ----------------------------------------------------------------------------------
 
 
 def test_given_ways_are_the_lengths_of_the_published_networks() -> None:

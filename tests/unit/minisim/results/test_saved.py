@@ -110,9 +110,6 @@ def test_what_is_not_ours_comes_back_as_a_stand_in(tmp_path: Path) -> None:
         minisim.simulate(loaded.scenario, Dim())
 
 
-# --- damage ----------------------------------------------------------------------------------
-
-
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_damaged_file_is_one_sentence(file: Path, data: st.DataObject) -> None:

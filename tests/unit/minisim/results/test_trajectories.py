@@ -61,8 +61,7 @@ def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_p
     read = pd.read_csv(path)
     assert tuple(read.columns) == TRIP_COLUMNS
     pd.testing.assert_frame_equal(read, run.trips, check_dtype=False, rtol=0, atol=1e-6)
-    unfinished = run.trips["arrival_s"].isna()
-    assert unfinished.any()
+    assert run.trips["arrival_s"].isna().any()
     assert "nan" not in path.read_text(encoding="utf-8").lower()
 
 
