@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import minisim
 from baselines import FixedTime
 from dim import AsRunDim
 from minisim.control import Advise, Controller, Plan, Unregulated
 from minisim.errors import InputError, SumoError
 from minisim.simulation import Run
-from minisim.sumo import host, network, simulate
+from minisim.sumo import simulate
 from minisim.testing import check_controller
 from scenarios import five_way, four_way
-from scenarios.cli import main
-from scenarios.library import MAKERS
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.scenario import Scenario
 from tests.builders import Fixed, as_run, replayed
+from tests.sumo.conftest import both
 
 
 def hosted(scenario: Scenario) -> Scenario:
@@ -37,17 +33,12 @@ def hosted(scenario: Scenario) -> Scenario:
 AS_RUN_FOUR = hosted(four_way(profile="as_run"))
 
 
-def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, ...]:
-    runs = (minisim.simulate, simulate)
-    return tuple(run(scenario, controller, on_collision="record", **options) for run in runs)
-
-
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
 @pytest.mark.parametrize("controller", [Unregulated(), AsRunDim()], ids=lambda c: c.name)
 def test_a_vehicle_alone_drives_alike(controller: Controller, manoeuvre: int) -> None:
     """as_run.md: DIM left, straight and right 63.99, 64.26 and 64.24 s."""
     scenario = replayed(AS_RUN_FOUR, (0.0, 0, manoeuvre), horizon=80.0)
-    ours, theirs = both(scenario, controller, record="all")
+    ours, theirs = both(scenario, controller, record="all", on_collision="record")
     a, b = ours.trace, theirs.trace
     assert len(a) == pytest.approx(len(b), abs=1)  # minisim has no line of the insertion itself
     b = b[b["tick"] > 0][: len(a)]
@@ -59,15 +50,6 @@ def test_a_vehicle_alone_drives_alike(controller: Controller, manoeuvre: int) ->
     if isinstance(controller, AsRunDim):
         published = {1: 63.99, 2: 64.26, 3: 64.24}[manoeuvre]
         assert theirs.columns.travel_time == pytest.approx([published], abs=0.011)
-
-
-@pytest.mark.parametrize("arms", [3, 4, 5])
-def test_the_published_junctions_have_the_published_lengths(arms: int, tmp_path: Path) -> None:
-    junction = MAKERS[arms](profile="as_run").intersection
-    made = network.build_network(junction, 14.0, tmp_path, host.sumo_home())
-    for path, approach, inside in zip(junction.paths, made.approach, made.inside, strict=True):
-        assert approach == pytest.approx(path.entry, abs=0.006)
-        assert inside == pytest.approx(path.exit - path.entry, abs=0.011)
 
 
 def test_ways_that_are_not_netconverts_are_refused() -> None:
@@ -101,7 +83,7 @@ SHARES = [
 )
 def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: float) -> None:
     scenario = replace(replay(*cell, sumo="1.28"), horizon=horizon)
-    ours, theirs = both(scenario, controller_of(*cell))
+    ours, theirs = both(scenario, controller_of(*cell), on_collision="record")
     a, b = ours.columns, theirs.columns
     ended = a.arrived & b.arrived
     assert ended.sum() > 10
@@ -152,7 +134,7 @@ def test_a_held_vehicle_stops_at_its_line(hold_distance: float) -> None:
 def test_advice_comes_before_and_after_insertion() -> None:
     scenario = replayed(AS_RUN_FOUR, (2.0, 0, 2), horizon=90.0)
     early = Fixed(Plan(lanes_open=True), (Advise(0, 8.0),))
-    ours, theirs = both(scenario, early)
+    ours, theirs = both(scenario, early, on_collision="record")
     assert ours.columns.travel_time[0] > 80.0 or not ours.columns.arrived[0]
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
 
@@ -193,18 +175,6 @@ def test_models_that_do_not_fit_are_told(profile: Any, model: str | None, messag
         simulate(replace(AS_RUN_FOUR, profile=profile), Unregulated(), model=model)
 
 
-def test_the_command_line_replays_in_sumo(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    source = resources.files("scenarios") / "data" / "arrivals" / "balanced_150_dim_4way.csv"
-    command = ["run", "four-way", "--profile", "as_run", "--host", "sumo", "--horizon", "120"]
-    command += ["--arrivals", str(source), "--on-collision", "record", "--json", "--no-safety"]
-    assert main(command) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["host"] == "sumo"
-    assert printed["travel_time_s"] == pytest.approx(66.0, abs=4.0)
-
-
 @pytest.mark.parametrize(
     ("pair", "controller", "sumo_sees"),
     [
@@ -221,7 +191,7 @@ def test_sumo_looks_for_collisions_between_foes_only(
     """Why minisim counts more touches in the published run of 5 arms at 350 veh/h."""
     five = hosted(five_way(profile="as_run"))
     scenario = replayed(five, *((0.0, *movement) for movement in pair), horizon=70.0)
-    ours, theirs = both(scenario, controller, record="all")
+    ours, theirs = both(scenario, controller, record="all", on_collision="record")
     assert len(ours.collisions) == 1
     assert len(theirs.collisions) == sumo_sees
     touch = ours.collisions[0]

@@ -93,8 +93,7 @@ def test_sixteen_steps_of_the_start_count_as_waiting() -> None:
 def test_speed_limits_mean_nothing() -> None:
     """No vehicle slows for a turn; the cruise speed holds all the way."""
     run = minisim.simulate(scenario((0.0, 0, 3)), Unregulated(), record="all")
-    frame = run.trajectories
-    inside = frame[(frame["s_m"] > 480.0) & (frame["s_m"] < 520.0)]
+    inside = run.trajectories[run.trajectories["s_m"].between(480.0, 520.0)]
     assert inside["speed_mps"].to_numpy() == pytest.approx(14.0, abs=1e-6)
     assert run.site.intersection.turn_speed(run.site.intersection.movements[2], 5.5) < 9.0
 
@@ -294,15 +293,6 @@ def test_inside_the_one_that_must_yield_counts_from_its_waiting_position() -> No
     assert against(498.0)[0] == pytest.approx(alone[0], abs=1e-9)
 
 
-def departs(leaving: int, back: float) -> float:
-    """Delay of a vehicle demanded on an arm that another leaves by, `back` s before its arrival."""
-    first = (0.0, (leaving + 2) % 4, 2)
-    end = trace(first, until=100.0).columns.arrival[0]
-    when = round(end - back, 2)
-    run = trace(first, (when, leaving, 2), until=when + 3.0)
-    return float(run.columns.depart[run.columns.lane == leaving][0] - when)
-
-
 @pytest.mark.parametrize(
     ("arm", "back", "delay"),
     # A vehicle at 14 m/s wants 14 m, and the turnaround of 4.67 m counts.
@@ -311,7 +301,11 @@ def departs(leaving: int, back: float) -> float:
 def test_where_the_road_leads_back_one_that_arrives_delays_an_insertion(
     arm: int, back: float, delay: float
 ) -> None:
-    assert departs(arm, back) == pytest.approx(delay)
+    """The other leaves by the same arm, `back` s after the insertion is due."""
+    first = (0.0, (arm + 2) % 4, 2)
+    when = round(trace(first, until=100.0).columns.arrival[0] - back, 2)
+    columns = trace(first, (when, arm, 2), until=when + 3.0).columns
+    assert columns.depart[columns.lane == arm][0] - when == pytest.approx(delay)
 
 
 def test_teleport_takes_the_one_off_the_road_that_runs_into_another_on_its_exit() -> None:

@@ -30,11 +30,6 @@ JUNCTION = SITE.intersection
 ENTRY = JUNCTION.approach_length
 
 
-@pytest.fixture(scope="module", params=["left", "right"])
-def square(request: pytest.FixtureRequest) -> Intersection:
-    return Intersection(SQUARE, side=request.param)
-
-
 def test_turning_the_whole_junction_changes_nothing_but_the_view() -> None:
     first, turned = (Intersection(tuple(b + by for b in ODD)) for by in (0.0, 20.0))
     np.testing.assert_allclose(separation(turned, CAR), separation(first, CAR), atol=1e-9)
@@ -56,8 +51,10 @@ def test_opposite_straight_corridors_are_a_lane_minus_a_body_apart() -> None:
     assert conflicts(four, CAR, 1.41)[a2, c2] == np.True_
 
 
-def test_room_beside_a_held_vehicle(square: Intersection) -> None:
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_room_beside_a_held_vehicle(side: str) -> None:
     """Straight traffic passes at a lane minus a body; a vehicle that turns in cuts the corner."""
+    square = Intersection(SQUARE, side=side)  # type: ignore[arg-type]
     assert 1.0 < entry_room(square, CAR) < 3.2 - 1.8
     bus = VehicleType(length=12.0, width=2.5)
     assert entry_room(square, bus) == 0.0

@@ -22,15 +22,11 @@ PATTERN = re.compile(
 )
 
 #: Expressions that it must find.
-BY_HAND = [
-    "lane * (site.intersection.n - 1)",
-    "path % (len(lanes) - 1) + 1",
-    "path_of // manoeuvres",
-    "(m.origin + m.manoeuvre) % self.n",
-    "1 << manoeuvre - 1",
-    "np.repeat(np.arange(n), n - 1)",
+BY_HAND = (
+    "lane * (site.intersection.n - 1)", "path % (len(lanes) - 1) + 1", "path_of // manoeuvres",
+    "(m.origin + m.manoeuvre) % self.n", "1 << manoeuvre - 1", "np.repeat(np.arange(n), n - 1)",
     "[(i, j) for i in range(n) for j in range(1, n)]",
-]
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 12])

@@ -93,10 +93,9 @@ def test_a_leader_that_has_turned_off_is_none() -> None:
     a1, a2 = map(SITE.intersection.index, ("a1", "a2"))
     parts = branch(SITE.intersection, SITE.vehicle)[a1, a2] - ENTRY
     follower = at(2, "a2", -3.0, 8.0)
-    still = frame_of(at(1, "a1", parts + 5.0 - 0.1, 4.0), follower)
-    gone = frame_of(at(1, "a1", parts + 5.0 + 0.1, 4.0), follower)
-    assert len(following(still, SITE)) == 1
-    assert len(following(gone, SITE)) == 0
+    for beyond, led in ((-0.1, 1), (0.1, 0)):
+        frame = frame_of(at(1, "a1", parts + 5.0 + beyond, 4.0), follower)
+        assert len(following(frame, SITE)) == led
 
 
 def test_behind_one_that_has_turned_off_the_next_one_ahead_counts() -> None:
@@ -138,7 +137,6 @@ def test_pet_of_two_crossing_vehicles(headway: float, pet: float) -> None:
     frame = frame_of(*drive(1, "a2", 10.0, 10.0), *drive(2, "b2", 10.0 + headway, 10.0))
     (row,) = encroachments(frame, SITE).to_dict("records")
     assert (row["first"], row["second"]) == (1, 2)
-    assert row["pet_s"] == pytest.approx(pet, abs=0.02)
     assert row["time_s"] == pytest.approx(10.0 + headway + 0.47, abs=0.01)
     summary = safety_summary(frame, SITE)
     assert summary["min_pet_s"] == pytest.approx(pet, abs=0.02)
@@ -201,11 +199,10 @@ def test_crossing_ttc_is_the_time_of_the_second_to_the_area() -> None:
 
 
 def test_a_vehicle_without_right_of_way_is_on_no_crossing_course() -> None:
-    first = at(1, "a2", 5.0, 10.0)
-    assert len(crossings(frame_of(first, at(2, "b2", -1.0, 8.0, row=False)), SITE)) == 0
-    assert len(crossings(frame_of(first, at(2, "b2", -1.0, 8.0)), SITE)) == 1
     # Inside the junction it crosses, with or without right of way.
-    assert len(crossings(frame_of(first, at(2, "b2", 0.1, 8.0, row=False)), SITE)) == 1
+    for s, row, crosses in ((-1.0, False, 0), (-1.0, True, 1), (0.1, False, 1)):
+        frame = frame_of(at(1, "a2", 5.0, 10.0), at(2, "b2", s, 8.0, row=row))
+        assert len(crossings(frame, SITE)) == crosses
 
 
 def test_braking_is_the_strongest_of_all() -> None:

@@ -213,6 +213,7 @@ values = st.recursive(
 )
 
 
+@settings(max_examples=50)
 @given(value=values)
 def test_values_come_back(value: Any) -> None:
     back = made(json.loads(json.dumps(written(value), allow_nan=False)))

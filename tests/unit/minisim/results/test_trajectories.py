@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -74,15 +73,11 @@ def test_parquet_without_pyarrow_says_what_to_install(
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    ("write", "frame"),
-    [(write_trips, 5), (write_trips, pd.DataFrame()), (write_trajectories, pd.DataFrame())],
-)
-def test_a_frame_without_the_columns_is_an_error(
-    tmp_path: Path, write: Callable[[Any, Path], None], frame: object
-) -> None:
-    with pytest.raises(InputError, match=r"DataFrame|no column (time_s|vehicle)"):
-        write(frame, tmp_path / "out.csv")
+@pytest.mark.parametrize("write", [write_trips, write_trajectories])
+def test_a_frame_without_the_columns_is_an_error(tmp_path: Path, write: Any) -> None:
+    for frame, message in ((5, "DataFrame"), (pd.DataFrame(), "no column (time_s|vehicle)")):
+        with pytest.raises(InputError, match=message):
+            write(frame, tmp_path / "out.csv")
 
 
 def test_fcd_follows_the_schema_of_sumo_and_says_what_the_frame_says(
