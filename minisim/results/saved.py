@@ -123,9 +123,8 @@ def load(path: str | os.PathLike[str]) -> Run:
             if head.get("mark") != MARK:
                 raise foreign
             if (layout := head["layout"]) != LAYOUT:
-                raise FileError(
-                    f"{place} has layout {show(layout)}, this version reads layout {LAYOUT}"
-                )
+                ours = f"this version of minisim reads layout {LAYOUT}"
+                raise FileError(f"{place} has layout {show(layout)}, {ours}")
             if data != _signed(data):
                 raise FileError(f"{place} is damaged: it is not what was saved")
             return _run(head, file)

@@ -16,6 +16,7 @@ from minisim.errors import InputError, SumoError
 from minisim.simulation import Run
 from minisim.sumo import simulate
 from minisim.testing import check_controller
+from minisim.vehicle import VehicleType
 from scenarios import five_way, four_way
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.profiles import AS_RUN, FAIR
@@ -166,6 +167,7 @@ def test_teleport_takes_a_vehicle_that_runs_into_another_off_the_road() -> None:
     [
         (FAIR, "CC", "CC does not .* 'idm'; choose IDM or Krauss, .*: use --profile as_run"),
         (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
+        (replace(FAIR, vehicle=VehicleType(model="krauss")), "IDM", "'krauss'; choose Krauss, or"),
         (replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)), None,
          "CC keeps a spacing of 2 m and sees 250 m far, the vehicles 2 m and 100 m"),
     ],

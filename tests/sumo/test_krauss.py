@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from baselines import FixedTime
-from minisim.errors import InputError
 from minisim.simulation import Run
-from minisim.sumo import simulate
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.paper import Cell, controller_of, replay
@@ -38,11 +36,6 @@ def test_vehicles_of_krauss_drive_krauss_in_sumo_and_trips_agree_one_by_one() ->
         apart = np.abs(difference(ours, theirs, column))
         assert (apart <= 0.3).mean() >= 0.95
         assert apart.max() <= 1.5
-
-
-def test_another_model_of_sumo_does_not_drive_them() -> None:
-    with pytest.raises(InputError, match="choose Krauss"):
-        simulate(four_way(100, profile=FAIR_KRAUSS, horizon=10.0), FixedTime(), model="IDM")
 
 
 @pytest.mark.slow

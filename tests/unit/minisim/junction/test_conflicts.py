@@ -105,17 +105,6 @@ def test_a_vehicle_that_leaves_by_the_same_arm_is_in_the_way_until_it_is_out() -
     assert np.isinf(clearing[merging]).all()
 
 
-def test_straight_ways_are_clear_where_the_drawing_says() -> None:
-    # Left-hand, lanes of 3.2 m, entries 7.2 m from the centre. a2 drives south on x = 1.6, b2
-    # west on y = -1.6: it has left a2's way when its rear is at x = 1.6 - 0.9 - 0.5, so its front
-    # has driven 7.2 - 0.2 + 5.0 = 12.0 m.
-    clearing, index = clearing_distances(JUNCTION, SITE.vehicle), JUNCTION.index
-    a2, b2, d2 = (index(Movement(lane, 2)) for lane in (0, 1, 3))
-    assert clearing[a2, b2] == pytest.approx(12.0, abs=0.26)
-    # d2 drives east on y = 1.6 and has to get 3.2 m farther.
-    assert clearing[a2, d2] == pytest.approx(15.2, abs=0.26)
-
-
 def test_the_conflict_area_of_two_straight_movements() -> None:
     """a2 drives south at x = 1.6 ± 0.9; b2 drives west at y = −1.6 ± 0.9."""
     areas = conflict_areas(JUNCTION, SITE.vehicle)
