@@ -147,9 +147,8 @@ def count(
                 unclassified.append(pair)
 
     ask()
-    width = max(map(len, counts))
     for kind, pairs in counts.most_common():
-        print(f"{kind:<{width}} {pairs:>7}")  # noqa: T201  (shown by pytest -s)
+        print(f"{pairs:>7} {kind}")  # noqa: T201  (shown by pytest -s)
     return counts, unclassified
 
 
