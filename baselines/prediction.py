@@ -27,6 +27,7 @@ from minisim.laws import (
     room_behind,
     short_of,
     slow_down,
+    within,
 )
 
 Floats = npt.NDArray[np.float64]
@@ -174,7 +175,7 @@ def _drive(
                             room = min(room, room_behind(rear - s, exit_lane.v[j, k], law))
                     break
         v0 = course.turn if 0.0 <= s < course.crossing else course.limit
-        acc = follow(v, v0, max(z, z_exit), law)
+        acc = within(v, follow(v, v0, max(z, z_exit), law), v0, law)
         if z_exit > z and acc < -law.b:
             hard = True
         if s < 0.0 and braking_begins(v, -s, law):

@@ -53,6 +53,13 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
+        room = self.intersection.approach_length
+        if (needed := self.vehicle.length + self.vehicle.margin) >= room:
+            raise InputError(
+                f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
+                f"{room:g} m; arm_length must be more than "
+                f"{self.intersection.arm_length - room + needed:g} m"
+            )
         if entry_room(self.intersection, self.vehicle) <= 0.0:
             raise InputError(
                 f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "

@@ -8,7 +8,7 @@ predicts by them.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from minisim.carfollowing import (
     STILL,
@@ -25,6 +25,7 @@ from minisim.carfollowing import (
 )
 from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
+from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
 from minisim.vehicle import MODELS, POSITION_EPS
 
@@ -63,6 +64,7 @@ class Law(NamedTuple):
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
     leave: float  # s up to which a vehicle at least stays in view
+    room: float  # see `minisim.junction.partings.turning_room`
     margin: float  # see `minisim.vehicle.VehicleType`
     sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
@@ -85,7 +87,7 @@ def build_law(
     vehicle = site.vehicle
     entry = site.intersection.approach_length
     near = record == "junction"
-    return Law(
+    law = Law(
         dt=site.dt,
         a=vehicle.acceleration,
         b=vehicle.deceleration,
@@ -100,6 +102,7 @@ def build_law(
         entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
+        room=turning_room(site.intersection, site.vehicle),
         margin=vehicle.margin,
         sumo=vehicle.sumo is not None,
         sight=plan.sight,
@@ -110,6 +113,12 @@ def build_law(
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )
+    # A whole number for a float would have every kernel compiled once more.
+    whole = ("model", "record_from", "record_to")
+    plain: dict[str, Any] = {
+        k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole
+    }
+    return law._replace(**plain)
 
 
 @njit_inline
@@ -129,10 +138,10 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
     """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader stops no sooner than its brakes can stop it, and half the gap at standstill stays
-    free, closer than the laws themselves ever come.
+    The leader stops no sooner than its brakes can stop it, and what corners need in a turn stays
+    free.
     """
-    room = gap - 0.5 * law.min_gap
+    room = gap - law.room
     if law.semi_implicit:
         return 2.0 * law.b_max * (room + braking_distance(v_leader, law.b_max, law.dt))
     return 2.0 * law.b_max * room + v_leader * v_leader
@@ -178,6 +187,15 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
     if law.model == IIDM:
         return iidm(v, v0, z, law.a, law.b, law.delta)
     return idm(v, v0, z, law.a, law.b, law.delta)
+
+
+@njit_inline
+def within(v: float, acc: float, limit: float, law: Law) -> float:
+    """`acc`, unless a step of it would take a vehicle past its speed limit.
+
+    Where a·dt is large the IDM would overshoot: it takes a step for short.
+    """
+    return min(acc, (limit - v) / law.dt) if v < limit else acc
 
 
 @njit

@@ -28,6 +28,7 @@ from minisim.laws import (
     room_behind,
     short_of,
     slow_down,
+    within,
 )
 
 #: Reasons to return, as bits.
@@ -165,8 +166,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 overlap |= gap <= 0.0 and s >= ends[p, 0]
 
             section, factor = me["section"], me["factor"]
-            v0 = min(speed[p, section] * factor, me["advice"])
-            acc = follow(v, v0, z, law)
+            limit = speed[p, section] * factor
+            acc = within(v, follow(v, min(limit, me["advice"]), z, law), limit, law)
             k = section + 1
             while braking_begins(v, start[p, k] - s, law):
                 acc = min(acc, slow_down(v, acc, speed[p, k] * factor, start[p, k] - s, law))

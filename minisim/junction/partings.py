@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from minisim.junction.geometry import Intersection
@@ -31,6 +32,45 @@ def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
         return float(s[np.flatnonzero(gaps < vehicle.width + BRANCH_ROOM)[-1]]) + 0.25
 
     return _by_lane(intersection, 0.0, last_near)
+
+
+@lru_cache(maxsize=256)
+def turning_room(intersection: Intersection, vehicle: VehicleType) -> float:
+    """The largest gap at which a vehicle still touches the one ahead in its lane [m].
+
+    On a straight road that is 0. In a turn the two bodies, chords of their paths, stand at an
+    angle, and their corners touch while the middles of the bumpers are apart: by up to
+    w·tan(arcsin(l/2r)) on one arc of radius r.
+    """
+    gaps = np.arange(0.0, 3.0, 0.1) * vehicle.width
+    reach = branch(intersection, vehicle)
+    paths, least = intersection.paths, 0.0
+    for p, q in np.argwhere(reach > 0.0).tolist():
+        path = paths[p]
+        rear = np.arange(path.entry, min(float(reach[p, q]), path.exit + vehicle.length), 0.3)
+        first = path.pose(rear + vehicle.length, vehicle.length)
+        second = paths[q].pose(np.subtract.outer(gaps, rear) * -1.0, vehicle.length)
+        touching = gaps[_overlap(first, second, vehicle).any(axis=-1)]
+        least = max(least, *touching) if len(touching) else least
+    return float(least) + 0.1 * vehicle.width
+
+
+def _overlap(
+    first: tuple[Floats, Floats], second: tuple[Floats, Floats], vehicle: VehicleType
+) -> npt.NDArray[np.bool_]:
+    """Whether bodies overlap, given by centres and headings (..., 2): separating-axis test."""
+    apart, (u, w) = first[0] - second[0], np.broadcast_arrays(first[1], second[1])
+    cos = np.abs((u * w).sum(axis=-1))
+    sin = np.abs(u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0])
+    long, wide = vehicle.length / 2.0, vehicle.width / 2.0
+    meet = np.ones(cos.shape, bool)
+    for axis in (u, w):
+        along = np.abs((apart * axis).sum(axis=-1))
+        across = np.abs(apart[..., 0] * axis[..., 1] - apart[..., 1] * axis[..., 0])
+        meet &= (along <= long + long * cos + wide * sin) & (
+            across <= wide + long * sin + wide * cos
+        )
+    return meet
 
 
 @lru_cache(maxsize=64)

@@ -11,6 +11,7 @@ from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
 from scenarios.controllers import controller_named
 from scenarios.strategies import floats
+from tests.builders import as_run
 
 STEPS = st.sampled_from([0.5, 0.3, 0.2, 0.1])
 
@@ -36,27 +37,50 @@ def car(**parts: float) -> VehicleType:
     return VehicleType(max_deceleration=parts.pop("max_deceleration", 1000.0), **parts)
 
 
-@given(any_vehicle(), STEPS, floats(0.5, 100.0), st.sampled_from(["fixed-time", "dim"]))
-@example(car(acceleration=50.0, deceleration=20.0, min_gap=0.5), 0.2, 5.0, "fixed-time")
+@given(
+    any_vehicle(), STEPS, floats(0.5, 100.0), st.sampled_from(["fixed-time", "dim"]),
+    st.sampled_from([350.0, 1500.0]), st.just(3),
+)  # fmt: skip
 @example(
-    car(acceleration=10.0, deceleration=20.0, exponent=50.0, headway=0.8), 0.5, 0.5, "fixed-time"
-)
+    car(acceleration=50.0, deceleration=20.0, min_gap=0.5, max_deceleration=54.0),
+    0.2, 5.0, "fixed-time", 3000.0, 3,
+)  # fmt: skip
 @example(
-    car(acceleration=50.0, deceleration=1.0, headway=0.5, speed_deviation=0.5), 0.5, 1.0, "dim"
-)
-@example(car(acceleration=0.1, headway=0.5, max_deceleration=6.0), 0.3, 100.0, "fixed-time")
-@settings(max_examples=25)
+    car(acceleration=10.0, deceleration=20.0, exponent=50.0, headway=0.8, min_gap=0.5),
+    0.5, 0.5, "fixed-time", 350.0, 3,
+)  # fmt: skip
+@example(
+    car(acceleration=50.0, deceleration=1.0, headway=0.5, speed_deviation=0.5),
+    0.5, 1.0, "fixed-time", 350.0, 3,
+)  # fmt: skip
+@example(
+    car(acceleration=0.1, headway=0.5, max_deceleration=6.0), 0.3, 100.0, "dim", 3000.0, 3
+)  # fmt: skip
+# In a turn the corners of bodies touch that have half a metre between the middles of the bumpers.
+@example(
+    car(acceleration=100.0, min_gap=0.5, headway=8.28, speed_deviation=0.5, max_deceleration=30.0),
+    0.25, 0.5, "fixed-time", 3000.0, 5,
+)  # fmt: skip
+@settings(max_examples=12)
 def test_nobody_runs_into_the_one_ahead(
-    vehicle: VehicleType, dt: float, limit: float, controller: str
+    vehicle: VehicleType, dt: float, limit: float, controller: str, density: float, arms: int
 ) -> None:
     scenario = small_scenario(
-        3, vehicle=vehicle, dt=dt, speed_limit=limit, density=1000.0, demand_time=40.0, drain=40.0,
-        arm_length=150.0,
+        arms, vehicle=vehicle, dt=dt, speed_limit=limit, density=density, demand_time=40.0,
+        drain=40.0 + 120.0 / limit, arm_length=80.0 if arms > 3 else 60.0,
     )  # fmt: skip
-    run = simulate(scenario, controller_named(controller), seed=1, on_collision="record")
+    run = simulate(scenario, controller_named(controller), seed=2, on_collision="record")
     lane = run.columns.lane
     touched = [c for c in run.collisions if lane[c.vehicles[0]] == lane[c.vehicles[1]]]
     assert not touched, str(touched[0])
+
+
+def test_the_cruise_control_of_the_published_runs_does_not_either() -> None:
+    """Others may: it keeps no distance to stop in."""
+    scenario = as_run(small_scenario(3, density=350.0, demand_time=60.0, drain=180.0))
+    run = simulate(scenario, controller_named("fixed-time"), seed=1, on_collision="record")
+    assert run.columns.arrived.all()
+    assert run.collisions == ()
 
 
 @given(floats(0.0, 100.0), floats(0.0, 200.0), floats(0.5, 1000.0), STEPS)

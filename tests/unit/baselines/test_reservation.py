@@ -17,6 +17,7 @@ from baselines.reservation import ReservationSession, Slot
 from minisim.control import Command, Go, Hold, Observed, Session, Site, Unregulated, View, Wake
 from minisim.errors import InputError
 from minisim.junction.partings import branch
+from minisim.testing import SmallScenario
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
 from scenarios.profiles import Profile
@@ -240,6 +241,19 @@ def test_vehicles_that_follow_krauss_at_long_headways_and_coarse_steps_do_not_co
     profile = Profile(name="test", vehicle=vehicle, speed_limit=100.0, dt=0.25)
     scenario = four_way(350, profile=profile, arm_length=80.0, horizon=300.0)
     minisim.simulate(scenario, Reservation(), seed=1)  # a collision raises
+
+
+def test_vehicles_that_could_pass_the_limit_within_a_step_do_not_collide() -> None:
+    """At 22.9 m/s² and steps of 0.5 s, a2 reached 14 m/s at a limit of 10 and hit b2 at 30 s."""
+    vehicle = VehicleType(
+        model="iidm", acceleration=22.9, deceleration=0.1, min_gap=4.32, max_deceleration=2.0
+    )
+    scenario = SmallScenario(
+        bearings=(0.0, 75.0, 190.0, 260.0), density=1200.0, demand_time=15.0, drain=35.0,
+        arm_length=150.0, vehicle=vehicle, speed_limit=9.92, dt=0.5,
+    )  # fmt: skip
+    run = minisim.simulate(scenario, Reservation(), 2, record="all")  # a collision raises
+    assert run.trace["v"].max() <= 9.92 + 1e-9
 
 
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)

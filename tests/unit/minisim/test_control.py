@@ -48,6 +48,15 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
         ({"demand": (1.0, 2.0, 3.0, -1.0)}, "demand must be 4 numbers"),
         ({"vehicle": VehicleType(length=12.0, width=2.5)}, r"12 × 2\.5 m do not fit lanes of 3\.2"),
         ({"vehicle": VehicleType(width=3.3)}, "do not fit lanes"),
+        (
+            {
+                "vehicle": VehicleType(length=12.0),
+                "intersection": Intersection(
+                    FOUR.bearings, lane_width=6.0, junction_radius=20.0, arm_length=31.0
+                ),
+            },
+            "no vehicle of 12 m can be inserted on approach lanes of 11 m; .* more than 32 m",
+        ),
     ],
 )
 def test_sites_are_checked(change: dict[str, object], message: str) -> None:

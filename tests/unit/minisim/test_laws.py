@@ -65,3 +65,9 @@ def test_sumos_vehicles_stop_a_metre_before_the_line_or_nearer_if_they_must() ->
     assert ends(5.0, 14.0) == pytest.approx(1.001, abs=1e-9)
     assert ends(0.9, 14.0) == pytest.approx(0.861, abs=1e-9)  # 0.04 m are what it needs to brake
     assert ends(0.05, 14.0) == pytest.approx(0.05)  # SUMO keeps 0.1 m, but never drives back
+
+
+def test_whole_numbers_do_not_have_the_kernels_compiled_once_more() -> None:
+    site = small_scenario(vehicle=VehicleType(acceleration=2, headway=1), speed_limit=14).site(0)
+    made = build_law(site, Plan(), depart_speed=5, record=None, record_window=(0.0, math.inf))
+    assert [type(x) for x in made] == [type(x) for x in law("idm")]

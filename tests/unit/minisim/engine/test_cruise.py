@@ -357,7 +357,8 @@ def obeying(
     s: float, v: float, a: float, *, lane: int = 0, manoeuvre: int = 1
 ) -> tuple[Records, Callable[[], bool]]:
     """The vehicle's acceleration, and its row, of a car alone that obeys limits at a red light."""
-    what = MAKERS[4](profile="as_run_obeying", recorded=arrivals((0.0, lane, manoeuvre)))
+    car = (0.0, lane, manoeuvre)
+    what = replayed(MAKERS[4](profile="as_run_obeying"), car, horizon=200.0)
     site = what.site(0)
     road = build_road(site, FixedTime().start(site).plan)
     law = build_law(

@@ -10,7 +10,7 @@ import pytest
 
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
-from minisim.junction.partings import branch, parting, showing
+from minisim.junction.partings import branch, parting, showing, turning_room
 from minisim.vehicle import VehicleType
 
 CAR = VehicleType()
@@ -72,3 +72,11 @@ def test_ways_part_where_the_arc_has_left_the_straight_line(apart: float) -> Non
     assert (np.diag(parts) == math.inf).all()
     assert (parts[FOUR.movements.apart] == -math.inf).all()
     assert (parting(FOUR, 1e3)[0, :3] == math.inf).all()  # never so far
+
+
+def test_corners_need_room_in_a_turn_as_on_one_arc() -> None:
+    """The tightest turn of four arms has a radius of 5.6 m; the search is in steps of w/10."""
+    for length, width in ((5.0, 1.8), (4.0, 2.0)):
+        arc = width * math.tan(math.asin(length / (2.0 * 5.6)))
+        room = turning_room(FOUR, VehicleType(length=length, width=width))
+        assert arc <= room <= arc + 0.2 * width
