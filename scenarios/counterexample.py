@@ -29,12 +29,8 @@ def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> A
     """Arrivals in the order of one of `paths` that end in a collision; None if there are none.
 
     All vehicles want to enter the road at time 0, except the last one. It comes after the shortest
-    delay that ends in a collision on any path.
-
-    Args:
-        scenario: junction and profile; its demand is not used.
-        dim: the rules under which the paths were found.
-        paths: paths to unsafe states (`dim.proofs.modelcheck.explore`).
+    delay that ends in a collision on any path. The scenario gives junction and profile, `dim` the
+    rules under which the paths to unsafe states were found (`dim.proofs.modelcheck.explore`).
     """
     for step in range(round(LATEST / scenario.profile.dt)):
         for path in paths:

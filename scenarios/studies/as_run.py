@@ -40,7 +40,6 @@ STUDY = Study(
         PublishedPoint(SERIES[cell.controller], cell.arms, cell.split, float(cell.density))
         for cell in (*GRID, *BASELINE_GRID)
     ),
-    # The published V2I-C decides every 0.01 s. A simulated hour costs some 20 s of CPU, a hundred
-    # times that of a signal, and its runs differ little.
+    # It decides every 0.01 s, so that an hour costs some 20 s of CPU, and its runs differ little.
     {"v2ic": 3},
 )
