@@ -88,6 +88,7 @@ class Observed(NamedTuple):
         demand_time: when it wanted to enter the road [s].
         rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
             rank: its id depends on the arrivals on other lanes.
+        speed_factor: its driver's factor on the speed limit.
     """
 
     id: int
@@ -98,6 +99,7 @@ class Observed(NamedTuple):
     length: float
     demand_time: float = 0.0
     rank: int = 0
+    speed_factor: float = 1.0
 
     @property
     def movement(self) -> Movement:

@@ -26,7 +26,7 @@ from minisim.carfollowing import (
 from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
 from minisim.ticks import NEVER, first_tick
-from minisim.vehicle import MODELS
+from minisim.vehicle import MODELS, POSITION_EPS
 
 #: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
 #: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
@@ -35,8 +35,15 @@ STOP_MARGIN = 0.25
 #: How far a recording of the junction alone reaches before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
 
+#: SUMO's vehicle has left a lane once it is past its end. One that slows down for a turn often gets
+#: to the very end, and a light may change then [m].
+PAST_THE_END = 1e-9
+
 #: Values of `Law.model`.
 IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
+
+#: How far before a red light SUMO's vehicles stop (`jmStoplineGap`'s default) [m].
+STOP_LINE_GAP = 1.0
 
 
 class Law(NamedTuple):
@@ -56,7 +63,8 @@ class Law(NamedTuple):
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
     leave: float  # s up to which a vehicle at least stays in view
-    margin: float  # see `minisim.vehicle.Model`
+    margin: float  # see `minisim.vehicle.VehicleType`
+    sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # the most at insertion
     wake_on_clear: bool
@@ -90,10 +98,11 @@ def build_law(
         semi_implicit=MODELS[vehicle.model].stepwise,
         length=vehicle.length,
         width=vehicle.width,
-        entry=entry,
+        entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        margin=MODELS[vehicle.model].margin,
+        margin=vehicle.margin,
+        sumo=vehicle.sumo is not None,
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -208,6 +217,16 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
     return max((v_new - v) / law.dt, -law.b)
 
 
+@njit
+def krauss_stop(v: float, room: float, law: Law) -> float:
+    """The acceleration with which a vehicle may still stop in `room` [m], as Krauß's law has it.
+
+    Source: SUMO's `MSCFModel_Krauss::stopSpeed`.
+    """
+    v_new = stepwise_towards(0.0, room - STILL, law.b, law.dt) if room >= STILL else 0.0
+    return (v_new - v) / law.dt
+
+
 @njit_inline
 def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
@@ -216,6 +235,8 @@ def hold(v: float, s: float, law: Law) -> float:
     it must. If that no longer suffices, it brakes as hard as it must to stop before the junction.
     """
     to_line = law.hold - s
+    if law.sumo and law.model == KRAUSS:
+        return stop_at_line(v, to_line, law)
     if law.semi_implicit:
         return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
     distance = to_line - STOP_MARGIN
@@ -228,6 +249,16 @@ def hold(v: float, s: float, law: Law) -> float:
         return -law.b
     to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
     return -max(law.b, v * v / (2.0 * to_junction))
+
+
+@njit
+def stop_at_line(v: float, to_line: float, law: Law) -> float:
+    """`hold` as SUMO has it: a vehicle stops 1 m before a line, or nearer if it must.
+
+    Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
+    """
+    braking = braking_distance(v, law.b, law.dt)
+    return krauss_stop(v, to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS), law)
 
 
 @njit

@@ -7,7 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from minisim.errors import InputError
-from minisim.parameters import declared, real, word
+from minisim.parameters import declared, real, switch, word
+
+#: SUMO's `POSITION_EPS` [m].
+POSITION_EPS = 0.1
 
 
 class Model(NamedTuple):
@@ -20,8 +23,6 @@ class Model(NamedTuple):
             vehicle's acceleration and comfortable deceleration.
         stepwise: whether it gives the next speed, at which a vehicle drives the whole step
             (`minisim.carfollowing.semi_implicit`); otherwise the step is ballistic.
-        margin: a vehicle is inserted this far past its own length, and counts as arrived this
-            far before the end of the road [m].
         sumo: SUMO's model of the same law; empty if SUMO has none.
         stand_ins: SUMO's models of other laws that can drive such vehicles.
     """
@@ -29,7 +30,6 @@ class Model(NamedTuple):
     meaning: str
     braking: Callable[[float, float], float]
     stepwise: bool = False
-    margin: float = 0.0
     sumo: str = ""
     stand_ins: tuple[str, ...] = ("Krauss",)
 
@@ -51,11 +51,10 @@ MODELS: Mapping[str, Model] = {
     "krauss": Model(
         "SUMO's default law without its random part", lambda _, b: b, stepwise=True, sumo="Krauss"
     ),
-    # A cruise control brakes as hard as the vehicle can. The margin is SUMO's `POSITION_EPS`,
-    # where it inserts a vehicle with `departPos="base"`, the position used in the published runs.
+    # A cruise control brakes as hard as the vehicle can.
     "cc": Model(
         "cruise control, only for a `CruiseVehicle`",
-        lambda *_: 0.0, stepwise=True, margin=0.1, sumo="CC", stand_ins=(),
+        lambda *_: 0.0, stepwise=True, sumo="CC", stand_ins=(),
     ),
 }  # fmt: skip
 
@@ -100,6 +99,11 @@ class VehicleType:
         "0 makes all drivers alike",
         default=0.0, low=0, high=0.5,
     )  # fmt: skip
+    sumo: str | None = word(
+        "the version of SUMO whose vehicles it drives like, from insertion to arrival, at stop "
+        "lines and inside the junction; only with krauss; none for minisim's own rules",
+        ("1.18",), optional=True, default=None, label="SUMO version of a vehicle",
+    )  # fmt: skip
     model: str = word(
         f"car following: {'; '.join(f'{name}, {it.meaning}' for name, it in MODELS.items())}",
         tuple(MODELS), default="idm", label="car-following model",
@@ -108,6 +112,10 @@ class VehicleType:
     def __post_init__(self) -> None:
         if self.model == "cc" and not isinstance(self, CruiseVehicle):
             raise InputError("the car-following model 'cc' goes with a CruiseVehicle")
+        if self.sumo is not None and self.model not in ("krauss", "cc"):
+            raise InputError(
+                f"sumo={self.sumo!r} goes with the car-following model 'krauss', not {self.model!r}"
+            )
         if self.max_deceleration < self.needed_braking:
             raise InputError(
                 f"max_deceleration must be at least {self.needed_braking:.2f} m/s², got "
@@ -119,6 +127,19 @@ class VehicleType:
     def needed_braking(self) -> float:
         """How hard the model makes a vehicle brake for a stationary obstacle [m/s²]."""
         return MODELS[self.model].braking(self.acceleration, self.deceleration)
+
+    @property
+    def margin(self) -> float:
+        """It is inserted this far past its length, and arrives this far before the end [m].
+
+        SUMO does so where vehicles depart at "base", as in the published runs.
+        """
+        return 0.0 if self.sumo is None else POSITION_EPS
+
+    @property
+    def looks_out(self) -> bool:
+        """Whether it lets vehicles pass that cross its way inside the junction."""
+        return self.sumo == "1.18"
 
     def top_speed(self, limit: float) -> float:
         """Upper bound on this type's speed where the speed limit is `limit` [m/s]."""
@@ -168,6 +189,10 @@ class CruiseVehicle(VehicleType):
     max_speed: float = real(
         "none is faster before or inside the junction, whatever is desired (maxSpeed)", "m/s",
         default=55.55, above=0, high=100,
+    )  # fmt: skip
+    obeys: bool = switch(
+        "whether it keeps to limits and lights by itself, but late: it brakes once it is in a "
+        "turn, runs amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
     )  # fmt: skip
     sumo: str = word(
         "the version of SUMO whose radar it has; that of the published runs saw more",

@@ -87,6 +87,7 @@ OBSERVED = np.dtype(
         ("length", np.float64),
         ("demand_time", np.float64),
         ("rank", np.int64),
+        ("speed_factor", np.float64),
     ]
 )
 

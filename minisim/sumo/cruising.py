@@ -37,6 +37,8 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
             f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
             f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
+    if vehicle.obeys:
+        raise InputError("hosted in SUMO, a CruiseVehicle cannot obey limits and lights by itself")
     return {
         "accel": vehicle.engine_acceleration, "decel": vehicle.max_deceleration,
         "ccAccel": vehicle.cruise_acceleration, "ccDecel": vehicle.cruise_deceleration,
@@ -102,7 +104,7 @@ class Cruiser:
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
         if ahead is not None:
             gap = ahead.s - law.length - car.s
-            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, cruise))
+            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, law, cruise))
         return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
 
     def _desired(self, car: Car) -> float:

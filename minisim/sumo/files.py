@@ -17,7 +17,7 @@ from minisim.results.trips import Trips
 from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.vehicle import MODELS, CruiseVehicle
+from minisim.vehicle import CruiseVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
 TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
@@ -64,7 +64,7 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
                 "type": "car",
                 "route": movements[vehicles["path"][i]],
                 "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": site.vehicle.length + MODELS[site.vehicle.model].margin,
+                "departPos": site.vehicle.length + site.vehicle.margin,
                 "departSpeed": "max" if depart_speed != 0.0 else 0,
                 "speedFactor": f"{vehicles['factor'][i]:.9f}",
             },

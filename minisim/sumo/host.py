@@ -31,7 +31,7 @@ from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
 from minisim.ticks import first_tick, time_of
 from minisim.vehicle import MODELS as CAR_FOLLOWING
-from minisim.vehicle import VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 
 #: SUMO's car-following models that a run may use.
 MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
@@ -209,6 +209,11 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
     site, plan = hosted.site, hosted.plan
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
+    if site.vehicle.sumo is not None and not isinstance(site.vehicle, CruiseVehicle):
+        raise InputError(
+            f"vehicles with sumo={site.vehicle.sumo!r} look out for those that cross inside the "
+            "junction; hosted in SUMO they leave that to the controller, so give none"
+        )
     model = _model(request.model, site.vehicle)
     depart_speed = request.scenario.depart_speed
     law = build_law(

@@ -134,7 +134,7 @@ class Worker:
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
                     car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
-                    car.rank,
+                    car.rank, car.factor,
                 )  # fmt: skip
 
     def _apply(self, command: Command) -> None:

@@ -27,7 +27,9 @@ from tests.builders import Fixed, replayed
 CAR = VehicleType(model="krauss")
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=CAR)
 #: The published vehicle, every driver at the limit.
-ALIKE = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, speed_deviation=0.0))
+#: The vehicle of the signals by minisim's own rules, which the host shares.
+HOSTED = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, sumo=None))
+ALIKE = replace(HOSTED, vehicle=replace(HOSTED.vehicle, speed_deviation=0.0))
 
 
 def follower(dt: float, leader_v: float, seconds: float, gap: float, v: float) -> tuple[float, ...]:
@@ -207,7 +209,7 @@ def test_a_step_of_a_tenth_gives_the_waits_of_a_hundredth() -> None:
     """
 
     def means(dt: float) -> tuple[float, float]:
-        road = four_way(250, profile=replace(AS_RUN_SIGNALS, dt=dt), horizon=900.0)
+        road = four_way(250, profile=replace(HOSTED, dt=dt), horizon=900.0)
         rows = [minisim.simulate(road, FixedTime(greens=10.75), k).summary() for k in (1, 2)]
         waiting, travel = ([row[f"{of}_time_s"] for row in rows] for of in ("waiting", "travel"))
         return sum(waiting) / 2.0, sum(travel) / 2.0

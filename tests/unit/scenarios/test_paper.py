@@ -30,7 +30,7 @@ from scenarios.paper import (
     replay,
     scenario,
 )
-from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
+from scenarios.profiles import AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
 from tests.builders import reference_value
 
@@ -160,7 +160,7 @@ def test_each_run_has_its_vehicle() -> None:
 
     assert profile("fts", "balanced") == profile("ats", "4:1:4:1") == AS_RUN_SIGNALS
     assert profile("dim", "4:3:2:1") == profile("v2ic", "balanced") == AS_RUN
-    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN
+    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN_OBEYING
     assert profile("fts", "4:3:2:1", as_labelled=True) == AS_RUN_SIGNALS
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import minisim
-from baselines import V2ICAsRun
+from baselines import FixedTime, V2ICAsRun
 from minisim.arrivals import Arrivals
 from minisim.carfollowing import (
     cruise_control,
@@ -18,9 +19,10 @@ from minisim.carfollowing import (
     semi_implicit,
 )
 from minisim.control import Advise, Plan, Unregulated
+from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.cruise.step import accelerate
-from minisim.engine.state import DRIVING, build_lanes, build_road, build_vehicles
+from minisim.engine.state import DRIVING, Records, build_lanes, build_road, build_vehicles
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.laws import build_law
@@ -385,3 +387,45 @@ def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
 def test_ways_are_checked(ways: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         Intersection((0.0, 90.0, 180.0, 270.0), ways=ways)  # type: ignore[arg-type]
+
+
+# --- speed mode 31: limits and lights -------------------------------------------------------------
+
+
+def obeying(
+    s: float, v: float, a: float, *, lane: int = 0, manoeuvre: int = 1
+) -> tuple[Records, Callable[[], bool]]:
+    """The vehicle's acceleration, and its row, of a car alone that obeys limits at a red light."""
+    what = MAKERS[4](profile="as_run_obeying", recorded=arrivals((0.0, lane, manoeuvre)))
+    site = what.site(0)
+    road = build_road(site, FixedTime().start(site).plan)
+    law = build_law(
+        site, FixedTime().start(site).plan, depart_speed=0.0, record=None,
+        record_window=(0.0, math.inf),
+    )  # fmt: skip
+    vehicles = build_vehicles(site, what.arrivals(0))
+    lanes = build_lanes(site, vehicles, lanes_open=False)
+    cruise = build_cruise(site, 1)
+    assert cruise is not None
+    vehicles["status"], lanes["next"][lane] = DRIVING, 1
+    vehicles["s"], vehicles["v"], vehicles["a"] = s, v, a
+    lanes["front"][lane] = int(s >= law.entry)
+    accelerate(vehicles, lanes, road, law, cruise)
+    return vehicles, lambda: look(vehicles, lanes, road, law, cruise, 1)
+
+
+def test_a_limit_counts_for_the_first_step_beyond_it_and_through_the_lag() -> None:
+    """SUMO 1.18, fixed-time, 4:3:2:1 at 150 veh/h, 83.29 s: vehicle 6 (d1) has entered its turn."""
+    v, before = 13.798586948920386, 13.797885076884404
+    vehicles, _ = obeying(492.8 + 0.06216767704455606, v, (v - before) / 0.01, lane=3)
+    assert v + vehicles["a"][0] * 0.01 == pytest.approx(13.65636158917291, abs=1e-9)
+
+
+def test_it_stops_dead_on_the_line_at_red_and_starts_from_an_engine_at_rest() -> None:
+    """SUMO 1.18, the same run, 53.18 s: vehicle 1 (c2) stops from 14 m/s within a step."""
+    vehicles, after = obeying(492.78271338554714, 13.999999999995646, 0.0)
+    assert 13.999999999995646 + vehicles["a"][0] * 0.01 == 0.0
+    after()
+    assert vehicles["s"][0] == pytest.approx(492.8, abs=1e-8)
+    assert vehicles["s"][0] < 492.8
+    assert vehicles["a"][0] == 0.0

@@ -18,10 +18,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from baselines import FixedTime
-from dim import Dim
+from baselines import FixedTime, V2ICAsRun
+from dim import AsRunDim, Dim
 from figures import save
-from figures.crossval import DODGE, crossval_figures
+from figures.crossval import crossval_figures
+from figures.plots import DODGE
 from minisim.errors import SumoError
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
@@ -31,25 +32,18 @@ from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.crossval import Case, Result, crossvalidate, film, replayed_cases, runs, write_report
-from scenarios.crossval.comparison import (
-    CLOSE,
-    Pair,
-    Tolerance,
-    agreement,
-    compare,
-    first_divergence,
-    first_parting,
-    times,
-)
+from scenarios.crossval import comparison as hosts
+from scenarios.crossval.comparison import CLOSE, Pair, Tolerance
 from scenarios.crossval.report import markdown, summary, table
-from scenarios.paper import GRID, Cell, controller_of, replay
+from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
+from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals
 from scenarios.statistics import ks_distance, mean_interval
 from tests.builders import reference_value
 from tests.unit.scenarios.cli.test_cli import fails
 
 END = 100.0
-ALL = (True,) * 4
+LANES = (0, 1, 0, 1)
 
 
 def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[bool]) -> Trips:
@@ -59,18 +53,21 @@ def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[b
     done = np.array(arrived)
     return Trips(
         end=END, vehicle=np.arange(4), demand_time=depart, depart=depart,
-        arrival=np.where(done, depart + travel, np.nan), lane=np.array([0, 1, 0, 1]),
+        arrival=np.where(done, depart + travel, np.nan), lane=np.array(LANES),
         manoeuvre=np.array([1, 2, 3, 1]), exit_lane=np.array([1, 3, 3, 2]),
         waiting_time=np.array(waiting), travel_time=np.array(travel), time_loss=zero,
         depart_delay=zero, departed=np.ones(4, bool), arrived=done,
     )  # fmt: skip
 
 
-def pair(seed: int = 1, waiting_sumo: Sequence[float] = (0, 1, 2, 3.5)) -> Pair:
+ALL = [True] * 4
+OURS = trips([0, 1, 2, 3], [50, 51, 52, 53], ALL)
+SAME = Pair(1, OURS, OURS)
+
+
+def pair(seed: int = 1) -> Pair:
     """The last trip waits longer in SUMO; the third never ends there."""
-    ours = trips([0, 1, 2, 3], [50, 51, 52, 53], ALL)
-    theirs = trips(waiting_sumo, [50, 51.05, 70, 54], [True, True, False, True])
-    return Pair(seed, ours, theirs)
+    return Pair(seed, OURS, trips([0, 1, 2, 3.5], [50, 51.05, 70, 54], [True, True, False, True]))
 
 
 @given(
@@ -87,7 +84,7 @@ def test_ks_distance_is_the_largest_gap_of_scipys_ecdfs(
 
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
-    rows = {(row.lane, row.metric): row for row in compare([pair()], 3)}
+    rows = {(row.lane, row.metric): row for row in hosts.compare([pair()], 3)}
     assert set(rows) == {(lane, metric) for lane in ("all", "a", "b", "c") for metric in MEANS}
     overall = rows["all", "waiting_time_s"]
     assert overall.trips == (4, 3)
@@ -100,39 +97,44 @@ def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
     assert rows["a", "travel_time_s"].within == pytest.approx(1 / 2), "the third is far apart"
     assert rows["b", "travel_time_s"].difference.mean == pytest.approx((0.05 + 1.0) / 2)
     empty = rows["c", "travel_time_s"]
-    assert empty.trips == (0, 0), "a lane without trips is not an error"
-    means = (empty.minisim.mean, empty.sumo.mean, empty.difference.mean)
-    assert all(map(math.isnan, (*means, empty.ks, empty.within)))
+    assert empty.trips == (0, 0)
+    values = (empty.minisim.mean, empty.sumo.mean, empty.difference.mean, empty.ks, empty.within)
+    assert all(map(math.isnan, values)), "a lane without trips is no error"
 
 
 def test_differences_are_paired_by_seed() -> None:
     """Seeds spread widely and the hosts hardly: the interval of the difference is narrow."""
-    pairs = []
-    for seed, level in enumerate((0.0, 10.0, 30.0)):
-        waits = [level] * 4, [level + 0.1 * (seed + 1)] * 4
-        pairs.append(Pair(seed, *(trips(each, [50.0] * 4, ALL) for each in waits)))
-    row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
+    waits = [(0.0, 0.1), (10.0, 10.2), (30.0, 30.3)]
+    pairs = [
+        Pair(seed, *(trips([wait] * 4, [50.0] * 4, ALL) for wait in both))
+        for seed, both in enumerate(waits)
+    ]
+    row = hosts.compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
 
 
 def test_same_trips_need_both_times() -> None:
-    assert agreement([pair()]) == pytest.approx(2 / 4)
-    assert agreement([Pair(1, pair().minisim, pair().minisim)]) == 1.0
-    rounded = Pair(
-        1, trips([0.1 + 0.2] * 4, [50.0] * 4, ALL), trips([0.3] * 4, [50 + CLOSE] * 4, ALL)
-    )
-    row = compare([rounded], 2)[0]
-    assert (row.ks, row.within, agreement([rounded])) == (0.0, 1.0, 1.0)
-    assert times(rounded.minisim, "waiting_time_s").tolist() == [0.3] * 4
+    assert hosts.agreement([pair()]) == pytest.approx(2 / 4)
+    assert hosts.agreement([SAME]) == 1.0
+
+
+def test_rounding_makes_no_difference() -> None:
+    ours = trips([0.1 + 0.2] * 4, [50.0] * 4, ALL)
+    theirs = trips([0.3] * 4, [50.0 + CLOSE] * 4, ALL)
+    row = hosts.compare([Pair(1, ours, theirs)], 2)[0]
+    assert (row.ks, row.within) == (0.0, 1.0)
+    assert hosts.times(ours, "waiting_time_s").tolist() == [0.3] * 4
+    assert hosts.agreement([Pair(1, ours, theirs)]) == 1.0
 
 
 def test_the_first_divergence_is_the_first_in_demand() -> None:
-    found = first_divergence(pair(seed=7))
+    found = hosts.first_divergence(pair(seed=7))
+    assert found is not None
     assert (found.seed, found.vehicle, found.movement, found.depart) == (7, 2, "a3", 30.0)
     assert found.travel == (52.0, 70.0)
     assert found.end == END, "it never arrives in SUMO"
-    assert first_divergence(Pair(1, pair().minisim, pair().minisim)) is None
+    assert hosts.first_divergence(SAME) is None
 
 
 def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
@@ -147,8 +149,8 @@ def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
         )
 
     same = frame({})
-    assert first_parting(same, frame({(4, 1.0): 0.4})) is None
-    found = first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
+    assert hosts.first_parting(same, frame({(4, 1.0): 0.4})) is None
+    found = hosts.first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
     assert found is not None
     assert (found.time, found.vehicle, found.positions) == (2.0, 6, (20.0, 18.0))
     assert found.movement == "a2"
@@ -171,26 +173,25 @@ def test_replays_are_the_published_grid_and_its_numbers() -> None:
     assert short[0].reference("waiting_time_s", "all") is None, "the paper's are of an hour"
 
 
-@pytest.mark.parametrize(
-    ("series", "split", "tolerance"),
-    [
-        ("v2ic", "4:3:2:1", 1.0),
-        ("fixed-time", "balanced", 2.0),
-        ("fixed-time", "4:3:2:1", 2.0),
-        ("dim", "4:1:4:1", 0.5),
-    ],
-)
-def test_replays_are_what_ran_beside_the_numbers_of_the_label(
-    series: str, split: str, tolerance: float
-) -> None:
-    (case,) = replayed_cases([], [series], [200], [split], None, 3600.0)
-    assert case.name == f"four-way {split} 200 {series}"
-    assert case.published is not None
-    assert case.recipe().controller == controller_of(*case.published)
-    assert case.scenario.profile == replay(*case.published, sumo="1.28").profile
-    number = reference_value(case.published, "travel_time_s")
-    assert case.reference("travel_time_s", "all") == number
-    assert case.reference_tolerance("travel_time_s") == Tolerance(0.0, tolerance)
+def test_replays_have_the_vehicle_and_controller_that_ran_and_the_numbers_of_the_label() -> None:
+    (v2ic,) = replayed_cases([], ["v2ic"], [350], ["4:3:2:1"], None, 3600.0)
+    assert v2ic.name == "four-way 4:3:2:1 350 v2ic"
+    assert v2ic.recipe().controller == V2ICAsRun(approach_speed=14.0)
+    assert v2ic.reference("travel_time_s", "all") == reference_value(
+        Cell("4:3:2:1", 350, 4, "v2ic"), "travel_time_s"
+    )
+    assert v2ic.reference_tolerance("travel_time_s") == Tolerance(0.0, 1.0)
+    balanced, unbalanced = replayed_cases(
+        [], ["fixed-time"], [200], ["balanced", "4:3:2:1"], None, 3600.0
+    )
+    assert balanced.scenario.profile == AS_RUN_SIGNALS
+    assert balanced.recipe().controller == FixedTime(greens=GREENS[200], order=PHASES)
+    assert unbalanced.scenario.profile.vehicle == replace(AS_RUN.vehicle, sumo="1.28")
+    assert unbalanced.recipe().controller == FixedTime(greens=5.0, order=PHASES)
+    assert balanced.reference_tolerance("travel_time_s") == Tolerance(0.0, 2.0)
+    (dim,) = replayed_cases([], ["dim"], [150], ["4:1:4:1"], None, 3600.0)
+    assert dim.recipe().controller == AsRunDim(names="acbd"), "its arms have other names"
+    assert dim.reference_tolerance("travel_time_s") == Tolerance(0.0, 0.5)
 
 
 def test_published_arrivals_with_another_vehicle() -> None:
@@ -223,21 +224,22 @@ def result(case: Case, *pairs: Pair) -> Result:
 def test_own_laws_are_judged_by_means_and_the_same_law_trip_by_trip() -> None:
     fair = Case(four_way(profile="fair"), "dim")
     assert result(fair, pair()).hosts_agree
-    waits = Pair(1, pair().minisim, trips([9, 9, 9, 9], [50, 51, 52, 53], ALL))
-    assert not result(fair, waits).hosts_agree
+    assert not result(fair, Pair(1, OURS, trips([9] * 4, [50, 51, 52, 53], ALL))).hosts_agree
     none = trips([0.0] * 4, [50.0] * 4, [False] * 4)
     assert result(fair, Pair(1, none, none)).hosts_agree is None, "no trip ended"
     same = Case(four_way(profile="as_run"), "dim")
     assert not result(same, pair()).hosts_agree, "means agree, half of the trips do not"
-    assert result(same, Pair(1, pair().minisim, pair().minisim)).hosts_agree
+    assert result(same, SAME).hosts_agree
 
 
 def test_replays_are_judged_by_the_papers_means() -> None:
     cell = Cell("balanced", 150, 4)  # published: waiting 0.7084, travel 65.94
     case = Case(replay(*cell), "dim", cell)
-    good, bad = (trips([0.75] * 4, [travel] * 4, ALL) for travel in (66.4, 66.6))
+    good = trips([0.75] * 4, [66.4] * 4, ALL)
+    bad = trips([0.75] * 4, [66.6] * 4, ALL)
     judged = result(case, Pair(0, good, bad))
-    assert (judged.meets_paper("minisim"), judged.meets_paper("sumo")) == (True, False)
+    assert judged.meets_paper("minisim") is True
+    assert judged.meets_paper("sumo") is False
     assert summary([judged]) == (
         "0 of 1 cells: both hosts agree within the tolerances; minisim meets the paper in 1 of 1; "
         "SUMO meets the paper in 0 of 1; 1 verdict over fewer than 30 trips"
@@ -343,19 +345,21 @@ def test_a_host_with_another_controller(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert 0.0 < result.agreement < 1.0
     assert result.parting is not None
     where = result.parting.time, result.parting.vehicle
-    frames = (result.parting.minisim, result.parting.sumo)
-    both = [frame.set_index(["time_s", "vehicle"])["s_m"][where] for frame in frames]
-    assert both == [*result.parting.positions]
+    both = tuple(
+        frame.set_index(["time_s", "vehicle"])["s_m"][where]
+        for frame in (result.parting.minisim, result.parting.sumo)
+    )
+    assert both == result.parting.positions
     figures = {name: figure for name, _, figure in crossval_figures([result])}
     parting = figures["parting_four-way_balanced_300_dim"]
     assert [axes.get_ylabel() for axes in parting.axes] == [f"lane {lane} [m]" for lane in "abcd"]
     for name, figure in figures.items():
         save(figure, tmp_path / f"{name}.png")
     write_report([result], tmp_path, "minisim crossval", {f"{name}.png": name for name in figures})
-    text = (tmp_path / "crossval.md").read_text()
-    links = re.findall(r"\]\((.*?)\)", text)
-    assert [(tmp_path / link).is_file() for link in links] == [True, True]
-    assert f"vehicle {where[1]} " in text
+    links = re.findall(r"\]\((.*?)\)", (tmp_path / "crossval.md").read_text())
+    assert len(links) == 2
+    assert all((tmp_path / link).is_file() for link in links)
+    assert f"vehicle {where[1]} " in (tmp_path / "crossval.md").read_text()
 
 
 def test_means_are_drawn_over_density() -> None:
