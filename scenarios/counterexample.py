@@ -1,7 +1,7 @@
 """Turns a path on which the protocol is unsafe into arrivals that make simulated vehicles collide.
 
-The model has no clock. It gives the order of the vehicles, and says that the last one comes while
-the others are on their way. The simulator finds out when that is.
+The model has no clock: it gives the order of the vehicles, and the simulator finds out when the
+last one has to come.
 """
 
 from __future__ import annotations

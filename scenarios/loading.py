@@ -65,10 +65,7 @@ def _controllers(module: ModuleType) -> list[str]:
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
-    """The metrics asked for, ours by name; `module:name` is a caller's `Metric` or function.
-
-    Raises `InputError` as `asked_metrics` and `load_class` do.
-    """
+    """The metrics asked for, ours by name; `module:name` is a caller's; raises `InputError`."""
     asked = asked_metrics(_loaded(it) for it in listed(metrics))
     return tuple(it.name if it.name in METRICS else it for it in asked)
 

@@ -11,7 +11,7 @@ from scenarios.studies.shared.study import Study
 
 
 class PublishedPoint(NamedTuple):
-    """A published run, even where it is not what its label says; fields as in `ControllerPoint`."""
+    """A published run, even if it is not what its label says; fields as in `ControllerPoint`."""
 
     series: str
     arms: int

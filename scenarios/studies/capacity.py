@@ -123,8 +123,7 @@ class Capacity(NamedTuple):
 def grows(row: Mapping[Any, Any]) -> bool:
     """Whether the queue grew in a run, given its row of a sweep.
 
-    `queue_growth` compares two windows that begin half the horizon apart. Half of the demanded
-    trips arrive in that time.
+    `queue_growth` compares windows half a horizon apart, in which half of the trips arrive.
     """
     return float(row["queue_growth"]) > TOLERANCE * float(row["trips"]) / 2.0
 

@@ -168,7 +168,7 @@ def test_names_that_are_taken_are_listed_as_unused(monkeypatch: pytest.MonkeyPat
     }
 
 
-def test_a_registered_class_that_is_no_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_registered_class_that_is_not_a_controller(monkeypatch: pytest.MonkeyPatch) -> None:
     plugin(monkeypatch, ("extra", "os:PathLike"))
     with pytest.raises(InputError, match="extra is not a controller: it has no name and no start"):
         controller_named("extra")

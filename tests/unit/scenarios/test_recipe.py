@@ -46,7 +46,7 @@ def test_humans_drive_among_vehicles_of_dim() -> None:
         Recipe(SHORT, AllWayStop(), humans=0.5)
 
 
-def test_its_name_is_that_of_the_controller_unless_told() -> None:
+def test_without_a_label_it_is_called_as_its_controller() -> None:
     assert Recipe(SHORT, Dim()).name == "dim"
     assert Recipe(SHORT, Dim(), humans=0.2).name == Mixed(Dim(), 0.2).name
     assert Recipe(SHORT, Dim(), label="ours").name == "ours"
