@@ -199,7 +199,7 @@ class V2ICAsRunSession:
     def _platoons(self, view: View) -> dict[int, Platoon]:
         """The vehicles that may be in the list; most of those in view cannot be."""
         platoons = {}
-        for vehicle, lane, manoeuvre, distance, speed, _, demand_time, _ in view.vehicles:
+        for vehicle, lane, manoeuvre, distance, speed, _, demand_time, *_ in view.vehicles:
             driven = self._origin - distance + ROUNDING
             if FIRST <= driven < LEFT:
                 order = (math.floor(demand_time + ROUNDING), lane, vehicle)

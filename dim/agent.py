@@ -7,8 +7,7 @@ from dim.perception import COMMITS, Percept
 from minisim.parameters import declared, part, word
 
 #: Which vehicles may enter while others cross. "clear": none (the paper). "harmonious" (ours): a
-#: participant in harmony with all that cross; those of its own lane do not count, since it simply
-#: follows them.
+#: participant in harmony with all that cross, except those of its own lane, which it follows.
 GATES = ("clear", "harmonious")
 
 
@@ -40,18 +39,16 @@ class Agent:
     def decide(self, percept: Percept, table: DecisionTable | None = None) -> bool:
         """Whether the vehicle goes, given what it perceives now (lines 4–12 of Algorithm 1).
 
-        - A crossing vehicle keeps going. Under the paper's commit rule it also goes if it has
-          rolled past the middle of the green zone after losing its right of way ("it is granted
-          the right of way by others"). Under the stoppable rule such a vehicle is stopping, and
-          waits.
-        - A vehicle that is not yet the first in its lane, or that the gate keeps out, goes on doing
-          what it did before.
-        - Any other vehicle goes if and only if it belongs to the clique. If it does not know
-          another vehicle's intent, it must belong to the clique of every possible case. So all the
-          vehicles that go belong to the clique of the true case, however little each of them
-          knows.
+        - A crossing vehicle keeps going. Under the paper's commit rule it also goes if it has lost
+          its right of way but rolled past the middle of the green zone ("it is granted the right
+          of way by others"). Under the stoppable rule such a vehicle is stopping, and waits.
+        - A vehicle that is not the first in its lane, or that the gate keeps out, does what it did
+          before.
+        - Any other vehicle goes if and only if it belongs to the clique. If it does not know an
+          intent, it must belong to the clique of every possible case. So all the vehicles that go
+          belong to the clique of the true case, however little each of them knows.
 
-        Where lane priorities change, `table` is for the present ones; by default it is the rules'.
+        If lane priorities change, `table` is for the present ones; by default it is the rules'.
         """
         rules = self.rules
         table = rules.table if table is None else table

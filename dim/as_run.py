@@ -1,14 +1,13 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
-The paper describes one algorithm; the runs behind its figures followed another. This module holds
-everything those runs did, so that they can be replayed vehicle by vehicle. An outsider cannot tell
-what was intended and what was a slip, so each difference is a quirk with a name:
+The paper describes one algorithm; the runs behind its figures followed another. This module repeats
+those runs vehicle by vehicle. We cannot tell what was intended and what was a slip, so each
+difference is a quirk with a name:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
    road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
-2. *speeds by decree*: no vehicle slows down for a zone. When it enters one, its desired speed is
-   replaced (14 m/s on the road, 10 in the red zone, 0 without and 10 with the right of way, 20
-   beyond);
+2. *speeds by decree*: a vehicle that enters a zone gets another desired speed (14 m/s on the road,
+   10 in the red zone, 0 without and 10 with the right of way, 20 beyond);
 3. *names decide*: vehicles are visited in alphabetical order of their names, `v<second of
    demand>.<lane>_<manoeuvre>`, so that v100 comes before v99;
 4. *short action list*: only as many vehicles take part as there are arms, first visited, first
@@ -19,8 +18,8 @@ what was intended and what was a slip, so each difference is a quirk with a name
 7. *green zone goes*: a vehicle in the action list and within 2 m of `bound` drives on without any
    right of way, at a desired speed of 50 m/s, and keeps the junction busy;
 8. *right of way by name*: it lasts until the next decision, wherever the vehicle is by then. A
-   vehicle that loses it in the yellow zone is told 20 m/s for one step before it is held (the
-   authors set 20 first, and 10 at the end of their loop for those that still have it);
+   vehicle that loses it in the yellow zone is told 20 m/s for one step (the authors set 20 first,
+   and 10 at the end of their loop for those that still have it);
 9. *lanes first*: of the maximal cliques the one whose sorted movements come first in the
    alphabet wins, whatever its size (`order="size"` is the rule that the paper describes);
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
@@ -34,12 +33,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from itertools import combinations, takewhile
+from itertools import takewhile
 from typing import Any, NamedTuple
 
-import networkx as nx
-
-from dim.decision import ORDERS
+from dim.decision import ORDERS, maximal_cliques
 from dim.harmony import HarmonyMatrix
 from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, printable
@@ -47,25 +44,19 @@ from minisim.junction.movements import Movement
 from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, word
 
-#: Where the junction begins for the rules, by number of arms: distance driven [m]. The numbers are
-#: the authors' (`JUNC_BOUND` of their three drivers).
+#: Where the junction begins for the rules: arms -> distance driven [m] (the authors' `JUNC_BOUND`).
 BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
-
-#: Length of the red zone before the yellow one, by number of arms [m].
-RED = {3: 20.0, 4: 20.0, 5: 25.0}
-
+RED = {3: 20.0, 4: 20.0, 5: 25.0}  #: arms -> length of the red zone before the yellow one [m]
 YELLOW = 5.0  #: length of the yellow zone, up to the bound [m]
 GREEN = 2.0  #: length of the stretch before the bound where a vehicle goes regardless [m]
 FREED = 506.0  #: distance driven at which a place in the action list is given up [m]
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
-#: Distance driven at which a vehicle is told 20 m/s for good [m], so that a host need not show it
-#: for longer. The authors have no such limit, but in the three runs that we checked, no vehicle is
-#: told anything after 531 m.
+#: Distance driven at which a vehicle is told 20 m/s for good [m], and no longer shown. The authors
+#: have no such limit, but in the three runs that we checked, no vehicle is told anything after
+#: 531 m.
 FOLLOWED = 600.0
-
-#: How much farther a vehicle stays in view, so that it is still seen after passing that mark [m].
-SEEN_BEYOND = 10.0
+SEEN_BEYOND = 10.0  #: how much farther a vehicle stays in view, to be seen past that mark [m]
 
 RED_SPEED = 10.0  #: desired in the red zone [m/s]
 HELD_SPEED = 0.0  #: desired in the yellow zone without right of way [m/s]
@@ -73,11 +64,8 @@ GO_SPEED = 10.0  #: desired with right of way [m/s]
 GREEN_SPEED = 50.0  #: desired in the green zone [m/s]
 EXIT_SPEED = 20.0  #: desired beyond the bound, if nothing else is asked for [m/s]
 
-#: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
-INSERTION = 0.1
-
-#: Rounding tolerance when a mark and a distance are compared [m].
-ROUNDING = 1e-9
+INSERTION = 0.1  #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m]
+ROUNDING = 1e-9  #: tolerance when a mark and a distance are compared [m]
 
 
 def _names(title: str, value: Any) -> str:
@@ -108,7 +96,7 @@ class AsRunDim:
     )  # fmt: skip
     names: str = checked(
         "the authors' letters of the arms, clockwise from north; they decide which vehicle is "
-        'first, and in the runs at 4:1:4:1 they were "acbd"',
+        'first ("acbd" in the runs at 4:1:4:1)',
         _names, "different letters", default="abcde",
     )  # fmt: skip
     exit_speed: float = real(
@@ -117,7 +105,7 @@ class AsRunDim:
     )  # fmt: skip
 
     def start(self, site: Site) -> AsRunSession:
-        """Begin a run; raises `InputError` where the rules do not fit the site."""
+        """Begin a run; raises `InputError` if the rules do not fit the site."""
         n = site.intersection.n
         if n not in BOUND:
             raise InputError(f"the as-run rules are for 3, 4 or 5 arms, the intersection has {n}")
@@ -125,7 +113,7 @@ class AsRunDim:
         if matrix.n != n:
             raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
         if len(self.names) < n:
-            raise InputError(f"names must be {n} letters, one an arm, got {self.names!r}")
+            raise InputError(f"names must be {n} letters, one per arm, got {self.names!r}")
         return AsRunSession(site, AsRunRules(self, matrix))
 
 
@@ -202,10 +190,9 @@ class AsRunRules:
         return busy
 
     def _green(self, cars: Mapping[int, Car], speeds: dict[int, float]) -> bool:
-        """Green zone: participants go regardless; whether there is one."""
+        """Green zone: participants go regardless; return whether there are any."""
         known = takewhile(cars.__contains__, self.serving)
-        there = [v for v in known if cars[v].driven >= self.green_start]
-        going = [v for v in there if v in self.action]
+        going = [v for v in known if cars[v].driven >= self.green_start and v in self.action]
         speeds.update(dict.fromkeys(going, GREEN_SPEED))
         return bool(going)
 
@@ -215,9 +202,6 @@ def winner(
     matrix: HarmonyMatrix, movements: frozenset[Movement], order: str, names: str = "abcde"
 ) -> tuple[Movement, ...]:
     """The maximal clique that wins, sorted by name; no two movements of a lane are in harmony."""
-    graph: nx.Graph[Movement] = nx.Graph()
-    graph.add_nodes_from(movements)
-    graph.add_edges_from(pair for pair in combinations(movements, 2) if matrix.harmony(*pair))
 
     def named(movement: Movement) -> tuple[str, int]:
         return names[movement.origin], movement.manoeuvre
@@ -225,7 +209,8 @@ def winner(
     def rank(clique: tuple[Movement, ...]) -> tuple[int, list[tuple[str, int]]]:
         return -len(clique) if order == "size" else 0, [named(movement) for movement in clique]
 
-    cliques = [tuple(sorted(clique, key=named)) for clique in nx.find_cliques(graph)]
+    found = maximal_cliques(tuple(movements), matrix)
+    cliques = [tuple(sorted(clique, key=named)) for clique in found]
     return min(cliques, key=rank, default=())
 
 

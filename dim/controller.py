@@ -4,24 +4,22 @@ The vehicles of the paper look around all the time. The host calls only at a few
 suffice because between them no agent would change its mind:
 
 - A new vehicle takes part when its front bumper passes the start of the yellow zone (a wake-up), or
-  when the vehicle ahead of it enters the junction. In the second case the gate "clear" keeps every
-  vehicle where it is; the gate "harmonious" asks for a wake-up at the entry.
+  when the vehicle ahead of it enters the junction. Then the gate "clear" keeps every vehicle where
+  it is, and the gate "harmonious" asks for a wake-up.
 - A participant begins to cross only when it holds the right of way, since a waiting vehicle can
   stop. The gate "clear" then freezes the decision. Under "harmonious" the choice among the rest
   stays the same: without the vehicle that went, the best clique is the best among the movements in
-  harmony with it. Two cliques are compared by the smallest lane rank that only one of them has,
-  so a lane that both have does not count.
+  harmony with it, since cliques are compared by the smallest lane rank that only one of them has.
 - A vehicle stops crossing when its rear bumper leaves the junction (a wake-up).
 
 There are four exceptions:
 
-- Under `commit="paper"` a vehicle without the right of way may roll past the middle of the green
-  zone and is then granted it. That point is another mark.
+- Under `commit="paper"` a vehicle that rolls past the middle of the green zone without the right of
+  way is granted it. That point is another mark.
 - On a host with different brakes, a vehicle that loses its right of way may look committed until it
   stands. The session then looks again every step.
-- Where lane priorities change with time (`dim.priorities`), the session looks again when they do.
-- Where perception errs, vehicles do not all see the same, and none of this holds. They look around
-  at intervals (`Perception.period`).
+- If lane priorities change with time (`dim.priorities`), the session looks again when they do.
+- If perception errs, vehicles do not all see the same. They look every `Perception.period`.
 """
 
 from __future__ import annotations
@@ -35,15 +33,7 @@ from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
 from dim.harmony import HarmonyMatrix
 from dim.monitor import Monitor
 from dim.perception import COMMITS, ROUNDING, ExactPerception, Perception, Reader
-from dim.priorities import (
-    SENSOR_RANGE,
-    TURN_TIME,
-    PassingTimes,
-    Ranking,
-    longest_waiting,
-    memory_of,
-    rotating,
-)  # fmt: skip
+from dim.priorities import CHANGING, SENSOR_RANGE, TURN_TIME, ranking_of, rotating
 from dim.senses.noise import NoisyPerception
 from dim.senses.tally import Tally
 from dim.zones import Zones
@@ -52,11 +42,7 @@ from minisim.errors import InputError, choice, instance, items
 from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, refuse_idle, word
 
-#: Lane priorities that change with time.
-CHANGING = ("rotating", "waiting")
-
-#: Views reach this far beyond the start of the yellow zone [m].
-SIGHT_MARGIN = 0.5
+SIGHT_MARGIN = 0.5  #: how far views reach beyond the start of the yellow zone [m]
 
 
 def _priorities(title: str, value: Any) -> Any:
@@ -69,7 +55,7 @@ def _priorities(title: str, value: Any) -> Any:
 
 @declared
 class Dim:
-    """Decentralised intersection management: vehicles decide alone, by the paper's rules or ours.
+    """Vehicles that decide alone, by the paper's rules or ours.
 
     `gate="harmonious"`, priorities other than the lanes' own order, and the monitor are ours.
     """
@@ -135,15 +121,11 @@ class Dim:
             refuse_idle(self, "priorities=waiting", "sensor_range")
 
     def start(self, site: Site) -> DimSession:
-        """Begin a run.
-
-        Raises `InputError` if the matrix or the priorities are for another number of arms, or the
-        roads are too short for the zones.
-        """
+        """Begin a run; raises `InputError` if matrix, priorities or zones do not fit the site."""
         return DimSession(self, site)
 
     def ranks(self, site: Site) -> tuple[int, ...]:
-        """Rank of each lane here at time 0, 0 being first; raises `InputError` for another n."""
+        """Rank of each lane here at time 0, 0 first; raises `InputError` if n differs."""
         n = site.intersection.n
         if self.priorities == "inflow":
             by_inflow = sorted(range(n), key=lambda lane: (-site.demand[lane], lane))
@@ -153,7 +135,7 @@ class Dim:
         return lane_ranks(self.priorities, n)
 
     def harmony(self, site: Site) -> HarmonyMatrix:
-        """The matrix in force at this site; raises `InputError` if a given one is for another n."""
+        """The matrix in force at this site; raises `InputError` if n differs."""
         n = site.intersection.n
         if self.matrix is None:
             return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
@@ -165,10 +147,9 @@ class Dim:
 
 
 class DimSession:
-    """One run of DIM: hosts an agent for each vehicle that takes part.
+    """One run of DIM: hosts an agent for each vehicle that takes part and that `follows` DIM.
 
-    Vehicles that `follows` rejects are seen but have no agent. `takes` says how vehicles
-    interpret what they have seen of a true view: (true, seen) -> taken.
+    `takes` is how vehicles interpret what they have seen of a true view: (true, seen) -> taken.
     """
 
     def __init__(
@@ -197,14 +178,12 @@ class DimSession:
             lanes_open=False,
         )
         self._start = zones.yellow_start + ROUNDING
-        self._ranks = _ranking(dim, site)
+        self._ranks = ranking_of(dim.priorities, site, zones, dim.turn_time, dim.sensor_range)
         see = dim.perception.start(site)
         self.see = see if takes is None else lambda view, ego: takes(view, see(view, ego))
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
-        self._dt = site.dt
-        self._follows = follows
+        self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
-        self._takes = takes
         errs = dim.perception.period is not None
         self._tally = Tally(self.rules, self.reader, self._start) if errs else None
 
@@ -261,17 +240,3 @@ class DimSession:
             return base, math.inf
         ranks, until = self._ranks(view)
         return decision_table(base.matrix, base.order, ranks), until
-
-
-def _ranking(dim: Dim, site: Site) -> Callable[[View], Ranking] | None:
-    """The ranks that all participants read from a view, or None if they never change."""
-    n = site.intersection.n
-    if dim.priorities == "rotating":
-        return lambda view: rotating(view.time, n, dim.turn_time)
-    if dim.priorities == "waiting":
-        memory = memory_of(site, dim.zones, dim.sensor_range)
-        passing = PassingTimes(dim.zones.yellow_start + ROUNDING)
-        return lambda view: longest_waiting(
-            view.time, n, passing.look(view.time, view.vehicles), memory, dim.turn_time
-        )
-    return None

@@ -1,9 +1,9 @@
 """Which vehicles cross: one right of way, the same for all, from the participants' movements.
 
-The participants are the nodes of a graph, with an edge where two movements are in harmony; the
-members of a clique can cross at the same time (paper, "Decentralized Intersection Management"). If
-there are several cliques, a total order of our own chooses among them, because vehicles that decide
-alone must agree, and a graph library lists cliques in an arbitrary order.
+The participants are the nodes of a graph, with an edge between two movements in harmony; a clique
+can cross at the same time (paper, "Decentralized Intersection Management"). Vehicles that decide
+alone must agree, and a graph library lists cliques in an arbitrary order, so a total order of our
+own chooses among them.
 """
 
 from __future__ import annotations
@@ -20,19 +20,17 @@ from dim.harmony import HarmonyMatrix
 from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.junction.movements import ARM_NAMES, Movement
 
-#: "size": the largest clique and, among equally large ones, the one with the higher-priority lanes
-#: (as the paper words it). "lanes": of all maximal cliques, the one with the higher-priority lanes
-#: (as in its published runs).
+#: "size": the largest clique and, among equals, the one with the higher-priority lanes (as the
+#: paper words it). "lanes": of all maximal cliques, the latter (as in its published runs).
 ORDERS = ("size", "lanes")
 
-#: `DecisionTable.complete` refuses more cases than this: 7 arms have 823,542, 8 arms 17 million.
-MAX_CASES = 1_000_000
+MAX_CASES = 1_000_000  #: more are not tried: 7 arms have 823,542 cases, 8 arms 17 million
 
 Movements = tuple[Movement, ...]
 
 
 def lane_ranks(priorities: Iterable[int] | None, n: int) -> tuple[int, ...]:
-    """Rank of each of n lanes, 0 first, by default in order; raises `InputError` for others."""
+    """Rank of each of n lanes, 0 first, by default in order; may raise `InputError`."""
     if priorities is None:
         return tuple(range(n))
     given = items("priorities", priorities, "lane ranks")
@@ -52,18 +50,12 @@ def decide(
 ) -> Movements:
     """The right of way among participants: a pure function of the set of their movements.
 
-    Args:
-        movements: those of the participants, at most one per lane, in any order.
-        matrix: harmony of the movements.
-        order: "size" or "lanes", see `ORDERS`.
-        priorities: rank of each lane, 0 first; by default the lanes' own order.
+    There is at most one participant per lane. `order` is one of `ORDERS`; `priorities` are the
+    ranks of the lanes, 0 first, by default in their own order.
 
-    Returns:
-        The movements that may cross, by lane; empty only when there are no participants.
-
-    Raises:
-        InputError: unknown movement or order, two movements of one lane, or priorities that are
-            not a permutation of the lanes.
+    Returns the movements that may cross, by lane; empty only when there are no participants. Raises
+    `InputError`: unknown movement or order, two movements of one lane, or priorities that are not
+    a permutation of the lanes.
     """
     participants = _participants(movements, matrix)
     choice("order", order, ORDERS)
@@ -95,48 +87,38 @@ def explain(
         raise InputError("a decision needs at least one participant, such as a1")
     choice("order", order, ORDERS)
     ranks = lane_ranks(priorities, matrix.n)
-    cliques = sorted(
-        maximal_cliques(participants, matrix), key=lambda clique: _key(clique, order, ranks)
-    )
+    found = maximal_cliques(participants, matrix)
+    cliques = tuple(sorted(found, key=lambda clique: _key(clique, order, ranks)))
     largest = max(map(len, cliques))
     tied = tuple(clique for clique in cliques if len(clique) == largest)
-    return Explanation(
-        participants=participants,
-        edges=_edges(participants, matrix),
-        cliques=tuple(cliques),
-        tied=tied,
-        right_of_way=cliques[0],
-        reason=_reason(participants, cliques, tied, order, ranks),
-    )
+    reason = _reason(participants, cliques, tied, order, ranks)
+    edges = _edges(participants, matrix)
+    return Explanation(participants, edges, cliques, tied, cliques[0], reason)
 
 
 class DecisionTable:
     """The decision for every case: the paper's "generated offline, queried online".
 
-    A case says what the front vehicle of each lane wants, with 0 for a lane that has none; n^n − 1
-    cases have at least one vehicle. A case is written as the integer Σ manoeuvre·n^lane, so every
-    integer 1 … n^n − 1 is a case and 0 is the empty junction. An entry is computed with networkx
-    when it is first asked for, and kept. Right of way is an integer with bit i set for lane i.
+    A case is what the front vehicle of each lane wants, 0 for none, written as the integer
+    Σ manoeuvre·n^lane. So every integer 1 … n^n − 1 is a case, and 0 is the empty junction. An
+    entry is computed when it is first asked for, and kept. Right of way is an integer with bit i
+    set for lane i.
 
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.
         lanes: case -> lanes with the right of way; the case is not checked.
-        admitted: (case, crossing) -> the case without the participants that conflict with any of
-            the movements in `crossing`, an integer with bit k set for the k-th movement. Movements
-            of one lane follow each other and are not in conflict.
+        admitted: (case, crossing) -> the case without the participants that conflict with any
+            movement in `crossing` (bit k for the k-th). Movements of one lane follow each other
+            and are not in conflict.
         surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those that have
             the right of way whatever the participants on the lanes in `unknown` (bit i for lane i)
             do; the case leaves these participants out.
 
-    Raises:
-        InputError: unknown order, or priorities that are not a permutation of the lanes.
+    Raises `InputError`: unknown order, or priorities that are not a permutation of the lanes.
     """
 
     def __init__(
-        self,
-        matrix: HarmonyMatrix,
-        order: str = "size",
-        priorities: Sequence[int] | None = None,
+        self, matrix: HarmonyMatrix, order: str = "size", priorities: Sequence[int] | None = None
     ) -> None:
         instance("matrix", matrix, HarmonyMatrix)
         self.matrix = matrix
@@ -189,14 +171,11 @@ class DecisionTable:
     def _admit(self, case: int, crossing: int) -> int:
         matrix = self.matrix
         occupied = [m for k, m in enumerate(matrix.movements) if crossing >> k & 1]
-
-        def free(movement: Movement) -> bool:
-            return all(
-                other.origin == movement.origin or matrix.harmony(movement, other)
-                for other in occupied
-            )
-
-        return self.case(m for m in self.participants(case) if free(m))
+        return self.case(
+            m
+            for m in self.participants(case)
+            if all(m.origin == other.origin or matrix.harmony(m, other) for other in occupied)
+        )
 
     def _agree(self, case: int, unknown: int, crossing: int) -> int:
         n = self.matrix.n
@@ -235,11 +214,10 @@ def _edges(participants: Movements, matrix: HarmonyMatrix) -> tuple[tuple[Moveme
 
 def maximal_cliques(participants: Movements, matrix: HarmonyMatrix) -> list[Movements]:
     """All maximal cliques, in no reliable order; each sorted by lane."""
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(m.origin for m in participants)
-    graph.add_edges_from((a.origin, b.origin) for a, b in _edges(participants, matrix))
-    by_lane = {m.origin: m for m in participants}
-    return [tuple(by_lane[lane] for lane in sorted(c)) for c in nx.find_cliques(graph)]
+    graph: nx.Graph[Movement] = nx.Graph()
+    graph.add_nodes_from(participants)
+    graph.add_edges_from(_edges(participants, matrix))
+    return [tuple(sorted(clique)) for clique in nx.find_cliques(graph)]
 
 
 def _key(clique: Movements, order: str, ranks: tuple[int, ...]) -> tuple[int, list[int]]:
@@ -255,14 +233,13 @@ def choose(cliques: list[Movements], order: str, ranks: tuple[int, ...]) -> Move
 
 def _reason(
     participants: Movements,
-    cliques: list[Movements],
+    cliques: tuple[Movements, ...],
     tied: tuple[Movements, ...],
     order: str,
     ranks: tuple[int, ...],
 ) -> str:
-    chosen, n = cliques[0], len(ranks)
-    names = " ".join(map(str, chosen))
-    lanes = " ".join(ARM_NAMES[lane] for lane in sorted(range(n), key=ranks.__getitem__))
+    names = " ".join(map(str, cliques[0]))
+    lanes = " ".join(ARM_NAMES[ranks.index(rank)] for rank in range(len(ranks)))
     if len(participants) == 1:
         return f"{names} is alone."
     if len(cliques) == 1:
@@ -273,8 +250,8 @@ def _reason(
             f"(priority {lanes}), whatever their size."
         )
     if len(tied) == 1:
-        return f"{names} is the only clique of {len(chosen)}, the largest size."
+        return f"{names} is the only clique of {len(cliques[0])}, the largest size."
     return (
-        f"{len(tied)} cliques tie at the largest size, {len(chosen)}; "
+        f"{len(tied)} cliques tie at the largest size, {len(cliques[0])}; "
         f"{names} holds the highest-priority lanes among them (priority {lanes})."
     )

@@ -1,7 +1,7 @@
 """Which movements can be driven at the same time: the paper's harmony matrix.
 
-A matrix comes from the geometry (two movements are in harmony when the corridors that vehicles
-sweep on them stay a clearance apart), from a file, or from the paper.
+A matrix comes from the geometry (movements are in harmony if the corridors that vehicles sweep on
+them stay a clearance apart), from a file, or from the paper.
 """
 
 from __future__ import annotations
@@ -26,22 +26,20 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.vehicle import VehicleType
 
-#: Arm counts for which the authors published a matrix.
-PAPER_ARMS = (3, 4, 5)
+PAPER_ARMS = (3, 4, 5)  #: arm counts for which the authors published a matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
-    Two matrices are equal, and hash alike, when their entries are. Raises `InputError` where it is
-    not square, not symmetric, has an entry other than 0 and 1, or harmony within a lane; the
-    message names the entry.
+    Raises `InputError`, with the entry, unless it is square, symmetric, and made of 0 and 1 (0
+    within a lane).
     """
 
     n: int  #: number of arms, 3 … 12
     #: Shape (m, m) with m = n(n−1), read-only; rows and columns in the order a1, a2, …, b1, … True
-    #: is harmony, False conflict; symmetric, and False within a lane.
+    #: is harmony, False conflict.
     values: Bools
 
     def __post_init__(self) -> None:
@@ -58,10 +56,7 @@ class HarmonyMatrix:
         vehicle: VehicleType | None = None,
         clearance: float = CLEARANCE,
     ) -> HarmonyMatrix:
-        """Harmony where swept corridors of different arms stay more than `clearance` [m] apart.
-
-        That is 0 … 10 m. The vehicle whose body sweeps is `VehicleType()` by default.
-        """
+        """Harmony if the corridors that a vehicle sweeps stay over `clearance` (0 … 10 m) apart."""
         instance("intersection", intersection, Intersection)
         vehicle = VehicleType() if vehicle is None else vehicle
         instance("vehicle", vehicle, VehicleType)
@@ -77,21 +72,19 @@ class HarmonyMatrix:
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
-        """Read a matrix: a header `,a1,a2,…`, then one line a movement, `a1,0,0,1,…`.
+        """Read a matrix: a header `,a1,a2,…`, then one line per movement, `a1,0,0,1,…`.
 
         Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
-        for labels or entries that are no harmony matrix (with the entry).
+        for labels or entries that do not make a harmony matrix (with the entry).
         """
         return _parse(read_file("harmony matrix", path), f"harmony matrix {path!s}")
 
     def to_text(self) -> str:
         """The matrix as `from_csv` reads it."""
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(["", *self.movements.names])
-        for label, row in zip(self.movements.names, self.values.astype(int).tolist(), strict=True):
-            writer.writerow([label, *row])
-        return buffer.getvalue()
+        names = self.movements.names
+        rows = zip(names, self.values.astype(int).astype(str).tolist(), strict=True)
+        lines = [",".join(["", *names]), *(",".join([label, *row]) for label, row in rows)]
+        return "\n".join(lines) + "\n"
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the matrix, whole or not at all; raises `FileError` if that is impossible."""
@@ -111,18 +104,13 @@ class HarmonyMatrix:
         """Whether both can be driven together; raises `InputError` for an unknown movement."""
         return bool(self.values[self.index(first), self.index(second)])
 
-    def __getitem__(self, pair: tuple[Movement | str, Movement | str]) -> bool:
-        if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InputError(f"a harmony matrix is indexed by two movements, got {show(pair)}")
-        return self.harmony(*pair)
-
     def disagreements(self, other: HarmonyMatrix) -> tuple[tuple[Movement, Movement], ...]:
         """The unordered pairs on which two matrices differ; raises `InputError` if n differs."""
         instance("other", other, HarmonyMatrix)
         if other.n != self.n:
             raise InputError(f"cannot compare matrices of {self.n} and {other.n} arms")
-        movements, differ = self.movements, np.triu(self.values != other.values)
-        return tuple((movements[r], movements[c]) for r, c in _where(differ))
+        differ = np.triu(self.values != other.values)
+        return tuple((self.movements[r], self.movements[c]) for r, c in _where(differ))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, HarmonyMatrix):
@@ -174,13 +162,9 @@ def _checked(values: npt.ArrayLike, movements: Movements) -> Bools:
         _refuse(labels, row, column, f"is {array[row, column]}; allowed: 0 or 1")
     result: Bools = array.astype(np.bool_)
     for row, column in _where(result != result.T):
-        here, there = int(result[row, column]), int(result[column, row])
-        _refuse(
-            labels,
-            row,
-            column,
-            f"is {here} but {there} the other way round: the matrix must be symmetric",
-        )
+        here = int(result[row, column])
+        why = f"is {here} but {1 - here} the other way round: the matrix must be symmetric"
+        _refuse(labels, row, column, why)
     for row, column in _where(result & ~movements.apart):
         _refuse(labels, row, column, "is 1, but they share a lane: it must be 0")
     return result
@@ -240,7 +224,7 @@ def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
 
 def _arms(columns: int, where: str) -> int:
     for n in range(3, len(ARM_NAMES) + 1):
-        if len(movements_of(n)) == columns:
+        if n * (n - 1) == columns:
             return n
     raise InputError(
         f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"

@@ -5,27 +5,23 @@ It belongs to one vehicle, uses what that vehicle sees, and watches the others t
 longer stop:
 
 - *What another may do*: the intent that was read, as long as the motion does not contradict it.
-  If the other is off every path of that reading, or was read differently at different times, it may
-  do whatever its position still allows.
+  If the other leaves every path of that reading, or was read differently before, it may do whatever
+  its position still allows.
 - *Where it matters*: in the forbidden region of the two paths (`minisim.junction.coordination`).
-  The ego must be able to stop before that region, however far the other goes, unless it leaves the
-  region in good time.
+  The ego must be able to stop before that region, unless it leaves the region in good time.
 - *When it brakes*: as soon as stopping takes at least comfortable braking, and as hard as needed.
-  Where it is too late to stop, the monitor checks whether the two would touch if the ego goes on,
-  and if it brakes.
+  If it is too late to stop, it brakes unless only going on avoids a touch.
 
-Vehicles that cross by unanimous decisions are in harmony with each other (proved in
-`dim.proofs.protocol`). So with exact perception and `commit="stoppable"` a monitor never sees
-another vehicle in the way. It never brakes, and a run is the same as without it.
+Vehicles that cross by unanimous decisions are in harmony (proved in `dim.proofs.protocol`). So with
+exact perception and `commit="stoppable"` a monitor never brakes, and a run is the same without it.
 
-Two vehicles that brake for each other must not stand for ever. Of two that stand, the one further
-in goes first (if equal, the one from the first lane), unless the other stands in its way. Both can
-see which one that is.
+Two vehicles must not brake for each other for ever. Of two that stand, the one further in goes
+first (if equal, the one from the first lane), unless the other stands in its way. Both can see
+which one that is.
 
-Nor may vehicles that do not cross wait for each other for ever. Where they read each other
-differently, each may conclude that it is not its turn. But some vehicle always has the right of
-way. So if no vehicle crosses and all have stood for a while, some have misread. Then the first lane
-goes alone, since that takes no knowledge of intents (`Patience`).
+Nor may vehicles before the junction wait for each other for ever. If they misread each other, each
+may conclude that it is not its turn. But some vehicle always has the right of way. So if no vehicle
+crosses and all have stood for a while, the first lane goes alone (`Patience`).
 """
 
 from __future__ import annotations
@@ -51,8 +47,7 @@ from minisim.junction.coordination import Region, passes, region
 from minisim.junction.partings import showing
 from minisim.parameters import declared, real
 
-#: The gap that a stopping vehicle leaves before the place where it must not be [m].
-ROOM = 0.25
+ROOM = 0.25  #: the gap that a stopping vehicle leaves before the place where it must not be [m]
 
 
 @declared
@@ -150,15 +145,12 @@ class Monitors:
         row = self._rows[other.lane]
         shown = self._shows[row[other.manoeuvre]]
         allowed = [k for k in row[1:] if -other.distance < shown[k]]
-        if len(readings) == 1 and UNKNOWN not in readings:
-            (reading,) = readings
-            if row[reading] in allowed:
-                return [row[reading]]
-        return allowed
+        certain = len(readings) == 1 and UNKNOWN not in readings
+        return [k for k in allowed if certain and k in {row[r] for r in readings}] or allowed
 
     def _asked_by(self, ego: Observed, mine: int, other: Observed, theirs: int) -> float:
-        shared = region(self._site.intersection, self._site.vehicle, mine, theirs)
-        mirrored = region(self._site.intersection, self._site.vehicle, theirs, mine)
+        place = self._site.intersection, self._site.vehicle
+        shared, mirrored = region(*place, mine, theirs), region(*place, theirs, mine)
         if shared is None or mirrored is None:
             return 0.0
         x, y = -ego.distance, -other.distance
@@ -215,11 +207,7 @@ class Monitors:
 
 
 class Patience:
-    """What ends a deadlock in which all vehicles stand and wait for each other.
-
-    After some `time` [s] the first goes alone. Vehicles take part from `sight` [m] before the
-    junction on; `deceleration` is comfortable braking [m/s²].
-    """
+    """Ends a deadlock: after all have stood for some `time` [s], the first goes alone."""
 
     def __init__(self, time: float, sight: float, deceleration: float) -> None:
         self._time, self._sight, self._deceleration = time, sight, deceleration
@@ -229,10 +217,7 @@ class Patience:
     def goes(
         self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
     ) -> bool:
-        """Whether a vehicle goes, either as it `decided`, or alone where all stand and wait.
-
-        Only positions and speeds of the others are taken from `view`, the true one.
-        """
+        """Whether it goes, as `decided` or alone; of the true `view` it uses only motion."""
         alone = ego.id in self._alone
         if not alone and (decided or ego.speed >= HALTING):
             self._since.pop(ego.id, None)

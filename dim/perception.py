@@ -1,8 +1,7 @@
 """What one vehicle, the ego, sees of the others, and how it reads that.
 
 A `Perception` says what an ego sees of the true view: everything (`ExactPerception`), or less,
-later, or wrong (`dim.senses.noise`). A `Reader` then picks out the few facts that Algorithm 1
-needs, the same way for every vehicle.
+later, or wrong (`dim.senses.noise`). A `Reader` picks out the few facts that Algorithm 1 needs.
 """
 
 from __future__ import annotations
@@ -19,11 +18,8 @@ from minisim.parameters import declared
 #: longer stop it before the junction. "paper": when it is past the middle of the green zone.
 COMMITS = ("stoppable", "paper")
 
-#: A host's rounding error [m]: a front bumper that has just passed a mark may seem to be before it.
-ROUNDING = 1e-6
-
-#: The manoeuvre that an ego sees if it does not know the intent, which may be any.
-UNKNOWN = 0
+ROUNDING = 1e-6  #: by how much a vehicle that has passed a mark may seem to be before it [m]
+UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent, which may be any
 
 #: Turns a view and an ego in it into the view that the ego sees. The ego sees itself exactly.
 See = Callable[[View, Observed], View]
@@ -35,10 +31,7 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None if DIM's wake-ups suffice.
-
-        They suffice as long as all vehicles see the same (`dim.controller`).
-        """
+        """How often vehicles must look [s]; None if all see the same, so that wake-ups suffice."""
 
     def start(self, site: Site) -> See:
         """Begin a run; its random numbers and its memory belong to the result."""
@@ -86,8 +79,8 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        One that brakes comfortably for the hold line is never committed, since the green zone is
-        longer than the margin of `can_stop`.
+        One that brakes comfortably for the hold line never is, since the green zone is longer than
+        the margin of `can_stop`.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0
@@ -103,7 +96,7 @@ class Reader(NamedTuple):
         for vehicle in view.vehicles:
             if vehicle.distance > start:
                 continue
-            _, lane, manoeuvre, distance, _, _, _, _ = vehicle
+            _, lane, manoeuvre, distance, *_ = vehicle
             front = distance >= 0.0 and lane != lane_served
             if front:
                 lane_served = lane

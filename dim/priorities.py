@@ -1,29 +1,30 @@
 """Which lane comes first where cliques tie: priorities that all vehicles know without a message.
 
-Fixed ranks starve the last lane. The two rules here change the ranks as time passes. They need
-nothing that a vehicle cannot know on its own:
+Fixed ranks starve the last lane. The two rules here change the ranks with time, by nothing that a
+vehicle cannot know on its own. All that look at the same moment get the same ranks:
 
-- "rotating" needs a shared clock, such as the one from satellite navigation. Each lane in turn
-  comes first for some seconds, and the others follow clockwise.
+- "rotating" needs a shared clock, such as satellite navigation has. Each lane in turn comes first
+  for some seconds, and the others follow clockwise.
 - "waiting" puts first the lane whose front vehicle passed the start of the yellow zone longest ago.
-  A vehicle that comes later has seen only what has happened since the junction came within range
-  of its sensors. By the time it takes part itself, it has watched for at least `memory` = (range −
-  yellow zone's start) / speed limit, since no vehicle drives faster. So no wait counts for more
-  than `memory`, and every participant knows all waits: a vehicle that passed before the latecomer
-  began to watch has waited longer than that. Lanes that tie are ranked as in "rotating".
-
-All vehicles that look at the same moment get the same ranks, no matter when they came.
+  A vehicle that comes later has watched only since the junction came within range of its sensors:
+  before it takes part, for at least `memory` = (range − yellow zone's start) / speed limit, since
+  no vehicle drives faster. So no wait counts for more than `memory`, and every participant knows
+  all waits: a vehicle that passed before the latecomer began to watch has waited longer than that.
+  Lanes that tie are ranked as in "rotating".
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
+from dim.perception import ROUNDING
 from dim.zones import Zones
-from minisim.control import Observed, Site
+from minisim.control import Observed, Site, View
 from minisim.errors import InputError
+
+CHANGING = ("rotating", "waiting")  #: priorities that change with time
 
 #: How long each lane comes first [s]. No vehicle takes that long to cross: from a standstill 2 m
 #: before the junction, 22 m at 2.6 m/s² take 4.1 s. So every lane's turn includes a decision.
@@ -34,8 +35,7 @@ TURN_TIME = 10.0
 #: prediction", IEEE IV 2017).
 SENSOR_RANGE = 100.0
 
-#: Times that differ by less than this count as the same [s]: hosts round their clocks.
-SAME_TIME = 1e-6
+SAME_TIME = 1e-6  #: times that differ by less count as the same [s]: hosts round their clocks
 
 
 class Ranking(NamedTuple):
@@ -97,3 +97,19 @@ class PassingTimes:
             if vehicle.distance >= 0.0:
                 fronts.setdefault(vehicle.lane, self._passed[vehicle.id])
         return fronts
+
+
+def ranking_of(
+    priorities: Any, site: Site, zones: Zones, turn_time: float, sensor_range: float
+) -> Callable[[View], Ranking] | None:
+    """The ranks that all participants read from a view, or None if they never change."""
+    n = site.intersection.n
+    if priorities == "rotating":
+        return lambda view: rotating(view.time, n, turn_time)
+    if priorities == "waiting":
+        memory = memory_of(site, zones, sensor_range)
+        passing = PassingTimes(zones.yellow_start + ROUNDING)
+        return lambda view: longest_waiting(
+            view.time, n, passing.look(view.time, view.vehicles), memory, turn_time
+        )
+    return None

@@ -11,13 +11,11 @@ KMH = 1.0 / 3.6
 
 @declared
 class Zones:
-    """The red, yellow and green zones, in this order towards the junction.
-
-    Source: the paper, "Decentralized Intersection Management".
+    """The red, yellow and green zones, in this order towards the junction (from the paper).
 
     A vehicle slows down in the red zone. From the start of the yellow zone it takes part in
-    decisions. It waits for its right of way at the hold line, where the yellow zone ends. The green
-    zone is a buffer: a vehicle that loses its right of way can still stop in it.
+    decisions. It waits for its right of way at the hold line, where the yellow zone ends. In the
+    green zone, a vehicle that loses its right of way can still stop.
     """
 
     red: float = real(
@@ -50,12 +48,11 @@ class Zones:
     def markings(self, site: Site) -> tuple[Marking, ...]:
         """The markings of every approach lane, from the far end to the junction.
 
-        In the paper a vehicle enters the red zone and *then* slows down. A host, however, slows a
-        vehicle down before a limit begins. So the limit begins where a vehicle that brakes
-        comfortably from the start of the red zone has slowed to it: after (v² − v_red²) / 2b,
-        23.1 m for the paper's 40 to 20 km/h at 2 m/s². The part of the red zone before that has no
-        limit. If the red zone is too short for this, vehicles begin to brake before they reach it,
-        because the limit holds in the yellow zone in any case.
+        In the paper a vehicle enters the red zone and *then* slows down, but a host slows it down
+        before a limit begins. So the limit begins where a vehicle that brakes comfortably from the
+        start of the red zone has slowed to it: after (v² − v_red²) / 2b, 23.1 m for the paper's 40
+        to 20 km/h at 2 m/s². In a red zone that is too short for this, the limit begins with the
+        yellow zone, and vehicles begin to brake before the red zone.
         """
         b = site.vehicle.deceleration
         braking = stopping_distance(site.speed_limit, b) - stopping_distance(self.red_speed, b)
@@ -66,9 +63,7 @@ class Zones:
             ("yellow", self.yellow_start, self.green, self.red_speed),
             ("green", self.green, 0.0, self.red_speed),
         )
-        return tuple(
-            Marking(name, start, end, speed) for name, start, end, speed in stretches if start > end
-        )
+        return tuple(Marking(*stretch) for stretch in stretches if stretch[1] > stretch[2])
 
     def check(self, site: Site) -> None:
         """Raise `InputError` if a vehicle could be inserted past the start of the zones."""

@@ -1,9 +1,9 @@
-"""What a cross-validation shows: means over density, every trip, and where the hosts part ways."""
+"""Figures of a cross-validation: means over density, every trip, and where the hosts part ways."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 MINISIM = style.Look("minisim", style.BLUE, "o", "-")
 SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
 PUBLISHED = style.Look("published", style.BLACK, "D", ":")
-#: The lines are this far apart, so that their interval bars do not overlap [veh/h/lane].
-DODGE: Final = 2.5
 
 #: The section that a trajectory figure shows: time around the parting [s], and distance around the
 #: junction entry [m].
@@ -41,11 +39,10 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
     All densities of a junction, split and controller are drawn together.
     """
     groups: dict[tuple[str, ...], list[Result]] = {}
-    for result in results:
+    for result in sorted(results, key=lambda result: result.case.density):
         if result.rows:
             groups.setdefault(_group(result), []).append(result)
-    for group, members in groups.items():
-        ordered = sorted(members, key=lambda result: result.case.density)
+    for group, ordered in groups.items():
         title = ", ".join(group)
         if len(ordered) > 1:
             yield _file("means", *group), f"{title}: means over density", means_figure(ordered)
@@ -60,31 +57,23 @@ def crossval_figures(results: Sequence[Result]) -> Iterator[tuple[str, str, Figu
 
 def means_figure(results: Sequence[Result]) -> Figure:
     """Means over density with 95 % intervals: minisim's, SUMO's and, where known, the paper's."""
-    figure = style.new_figure(8.6, 4.0)
-    panels = figure.subplots(1, len(JUDGED))
-    figure.subplots_adjust(left=0.08, right=0.985, top=0.76, bottom=0.135, wspace=0.2)
+    figure, panels = plots.panels(
+        8.6, 4.0, len(JUDGED), sharey=False, left=0.08, right=0.985, top=0.76, bottom=0.135,
+        wspace=0.2,
+    )  # fmt: skip
     for axes, (metric, name) in zip(panels, JUDGED.items(), strict=True):
-        densities = [result.case.density for result in results]
-        for look, host, aside in ((MINISIM, "minisim", -DODGE / 2), (SUMO, "sumo", DODGE / 2)):
-            intervals = [getattr(result.row(metric), host) for result in results]
-            plots.draw_line(
-                axes, [density + aside for density in densities],
-                [plots.Estimate(i.mean, i.mean - i.half_width, i.mean + i.half_width)
-                 for i in intervals],
-                look, **plots.BOLD,
-            )  # fmt: skip
-        paper = [
-            (density, plots.Estimate(value, value, value))
-            for density, result in zip(densities, results, strict=True)
-            if (value := result.case.reference(metric, "all")) is not None
-        ]
-        if paper:
-            x, values = zip(*paper, strict=True)
-            plots.draw_line(axes, x, values, PUBLISHED, **plots.BOLD)
-        style.plot_axes(axes, name, "density [veh/h/lane]", "mean [s]")
-        axes.set_xticks(sorted(set(densities)))
-        axes.margins(x=0.08, y=0.1)
-        axes.set_ylim(bottom=0.0)
+        ours: dict[float, plots.Estimate] = {}
+        theirs: dict[float, plots.Estimate] = {}
+        paper: dict[float, plots.Estimate] = {}
+        for result in results:
+            density, row = result.case.density, result.row(metric)
+            for line, (mean, half, _) in ((ours, row.minisim), (theirs, row.sumo)):
+                line[density] = plots.Estimate(mean, mean - half, mean + half)
+            value = result.case.reference(metric, "all")
+            if value is not None:
+                paper[density] = plots.Estimate(value, value, value)
+        lines = [(MINISIM, ours), (PUBLISHED, paper), (SUMO, theirs)]
+        plots.draw_side_by_side(axes, [line for line in lines if line[1]], name)
     _head(figure, panels[0], results[0])
     return figure
 
@@ -115,77 +104,62 @@ def parting_figure(result: Result, parting: Parting) -> Figure:
     """Distance to the junction over time, one panel per lane, with both hosts overlaid."""
     junction = result.case.scenario.intersection
     entry, arms = junction.approach_length, junction.n
-    start = parting.time - SHOWN_BEFORE
+    start, end = parting.time - SHOWN_BEFORE, parting.time + SHOWN_AFTER
     figure = style.new_figure(9.6, 1.25 + 1.45 * arms)
     height = figure.get_figheight()
     panels = figure.subplots(arms, 1, sharex=True, squeeze=False)[:, 0]
-    figure.subplots_adjust(
-        left=0.085, right=0.985, top=1.0 - 0.95 / height, bottom=0.55 / height, hspace=0.14
-    )
+    top, bottom = 1.0 - 0.95 / height, 0.55 / height
+    figure.subplots_adjust(left=0.085, right=0.985, top=top, bottom=bottom, hspace=0.14)
     for frame, look in ((parting.minisim, MINISIM), (parting.sumo, SUMO)):
-        near = frame[
-            frame[TIME].between(start, start + SHOWN_BEFORE + SHOWN_AFTER)
-            & frame[S].between(entry + SHOWN_FROM, entry + SHOWN_TO)
-        ]
+        near = frame[frame[TIME].between(start, end)]
+        near = near[near[S].between(entry + SHOWN_FROM, entry + SHOWN_TO)]
         width = 1.3 if look is MINISIM else 1.8
         for _, trip in near.groupby(VEHICLE):
             axes = panels[ARM_NAMES.index(str(trip[LANE].iloc[0]))]
-            axes.plot(trip[TIME], trip[S] - entry, color=look.colour, linestyle=look.dashes,
-                      linewidth=width)  # fmt: skip
+            way = trip[TIME], trip[S] - entry
+            axes.plot(*way, color=look.colour, linestyle=look.dashes, linewidth=width)
             if look is MINISIM:
                 _name_trip(axes, trip, entry)
     for axes, lane in zip(panels, ARM_NAMES, strict=False):
         style.plot_axes(axes, "", "", f"lane {lane} [m]")
         axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
-        axes.set_ylim(SHOWN_FROM, SHOWN_TO)
-        axes.set_xlim(start, start + SHOWN_BEFORE + SHOWN_AFTER)
-    lane = panels[ARM_NAMES.index(parting.movement[0])]
-    lane.plot(
-        parting.time, parting.positions[0] - entry, "o", markersize=13,
-        markerfacecolor="none", markeredgecolor=style.VERMILLION, markeredgewidth=1.8,
-    )  # fmt: skip
-    panels[-1].set_xlabel("time [s]", fontsize=9.5, color=style.INK)
+        axes.set(xlim=(start, end), ylim=(SHOWN_FROM, SHOWN_TO))
+    ring: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": style.VERMILLION}
+    panels[ARM_NAMES.index(parting.movement[0])].plot(
+        parting.time, parting.positions[0] - entry, "o", markersize=13, markeredgewidth=1.8, **ring
+    )
+    panels[-1].set_xlabel("time [s]", **style.LABEL)
     for look in (MINISIM, SUMO):
         panels[0].plot([], [], color=look.colour, linestyle=look.dashes, label=look.label)
-    panels[0].plot(
-        [], [], "o", markerfacecolor="none", markeredgecolor=style.VERMILLION, label="parting point"
-    )
+    panels[0].plot([], [], "o", label="parting point", **ring)
     _head(figure, panels[0], result, "front bumper before (−) or past (+) the junction entry")
     return figure
 
 
 def _distributions(axes: Axes, result: Result, metric: str) -> None:
-    values = {
-        MINISIM: np.concatenate([times(pair.minisim, metric) for pair in result.pairs]),
-        SUMO: np.concatenate([times(pair.sumo, metric) for pair in result.pairs]),
-    }
-    for look, seconds in values.items():
-        axes.ecdf(
-            seconds, color=look.colour, linestyle=look.dashes, linewidth=1.6, label=look.label
-        )
-    axes.set_xlim(_limits(np.concatenate(list(values.values()))))
+    ours = np.concatenate([times(pair.minisim, metric) for pair in result.pairs])
+    theirs = np.concatenate([times(pair.sumo, metric) for pair in result.pairs])
+    for look, seconds in ((MINISIM, ours), (SUMO, theirs)):
+        axes.ecdf(seconds, color=look.colour, linestyle=look.dashes, linewidth=1.6,
+                  label=look.label)  # fmt: skip
+    axes.set_xlim(_limits(np.concatenate([ours, theirs])))
     axes.set_ylim(0.0, 1.02)
-    axes.text(
-        0.97, 0.06, f"KS {result.row(metric).ks:.3f}", transform=axes.transAxes, ha="right",
-        fontsize=9, color=style.INK,
-    )  # fmt: skip
+    _note(axes, 0.97, 0.06, f"KS {result.row(metric).ks:.3f}", "right")
 
 
 def _scatter(axes: Axes, result: Result) -> None:
     """Travel time of each trip that ended in both hosts."""
     both = _travel_times(result)
-    axes.plot(
-        *both, linestyle="none", marker="o", markersize=2.6, markeredgewidth=0,
-        color=style.BLUE, alpha=0.35, rasterized=True,
-    )  # fmt: skip
+    axes.plot(*both, "o", markersize=2.6, markeredgewidth=0, color=style.BLUE, alpha=0.35,
+              rasterized=True)  # fmt: skip
     limits = _limits(both)
     axes.plot(limits, limits, color=style.VERMILLION, linewidth=1.0, zorder=1)
-    axes.set_xlim(limits)
-    axes.set_ylim(limits)
-    axes.text(
-        0.05, 0.9, f"same: {100 * result.row('travel_time_s').within:.1f} %",
-        transform=axes.transAxes, fontsize=9, color=style.INK,
-    )  # fmt: skip
+    axes.set(xlim=limits, ylim=limits)
+    _note(axes, 0.05, 0.9, f"same: {100 * result.row('travel_time_s').within:.1f} %", "left")
+
+
+def _note(axes: Axes, x: float, y: float, text: str, align: str) -> None:
+    axes.text(x, y, text, transform=axes.transAxes, ha=align, fontsize=9, color=style.INK)
 
 
 def _limits(values: Floats) -> tuple[float, float]:
@@ -196,12 +170,9 @@ def _limits(values: Floats) -> tuple[float, float]:
 
 def _travel_times(result: Result) -> Floats:
     """Times in minisim and in SUMO of the trips that ended in both [s], shape (2, k)."""
-    return np.hstack([
-        np.array([pair.minisim.travel_time, pair.sumo.travel_time])[
-            :, pair.minisim.arrived & pair.sumo.arrived
-        ]
-        for pair in result.pairs
-    ])  # fmt: skip
+    trips = [(pair.minisim, pair.sumo) for pair in result.pairs]
+    both = [np.array([a.travel_time, b.travel_time])[:, a.arrived & b.arrived] for a, b in trips]
+    return np.hstack(both)
 
 
 def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
@@ -216,22 +187,15 @@ def _name_trip(axes: Axes, trip: pd.DataFrame, entry: float) -> None:
 
 def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
     case = result.case
-    height = figure.get_figheight()
-    left = figure.subplotpars.left
+    height, left = figure.get_figheight(), figure.subplotpars.left
     where = case.name if note else ", ".join(_group(result))
     arrivals = "drawn" if case.published is None else "published"
     title = f"{where} · profile {case.scenario.profile.name}, {arrivals} arrivals"
-    figure.text(left, 1 - 0.2 / height, title, fontsize=10.5, color=style.INK, va="center")
-    if note:
-        figure.text(
-            0.985, 1 - 0.2 / height, note, fontsize=9, color=style.MUTED, va="center", ha="right"
-        )
+    style.write(figure, left, 1 - 0.2 / height, title, 10.5)
+    style.write(figure, 0.985, 1 - 0.2 / height, note, 9, colour=style.MUTED, ha="right")
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="upper left", bbox_to_anchor=(left - 0.01, 1 - 0.28 / height),
-        ncols=len(labels), frameon=False, fontsize=10, handlelength=2.6, columnspacing=2.2,
-        labelcolor=style.INK,
-    )  # fmt: skip
+    corner = (left, 1 - 0.36 / height)
+    plots.legend(figure, handles, labels, corner[1], bbox_to_anchor=corner, fontsize=10)
 
 
 def _group(result: Result) -> tuple[str, ...]:

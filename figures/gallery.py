@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -33,12 +35,9 @@ def item_named(name: str) -> Item:
 
 def write(drawing: Drawing, folder: Path, name: str) -> list[Path]:
     """Write a drawing in all its formats, each completely or not at all; return the files."""
-    if isinstance(drawing, Figure):
-        files = [folder / f"{name}.{suffix}" for suffix in FORMATS]
-        for file in files:
-            save(drawing, file)
-    else:
-        files = [folder / f"{name}.{suffix}" for suffix in WRITERS]
-        for file in files:
-            save_table(drawing, file)
+    writer: Callable[[Any, Path], None] = save if isinstance(drawing, Figure) else save_table
+    formats = FORMATS if isinstance(drawing, Figure) else WRITERS
+    files = [folder / f"{name}.{suffix}" for suffix in formats]
+    for file in files:
+        writer(drawing, file)
     return files

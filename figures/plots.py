@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,16 +21,15 @@ from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
 #: Series are drawn side by side, so that their bars do not cover each other: spread over this share
-#: of the range of demands, or this share per series if that is more.
-DODGE, APART = 0.028, 0.0075
+#: of the smallest step between demands.
+SPREAD = 0.12
+#: Lines with few points are this far apart [veh/h/lane].
+DODGE = 2.5
 DENSITY_LABEL = "demand [veh/h/lane]"
 #: Left edge of titles, legends and small print, as a share of the figure.
 LEFT = 0.012
 #: Size of the small print [pt].
 FOOTNOTE_SIZE = 7.5
-
-#: Style of a line with few points, see `draw_line`.
-BOLD: dict[str, Any] = {"linewidth": 1.8, "markersize": 5.5, "capsize": 3.5, "elinewidth": 1.2}
 
 
 class Estimate(NamedTuple):
@@ -62,13 +62,26 @@ def draw_line(
         "markersize": 5.0, "capsize": 2.6, "elinewidth": 1.1, "zorder": 3, "label": look.label,
     }  # fmt: skip
     axes.errorbar(x, [e.value for e in estimates], yerr=bars, **(drawn | changes))
-    arrow = {
-        "arrowstyle": "<-", "color": look.colour, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 5.5,
-    }  # fmt: skip
+    arrow = {"arrowstyle": "<-", "color": look.colour, "linewidth": 1.1, "shrinkA": 0}
     for place, estimate, grown in zip(x, estimates, growing, strict=False):
         if grown:
             axes.annotate("", (place, estimate.high), xytext=(0, 16), textcoords="offset points",
-                          zorder=4, arrowprops=arrow)  # fmt: skip
+                          zorder=4, arrowprops=arrow | {"shrinkB": 5.5})  # fmt: skip
+
+
+def draw_side_by_side(
+    axes: Axes, lines: Iterable[tuple[style.Look, Mapping[float, Estimate]]], title: str
+) -> None:
+    """Means [s] over a few densities [veh/h/lane], one line per look, in a frame of their own."""
+    drawn = list(lines)
+    for k, (look, points) in enumerate(drawn):
+        aside = DODGE * (k - (len(drawn) - 1) / 2.0)
+        places = [density + aside for density in points]
+        draw_line(axes, places, [*points.values()], look, markersize=5.5, capsize=3.5)
+    axes.set_xticks(sorted({density for _, points in drawn for density in points}))
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.08)
+    style.plot_axes(axes, title, "density [veh/h/lane]", "mean [s]")
 
 
 def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str]) -> None:
@@ -77,10 +90,8 @@ def draw_means(axes: Axes, rows: pd.DataFrame, metric: str, series: Sequence[str
     `rows` come from a study (`Results.good`); a series without rows is left out.
     """
     if rows.empty:
-        axes.text(
-            0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top", fontsize=11,
-            color=style.MUTED,
-        )  # fmt: skip
+        axes.text(0.5, 0.94, "not run", transform=axes.transAxes, ha="center", va="top",
+                  fontsize=11, color=style.MUTED)  # fmt: skip
         return
     for place, name in enumerate(series):
         known = rows[(rows["series"] == name) & rows[metric].notna()]
@@ -113,38 +124,29 @@ def draw_published(
         look = style.look(name)
         chosen = table[table["series"] == name]
         x = chosen["density"].astype(float) + offset(rows, place, len(series))
-        axes.plot(
-            x, chosen["paper"], marker=look.marker, markersize=8.0, markeredgewidth=1.2,
-            markeredgecolor=look.colour, markerfacecolor="none", linestyle="none", zorder=5,
-        )  # fmt: skip
+        drawn: dict[str, Any] = {
+            "color": look.colour, "markeredgewidth": 1.2, "linestyle": "none", "zorder": 5
+        }  # fmt: skip
+        axes.plot(x, chosen["paper"], look.marker, markersize=8.0, markerfacecolor="none", **drawn)
         crossed = (chosen["comparable"] != "yes").to_numpy()
-        axes.plot(
-            x[crossed], chosen["paper"][crossed], marker="x", markersize=7.0,
-            markeredgewidth=1.2, color=look.colour, linestyle="none", zorder=6,
-        )  # fmt: skip
+        axes.plot(x[crossed], chosen["paper"][crossed], "x", markersize=7.0, **drawn)
 
 
 def offset(rows: pd.DataFrame, place: int, count: int) -> float:
     """Sideways shift of a series [veh/h/lane]."""
-    if rows.empty or count < 2:
+    demands = np.unique(rows["density"])
+    if len(demands) < 2 or count < 2:
         return 0.0
-    span = float(rows["density"].max() - rows["density"].min())
-    return max(DODGE, APART * (count - 1)) * span * (place / (count - 1) - 0.5)
+    return SPREAD * float(np.diff(demands).min()) * (place / (count - 1) - 0.5)
 
 
-def density_axis(axes: Axes, densities: Iterable[float]) -> None:
-    """Ticks at the demands that were run, six at most, with a margin around them."""
+def density_axis(axes: Axes, densities: Iterable[float] = DENSITIES) -> None:
+    """Ticks at these demands (by default the paper's), six at most, with a margin around them."""
     shown = sorted(set(densities))
     step = math.ceil(len(shown) / 6)
     axes.set_xticks(shown[(len(shown) - 1) % step :: step], minor=False)
-    margin = 0.05 * (shown[-1] - shown[0]) or 14.0
+    margin = 0.06 * (shown[-1] - shown[0]) or 14.0
     axes.set_xlim(shown[0] - margin, shown[-1] + margin)
-
-
-def paper_densities(axes: Axes) -> None:
-    """Ticks at the paper's demands, with a margin around them."""
-    axes.set_xticks(DENSITIES)
-    axes.set_xlim(DENSITIES[0] - 14, DENSITIES[-1] + 14)
 
 
 def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None) -> None:
@@ -181,27 +183,34 @@ def panels(
     return figure, list(drawn.flat)
 
 
-def heading(figure: Figure, text: str) -> None:
-    """The title of a figure, above its legends."""
-    style.write(figure, LEFT, 0.965, text, 13, bold=True)
-
-
-def looks_legend(
-    figure: Figure, looks: Iterable[style.Look], top: float, ncols: int | None = None,
-    *, lines: bool = True, **changes: Any,
+def frame(
+    figure: Figure, title: str, looks: Iterable[style.Look], note: str, *,
+    ncols: int | None = None, marks: float | None = None, paper: bool = False, lines: bool = True,
 ) -> None:  # fmt: skip
-    """A legend of lines and markers, or of markers only; `changes` as in `legend`."""
+    """The title of a figure, the legend of its looks in `ncols` columns, and its small print.
+
+    At the height `marks`, a second legend says what markers and arrows mean, those of the `paper`
+    too. Without `lines`, the looks are markers only.
+    """
+    style.write(figure, LEFT, 0.965, title, 13, bold=True)
     shown = list(looks)
     handles = [
         Line2D([], [], color=k.colour, marker=k.marker, linewidth=1.7, markersize=5.5,
                linestyle=k.dashes if lines else "none")
         for k in shown
     ]  # fmt: skip
-    legend(figure, handles, [k.label for k in shown], top, ncols, **changes)
+    legend(figure, handles, [k.label for k in shown], 0.93, ncols)
+    if marks is not None:
+        _marks_legend(figure, marks, paper=paper)
+    # A letter is about 0.54 times its size in width; an inch has 72 points.
+    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
+    figure.text(
+        LEFT, 0.008, textwrap.fill(note, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
+        va="bottom", linespacing=1.05,
+    )  # fmt: skip
 
 
-def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:
-    """A legend of every series' markers, with or without the markers of the paper's values."""
+def _marks_legend(figure: Figure, top: float, *, paper: bool) -> None:
     handles: list[Any] = [Line2D([], [], color=style.MUTED, marker="o", markersize=5.0)]
     labels = ["ours, mean and 95 % interval"]
     if paper:
@@ -214,9 +223,8 @@ def marks_legend(figure: Figure, top: float, *, paper: bool = False) -> None:
 
 
 def _mark(marker: str, size: float, **look: Any) -> Line2D:
-    return Line2D(
-        [], [], color=style.MUTED, marker=marker, linestyle="none", markersize=size, **look
-    )
+    look |= {"color": style.MUTED, "linestyle": "none"}
+    return Line2D([], [], marker=marker, markersize=size, **look)
 
 
 def legend(
@@ -228,16 +236,6 @@ def legend(
         "loc": "upper left", "bbox_to_anchor": (LEFT, top), "frameon": False, "fontsize": 9.5,
         "handlelength": 2.4, "labelcolor": style.INK, "borderaxespad": 0.0, "handletextpad": 0.6,
         "handler_map": {tuple: HandlerTuple(ndivide=1)}, "columnspacing": 1.7,
-        "ncols": len(labels) if ncols is None else ncols,
+        "ncols": ncols or max(len(labels), 1),
     }  # fmt: skip
     figure.legend(handles, labels, **(drawn | changes))
-
-
-def footnote(figure: Figure, text: str) -> None:
-    """Small print along the lower edge, on as many lines as it needs."""
-    # A letter is about 0.54 times its size in width; an inch has 72 points.
-    columns = int(figure.get_figwidth() * 72.0 / (0.54 * FOOTNOTE_SIZE))
-    figure.text(
-        LEFT, 0.008, textwrap.fill(text, columns), fontsize=FOOTNOTE_SIZE, color=style.MUTED,
-        va="bottom", linespacing=1.05,
-    )  # fmt: skip

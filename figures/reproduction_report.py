@@ -28,25 +28,20 @@ def write_report(
 ) -> int:  # fmt: skip
     """Draw into `folder`/figures, then write `folder`/report.md; return the number of drawings.
 
-    `parts` are studies; unless all are given, the report has only figures that need one of them.
-    `progress` is called with the figures drawn and the total. Raises `FileError`.
+    `parts` are studies; without all of them, the report has only figures that need one of them.
+    `progress` is called with the figures done and the total. Raises `FileError`.
     """
     pictures = make_folder(folder / "figures")
     drawn: dict[str, Drawing] = {}
     missing: dict[str, str] = {}
     whole = set(parts) >= set(NAMES)
-    chosen = {
-        name: item
-        for name, item in GALLERY.items()
-        if whole or not set(parts).isdisjoint(item.needs)
-    }
-    for done, (name, item) in enumerate(chosen.items(), start=1):
+    chosen = [item for item in GALLERY.values() if whole or set(parts) & set(item.needs)]
+    for done, item in enumerate(chosen, start=1):
         try:
-            drawn[name] = item.build(archive)
+            drawing = drawn[item.name] = item.build(archive)
+            write(drawing, pictures, item.name)
         except MissingRunsError as error:
-            missing[name] = str(error)
-        else:
-            write(drawn[name], pictures, name)
+            missing[item.name] = str(error)
         progress(done, len(chosen))
     text = "\n\n".join(_report(archive, made, jobs, drawn, missing, parts))
     write_text(folder / "report.md", text.rstrip() + "\n")
@@ -61,7 +56,7 @@ def _report(
     studies = [archive.study(name) for name in NAMES if name in parts]
     yield "# The paper's experiments, reproduced"
     yield (
-        f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s a run, "
+        f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s per run, "
         f"{jobs} {'process' if jobs == 1 else 'processes'}. All controllers of a cell get the "
         "same arrivals, except in `as-run`, where some met another inflow than their label says. "
         "Intervals are 95 %, Student's t over seeds."
@@ -83,8 +78,8 @@ def _report(
         yield "## Result in short"
         yield from answers
     for section in SECTIONS:
-        known = [item for item in section.items if item.name in drawn or item.name in missing]
-        shown = [item for item in known if item.in_report]
+        known = drawn.keys() | missing.keys()
+        shown = [item for item in section.items if item.in_report and item.name in known]
         if shown:
             yield f"## {section.heading}"
         for item in shown:
@@ -103,22 +98,20 @@ def _report(
 
 
 def _made_table(made: Sequence[Made]) -> Table:
-    digits = (0, 1, 0, 0, 0, 0)
-    counts = [
-        (part.runs, part.hours, part.computed, part.wall_s, part.cpu_s, len(part.failed))
-        for part in made
-    ]
-    names = [(part.name, study_named(part.name).question) for part in made]
-    totals = tuple(map(sum, zip((0,) * len(digits), *counts, strict=True)))
-    rows = [
-        (*words, *(f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)))
-        for words, values in zip([*names, ("all", "")], [*counts, totals], strict=True)
-    ]
+    def totals(parts: Sequence[Made]) -> tuple[str, ...]:
+        wall, cpu = (sum(getattr(part, time) for part in parts) for time in ("wall_s", "cpu_s"))
+        return (
+            f"{sum(part.runs for part in parts)}", f"{sum(part.hours for part in parts):.1f}",
+            f"{sum(part.computed for part in parts)}", f"{wall:.0f}", f"{cpu:.0f}",
+            f"{sum(len(part.failed) for part in parts)}",
+        )  # fmt: skip
+
+    rows = [(part.name, study_named(part.name).question, *totals([part])) for part in made]
     return Table(
         "Studies; what the store had already was not computed again",
         ("study", "question", "runs", "simulated h", "computed now", "wall [s]", "CPU [s]",
          "failed"),
-        tuple(rows), labels=2,
+        (*rows, ("all", "", *totals(made))), labels=2,
         notes=(
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
             "clique first) and says what the paper's rules give; `as-run` are the profiles "
@@ -133,22 +126,19 @@ def _made_table(made: Sequence[Made]) -> Table:
 
 def _cost_table(studies: Iterable[Results]) -> Table:
     run = [results for results in studies if not results.good.empty]
+
+    def cost(results: Results, name: str) -> str:
+        rows = results.good[results.good["series"] == name]
+        cpu, horizon = (float(rows[key].astype(float).sum()) for key in ("cpu_s", "horizon_s"))
+        return "–" if rows.empty else f"{3600.0 * cpu / horizon:.2f}"
+
     series = dict.fromkeys(point.series for results in run for point in results.study.points)
-    rows = [
-        (style.look(name).label, *(_cost(each.good[each.good["series"] == name]) for each in run))
-        for name in series
-    ]
     return Table(
         "CPU seconds for one simulated hour, mean of the runs",
-        ("controller", *(results.study.name for results in run)), tuple(rows),
+        ("controller", *(results.study.name for results in run)),
+        tuple((style.look(name).label, *(cost(results, name) for results in run))
+              for name in series),
     )  # fmt: skip
-
-
-def _cost(rows: pd.DataFrame) -> str:
-    if rows.empty:
-        return "–"
-    hours = float(rows["horizon_s"].astype(float).sum()) / 3600.0
-    return f"{float(rows['cpu_s'].astype(float).sum()) / hours:.2f}"
 
 
 def _shown(item: Item, drawing: Drawing) -> str:
@@ -168,20 +158,20 @@ def _cells(results: Results) -> Iterator[tuple[Point, pd.DataFrame]]:
 
 
 def _collisions(studies: Iterable[Results]) -> str:
-    lines = [
-        f"- {results.study.name}: {style.look(point.series).label}, {point.where}, "
-        f"{point.density:g} veh/h/lane: {count} in "
-        f"{len(rows) * results.effort.horizon / 3600.0:.1f} h"
-        for results in studies
-        for point, rows in _cells(results)
-        if (count := int(rows["collisions"].sum()))
-    ]
+    lines = []
+    for results in studies:
+        for point, rows in _cells(results):
+            if count := int(rows["collisions"].sum()):
+                hours = len(rows) * results.effort.horizon / 3600.0
+                where = f"{style.look(point.series).label}, {point.where}, {point.density:g}"
+                lines.append(
+                    f"- {results.study.name}: {where} veh/h/lane: {count} in {hours:.1f} h"
+                )
     return "\n".join(lines) or "None in any run."
 
 
 def _saturated(studies: Iterable[Results]) -> str:
-    lines = []
-    short = 0
+    lines, short = [], 0
     for results in studies:
         grown: dict[str, list[str]] = {}
         for point, rows in _cells(results):
@@ -201,7 +191,7 @@ def _saturated(studies: Iterable[Results]) -> str:
         lines.append(
             f"- In {short} cells, the runs are too short to tell: the roads were still filling."
         )
-    return f"{head}\n\n" + ("\n".join(lines) if lines else "None.")
+    return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 
 def _failed(made: Sequence[Made]) -> str:

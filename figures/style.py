@@ -7,7 +7,7 @@ state, a display or another program's figures.
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from minisim.errors import InputError
-from minisim.files import replacing
+from minisim.files import AnyPath, replacing
 from scenarios.controllers import VARIANTS
 from scenarios.controllers import Look as Look
 
@@ -87,16 +87,21 @@ def plot_axes(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
     axes.spines[["left", "bottom"]].set_color(MUTED)
 
 
-def figure_format(path: str | os.PathLike[str]) -> str:
-    """The format of a figure file by its suffix; raises `InputError` for an unknown one."""
+def suffix_of(path: AnyPath, what: str, formats: Iterable[str]) -> str:
+    """The suffix of a file; raises `InputError` if it is not one of the formats."""
     suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in FORMATS:
-        allowed = ", ".join(f".{name}" for name in FORMATS)
-        raise InputError(f"a figure file ends in {allowed}; got {str(path)!r}")
+    if suffix not in formats:
+        allowed = ", ".join(f".{name}" for name in formats)
+        raise InputError(f"{what} file ends in {allowed}; got {str(path)!r}")
     return suffix
 
 
-def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+def figure_format(path: AnyPath) -> str:
+    """The format of a figure file by its suffix; raises `InputError` for an unknown one."""
+    return suffix_of(path, "a figure", FORMATS)
+
+
+def save(figure: Figure, path: AnyPath) -> None:
     """Write a figure in the format of its suffix, with the same bytes every time."""
     kind = figure_format(path)
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}

@@ -7,6 +7,7 @@ import io
 from dataclasses import dataclass
 from pathlib import Path
 
+from figures.style import suffix_of
 from minisim.errors import InputError
 from minisim.files import markdown_table, write_text
 
@@ -55,10 +56,7 @@ WRITERS = {"md": Table.markdown, "csv": Table.csv, "tex": Table.latex}
 
 def save_table(table: Table, path: Path) -> None:
     """Write a table in the format of its suffix (`WRITERS`), whole or not at all."""
-    suffix = path.suffix.removeprefix(".")
-    if suffix not in WRITERS:
-        raise InputError(f"a table file ends in {', '.join(f'.{k}' for k in WRITERS)}; got {path}")
-    write_text(path, WRITERS[suffix](table))
+    write_text(path, WRITERS[suffix_of(path, "a table", WRITERS)](table))
 
 
 _LATEX = str.maketrans({

@@ -1,8 +1,4 @@
-"""Demand and the arrival table drawn from it.
-
-The table is drawn before the run from the run's own streams, so every controller meets the same
-vehicles.
-"""
+"""Demand, and the arrival table drawn from it before a run: every controller meets the same one."""
 
 from __future__ import annotations
 
@@ -32,9 +28,9 @@ LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
 MAX_DENSITY = 3600.0
 #: More in one second have a chance below 10⁻¹⁶ at any density.
 MOST_IN_A_SECOND = 20
-#: Seconds, and headways of each lane, drawn at once.
+#: Seconds, or headways of each lane, drawn at once.
 BLOCK, HEADWAYS = 3600, 64
-#: The forms in which callers may give shares.
+#: Shares as callers may give them.
 Shares = Sequence[float] | str | None
 #: The longest duration and the latest demand time [s].
 MAX_TIME = 1e7
@@ -42,10 +38,7 @@ MAX_TIME = 1e7
 
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """An arrival table, sorted by demand time (ties keep lane order).
-
-    All columns have the shape (k,).
-    """
+    """An arrival table, sorted by demand time and lane; all columns have the shape (k,)."""
 
     time: Floats  # demand time [s]
     lane: Ints  # index of the approach lane
@@ -64,10 +57,10 @@ class Arrivals:
             columns["speed_factor"] = factors
         if any(len(column) != len(time) for column in columns.values()):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
-        if len(time) and (not np.isfinite(time).all() or time.min() < 0):
+        if not np.isfinite(time).all() or time.min(initial=0.0) < 0:
             raise InputError("demand times must be finite and not negative")
-        if len(time) and time.max() > MAX_TIME:
-            raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {time.max():g}")
+        if (last := time.max(initial=0.0)) > MAX_TIME:
+            raise InputError(f"demand times must be at most {MAX_TIME:g} s, got {last:g}")
         order = np.lexsort((lane, time))
         for name, column in columns.items():
             column = column[order]
@@ -81,8 +74,8 @@ class Arrivals:
     def rank(self) -> Ints:
         """Each vehicle's place among those of its lane, from 0.
 
-        What a vehicle is by chance, such as a human's, is drawn by lane and rank, so it depends on
-        no other lane and not on the horizon.
+        What chance makes of a vehicle, such as a human's, is drawn by lane and rank, so it does not
+        depend on other lanes or on the horizon.
         """
         return ranks(self.lane)
 
@@ -107,29 +100,23 @@ class Arrivals:
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)"; None if equal.
+    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)".
 
-    Args:
-        name: what messages call them.
-        value: the shares; None and the word `equal` both mean equal shares.
-        equal: that word.
+    None and the word `equal` mean equal shares, which are returned as None.
 
     Raises:
         InputError: not finite numbers, a negative one, or only zeros.
     """
-    if value is None:
+    if value is None or (isinstance(value, str) and value == equal):
         return None
     if isinstance(value, str):
-        if value == equal:
-            return None
         text = value.strip()
         listed = text[1:-1] if text[:1] + text[-1:] in ("()", "[]") else text
         try:
             value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
-            raise InputError(
-                f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
-            ) from None
+            wrong = f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
+            raise InputError(wrong) from None
     shares = numbers(name, value)
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:
         raise InputError(f"{name} must be shares ≥ 0, not all 0; got {show(value)}")
@@ -145,13 +132,12 @@ def shares_text(shares: Shares, equal: str) -> str:
 class Demand:
     """How many vehicles come, from where, and where to.
 
-    Shares may be given as numbers or as text such as "4:3:2:1"; they are kept as a tuple of
-    floats, or None if they are equal. All models of arrivals have the same mean headway. The
-    paper's is Poisson: it draws a count of arrivals for every second.
+    Shares are kept as `read_shares` returns them. All models of arrivals have the same mean
+    headway. The paper's is Poisson: it draws a count of arrivals for every second.
     """
 
     density: float = real(
-        "mean inflow a lane; with a split, the mean over all lanes", "veh/h/lane",
+        "mean inflow per lane; with a split, the mean over all lanes", "veh/h/lane",
         low=0, high=MAX_DENSITY,
     )  # fmt: skip
     split: Shares = checked(
@@ -173,9 +159,8 @@ class Demand:
         shares = _shares("split", self.split, n, "lanes")
         rates = tuple(self.density * n * share for share in shares)
         if max(rates) > MAX_DENSITY:
-            raise InputError(
-                f"the split gives a lane {max(rates):g} veh/h; at most {MAX_DENSITY:g} are allowed"
-            )
+            most = f"at most {MAX_DENSITY:g} are allowed"
+            raise InputError(f"the split gives a lane {max(rates):g} veh/h; {most}")
         if self.model == "shifted" and max(rates) / 3600.0 * self.min_headway >= 1.0:
             raise InputError(
                 f"{max(rates):g} veh/h leave no room for a min_headway of {self.min_headway:g} s"
@@ -185,12 +170,12 @@ class Demand:
     def draw(self, n: int, duration: float, seed: int) -> Arrivals:
         """Draw the arrivals on n lanes over `duration` seconds.
 
-        Each random number belongs to one lane and to one second or vehicle. So a longer duration
-        only adds arrivals, and a lane's arrivals do not depend on the rates of the others.
+        Each random number belongs to one lane and one second or vehicle, so a longer duration only
+        adds arrivals, and a lane's arrivals do not depend on the rates of the others.
 
         Manoeuvres are drawn independently. (The authors drew them without replacement within a
-        second, which ends the run when more vehicles come than there are manoeuvres; at 350
-        veh/h/lane that affects 0.4 % of the lane-seconds.)
+        second, which ends the run if more vehicles come than there are manoeuvres: at 350
+        veh/h/lane, in 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
@@ -209,7 +194,7 @@ class Demand:
 
 
 def _counted(rates: Floats, duration: float, rng: np.random.Generator) -> tuple[Floats, Ints]:
-    """Times and lanes of Poisson counts of every second, by inversion; `rates` [veh/s], (n,)."""
+    """Times and lanes of Poisson counts for every second, by inversion; `rates` [veh/s], (n,)."""
     k = np.arange(MOST_IN_A_SECOND)
     chances = np.exp(-rates)[:, None] * rates[:, None] ** k / np.cumprod(np.maximum(k, 1))
     at_most = chances.cumsum(axis=1)  # chance of at most k vehicles in a second, (n, k)
@@ -229,7 +214,7 @@ def _spaced(
 ) -> tuple[Floats, Ints]:
     """Times and lanes with exponential headways beyond `shift` [s]; `rates` [veh/s], (n,)."""
     with np.errstate(divide="ignore"):
-        mean = 1.0 / rates - shift  # infinite on a lane where nobody comes
+        mean = 1.0 / rates - shift  # infinite on a lane without arrivals
     blocks = [np.zeros((1, len(rates)))]
     while blocks[-1][-1].min() < duration:
         headways = shift + mean * rng.standard_exponential((HEADWAYS, len(rates)))
@@ -240,7 +225,7 @@ def _spaced(
 
 
 def ranks(lane: Ints) -> Ints:
-    """Each vehicle's place among those of its lane, from 0, given the lanes in order of demand."""
+    """`Arrivals.rank`, given the lanes in order of demand."""
     order = np.argsort(lane, kind="stable")
     ahead = np.searchsorted(lane[order], lane[order])
     rank = np.empty(len(lane), int)
@@ -255,8 +240,7 @@ def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, .
     shares = tuple(map(float, given))  # `Demand` has already turned text into numbers
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
-    total = sum(shares)
-    return tuple(share / total for share in shares)
+    return tuple(share / sum(shares) for share in shares)
 
 
 def _column(name: str, value: npt.ArrayLike, dtype: type) -> npt.NDArray[np.generic]:

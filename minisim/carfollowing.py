@@ -1,8 +1,8 @@
-"""Car-following laws as pure functions of plain floats, compiled where numba is installed.
+"""Car-following laws as pure functions of plain floats, compiled if numba is installed.
 
-All values are in SI units. Under the IDM, positions and speeds advance by the ballistic rule
-(`ballistic`): a vehicle keeps its acceleration for one step. Krauß's law gives the next speed
-instead, and a vehicle drives the whole step at it (`semi_implicit`), as in SUMO by default.
+All values are in SI units. Under the IDM a vehicle keeps its acceleration for one step
+(`ballistic`). Krauß's law gives the next speed instead, at which a vehicle drives the whole step
+(`semi_implicit`), as in SUMO by default.
 """
 
 from __future__ import annotations
@@ -82,12 +82,11 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
 def safe_speed(gap: float, v_leader: float, b: float, headway: float, dt: float) -> float:
     """Krauß's safe speed: the highest at which a leader that brakes at b causes no collision.
 
-    A vehicle that keeps it for `headway` and then slows by b·dt per step uses up `gap` plus the
-    leader's braking distance. So the equilibrium gap is v·headway for any step. For dt → 0 this
-    is Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
+    A vehicle that keeps it for `headway` and then slows by b·dt per step uses up `gap` (beyond the
+    gap at standstill) plus the leader's braking distance. So the equilibrium gap is v·headway for
+    any step. For dt → 0 this is Krauß's −bT + √(b²T² + v_l² + 2b·gap). 0 for a gap ≤ 0.
     Source: Krauß 1998, Microscopic Modeling of Traffic Flow, §3.1 (eq. 3.7, leader and follower
-    alike); in whole braking steps, as in SUMO's `MSCFModel::maximumSafeFollowSpeed` without
-    the ballistic rule. `gap` is measured beyond the gap at standstill, as there.
+    alike); in whole braking steps, as SUMO's `MSCFModel::maximumSafeFollowSpeed` (not ballistic).
     """
     room = gap - STILL
     if room < 0.0:
@@ -114,8 +113,7 @@ def braking_distance(v: float, b: float, dt: float) -> float:
 def stepwise_towards(v_target: float, distance: float, b: float, dt: float) -> float:
     """`speed_towards` for `semi_implicit`: the highest next speed that still allows `v_target`.
 
-    The vehicle drives one step at that speed and then slows by b·dt per step to `v_target`; all of
-    this takes `distance`.
+    One step at that speed, and slowing by b·dt per step to `v_target`, take `distance`.
     Source: SUMO's `MSCFModel::freeSpeed`, and `stopSpeed` for v_target = 0.
     """
     if distance <= v_target * dt:
@@ -143,10 +141,9 @@ def krauss(v: float, v0: float, v_safe: float, a: float, b: float, dt: float) ->
 def speed_towards(v: float, v_target: float, distance: float, b: float, dt: float) -> float:
     """Highest speed after one step that still allows `v_target` at `distance`, braking at b.
 
-    Solves (v + v')/2·dt + (v'² − v_target²)/(2b) = distance for v'; a negative result means that
-    the vehicle has to stop within this step. A vehicle that follows this bound brakes at exactly
-    b and no earlier than it must; with v_target = 0 the bound is a hold line.
-    The same construction is Krauß's safe speed (1998, §2) with a ballistic step.
+    Solves (v + v')/2·dt + (v'² − v_target²)/(2b) = distance for v', which is negative if the
+    vehicle has to stop within this step. A vehicle at this bound brakes at exactly b and no earlier
+    than it must. Krauß's safe speed (1998, §2) with a ballistic step is the same construction.
     """
     half = 0.5 * b * dt
     disc = half * half + v_target * v_target + 2.0 * b * distance - b * dt * v
@@ -169,9 +166,8 @@ def stop_within(v: float, distance: float, b: float, dt: float) -> float:
 
 @njit_inline
 def ballistic(s: float, v: float, acc: float, dt: float) -> tuple[float, float]:
-    """Position and speed after one step of constant acceleration; a vehicle never reverses.
+    """Position and speed after one step of constant acceleration; it ends at a standstill.
 
-    A vehicle that would reverse stops where its speed reaches zero.
     Source: Treiber, Kanagaraj 2015, arXiv 1403.4881, eq. 9–10.
     """
     v_new = v + acc * dt
@@ -196,9 +192,8 @@ def insertion_speed(
 ) -> float:
     """Highest speed whose desired gap s* does not exceed `gap`; negative if there is none.
 
-    SUMO's insertion rule for the IDM: the gap must be the law's own secure gap
-    (`MSCFModel_IDM::getSecureGap`), so that a vehicle never starts by braking hard.
-    Solves s0 + vT + v·(v − v_leader) / (2√(ab)) = gap for v.
+    Solves s0 + vT + v·(v − v_leader) / (2√(ab)) = gap for v. Source: SUMO's insertion rule for the
+    IDM, by its secure gap (`MSCFModel_IDM::getSecureGap`): no vehicle starts by braking hard.
     """
     room = gap - min_gap
     if room < 0.0:
@@ -215,8 +210,7 @@ def cruise_control(v: float, v0: float, gain: float, a: float, b: float) -> floa
     Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without the integral term; SUMO's
     `MSCFModel_CC::_cc`.
     """
-    u = gain * (v0 - v)
-    return min(max(u, -b), a)
+    return min(max(gain * (v0 - v), -b), a)
 
 
 @njit_inline

@@ -1,16 +1,13 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Besides this module, `dim` and `baselines` may import `minisim.junction` (geometry, conflicts,
-movements), `minisim.vehicle` (vehicle types), `minisim.parameters`, `minisim.names` and
-`minisim.errors` (recipes and their checks), `minisim.files` (writers), `minisim.streams` (random
-numbers), and `minisim.laws` with `minisim.carfollowing` and `minisim.jit` (how vehicles move, for
-prediction). None of these imports the engine, the hosts or the results; `make lint` checks this.
+Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
+`streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the engine, the
+hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
 The host then advances alone until one of the plan's wake-ups, shows the session a `View`, and
-carries out the commands that the session returns. No session is called every step unless its plan
-has a period.
+carries out the commands that the session returns. Only a plan with a period wakes it regularly.
 """
 
 from __future__ import annotations
@@ -28,13 +25,13 @@ from minisim.names import Name
 from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
 from minisim.vehicle import MODELS, VehicleType
 
-#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default
-#: `--junctions.limit-turn-speed`, so that turn speeds are comparable with SUMO's.
+#: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default of
+#: `--junctions.limit-turn-speed`, for turn speeds like SUMO's.
 LATERAL_ACCELERATION = 5.5
 
-#: A vehicle counts as able to stop only with this distance to spare [m]. A held vehicle keeps more
-#: before its line (`minisim.engine.state.STOP_MARGIN`), so one braking for the junction entry is
-#: never committed. The margin exceeds rounding errors, so a vehicle that can stop always does.
+#: A vehicle counts as able to stop only with this distance to spare [m], more than rounding errors.
+#: A held vehicle keeps more before its line (`minisim.laws.STOP_MARGIN`), so it always counts as
+#: able to stop while it brakes for the junction entry.
 COMMIT_MARGIN = 0.1
 
 #: A vehicle no faster than this stands or waits [m/s]: SUMO's `SUMO_const_haltingSpeed`.
@@ -50,17 +47,14 @@ class Site:
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
-    seed: int = whole(
-        "of the run, for controllers that draw random numbers (`minisim.streams`)", default=0, low=0
-    )
+    seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
 
     def __post_init__(self) -> None:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
-            raise InputError(
-                f"demand must be {self.intersection.n} numbers ≥ 0 [veh/h], got {self.demand}"
-            )
+            wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
+            raise InputError(f"demand must be {wanted}, got {self.demand}")
         room = self.intersection.approach_length
-        if (needed := self.vehicle.length + MODELS[self.vehicle.model].margin) >= room:
+        if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
                 f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
                 f"{room:g} m; arm_length must be more than "
@@ -75,36 +69,25 @@ class Site:
 
     @cached_property
     def conflicts(self) -> Bools:
-        """Whether two movements from different arms must not be driven at once, shape (m, m).
-
-        Movements from one arm share their lane: one follows the other, which is no conflict here.
-        """
+        """Whether two movements from different arms must not be driven at once, shape (m, m)."""
         return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
 
 
 class Observed(NamedTuple):
     """One vehicle in a view.
 
-    Attributes:
-        id: of the vehicle; the same in every view of a run.
-        lane: index of its approach lane.
-        manoeuvre: 1 … n−1.
-        distance: from its front bumper to the junction entry [m]; negative inside.
-        speed: [m/s].
-        length: [m].
-        demand_time: when it wanted to enter the road [s].
-        rank: its place among the vehicles of its lane, from 0. Draw what a vehicle is by lane and
-            rank: its id depends on the arrivals on other lanes.
+    Draw what chance makes of a vehicle by its lane and rank: its id depends on other lanes.
     """
 
-    id: int
-    lane: int
-    manoeuvre: int
-    distance: float
-    speed: float
-    length: float
-    demand_time: float = 0.0
-    rank: int = 0
+    id: int  # the same in every view of a run
+    lane: int  # index of its approach lane
+    manoeuvre: int  # 1 … n−1
+    distance: float  # from its front bumper to the junction entry [m]; negative inside
+    speed: float  # [m/s]
+    length: float  # [m]
+    demand_time: float = 0.0  # when it wanted to enter the road [s]
+    rank: int = 0  # its place among the vehicles of its lane, from 0
+    speed_factor: float = 1.0  # its driver's factor on the speed limit
 
     @property
     def movement(self) -> Movement:
@@ -120,26 +103,22 @@ def stopping_distance(speed: float, deceleration: float) -> float:
 def can_stop(vehicle: Observed, deceleration: float) -> bool:
     """Whether comfortable braking still stops the vehicle before the junction.
 
-    Position and speed alone decide it, so every observer comes to the same answer.
+    Only position and speed count, so every observer comes to the same answer.
     """
-    needed = stopping_distance(vehicle.speed, deceleration)
-    return needed + COMMIT_MARGIN <= vehicle.distance or (
-        vehicle.speed == 0.0 and vehicle.distance >= 0.0
-    )
+    stands = vehicle.speed == 0.0 and vehicle.distance >= 0.0
+    needed = stopping_distance(vehicle.speed, deceleration) + COMMIT_MARGIN
+    return stands or needed <= vehicle.distance
 
 
 class View(NamedTuple):
     """What the session is shown at a wake-up.
 
-    Attributes:
-        time: [s].
-        vehicles: every vehicle from `Plan.sight` before the junction until its rear bumper has
-            left it (and its front is `Plan.reach` past the entry); ordered by lane, then front to
-            back (vehicles inside the junction first).
+    It has every vehicle from `Plan.sight` before the junction until its rear bumper has left it
+    and its front is `Plan.reach` past the entry.
     """
 
-    time: float
-    vehicles: tuple[Observed, ...]
+    time: float  # [s]
+    vehicles: tuple[Observed, ...]  # by lane, then front to back
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +132,8 @@ class Go:
 class Hold:
     """Take away one vehicle's right of way: it stops at its hold line.
 
-    If comfortable braking can no longer stop it at the hold line, it stops before the junction if
-    its brakes can; inside the junction, a hold has no effect.
+    If it is too late for comfortable braking, the vehicle stops before the junction if its brakes
+    can; inside the junction, a hold has no effect.
     """
 
     vehicle: int
@@ -186,9 +165,8 @@ class Advise:
 class Brake:
     """Make one vehicle brake at `deceleration` [m/s²] or harder until told otherwise; 0 lifts this.
 
-    It acts everywhere, even inside the junction, and never exceeds what the brakes can do. A
-    standing vehicle stays put. The command ends when the vehicle leaves the view for good, since no
-    session could lift it after that.
+    It acts everywhere, even inside the junction, within what the brakes can do. A standing vehicle
+    stays put. It ends when the vehicle leaves the view for good: no session could lift it then.
     """
 
     vehicle: int
@@ -236,11 +214,9 @@ class Plan:
     """What a session needs from its host."""
 
     hold_distance: float = real(
-        "the hold line's distance before the junction entry", "m", default=0.0, low=0, high=1000
+        "of the hold line from the junction entry", "m", default=0.0, low=0, high=1000
     )
-    markings: tuple[Marking, ...] = checked(
-        "on every approach lane", _markings, "markings", default=()
-    )
+    markings: tuple[Marking, ...] = checked("on every lane", _markings, "markings", default=())
     marks: tuple[float, ...] = reals(
         "wake when a front bumper passes one of these distances before the junction entry; 0 is "
         "the entry itself, negative is past it",
@@ -254,13 +230,11 @@ class Plan:
         "how far before the junction entry a view reaches, on the road", "m", default=50.0, low=0
     )
     reach: float = real(
-        "a view holds a vehicle until its front is at least this far past the junction entry, even "
-        "when its rear has left the junction before that",
+        "a view keeps a vehicle until its front is this far past the junction entry, even after "
+        "its rear has left the junction",
         "m", default=0.0, low=0, high=1000,
     )  # fmt: skip
-    lanes_open: bool = switch(
-        "lanes start open; otherwise vehicles are held until told to go", default=False
-    )
+    lanes_open: bool = switch("lanes start open; otherwise vehicles are held", default=False)
 
 
 @runtime_checkable
@@ -297,15 +271,10 @@ class Kinds(Session, Protocol):
 
 @dataclass(frozen=True)
 class Cover:
-    """The vehicles with which a controller promises: none collides, and each is served.
+    """The vehicles for which a controller promises that none collides and each is served."""
 
-    Attributes:
-        laws: names of their car-following models (`minisim.vehicle.MODELS`).
-        alike: whether their drivers must be alike, which is a `speed_deviation` of 0.
-    """
-
-    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")
-    alike: bool = False
+    laws: tuple[str, ...] = tuple(name for name in MODELS if name != "cc")  # of car following
+    alike: bool = False  # whether their drivers must be alike: a `speed_deviation` of 0
 
     def __contains__(self, vehicle: VehicleType) -> bool:
         return vehicle.model in self.laws and not (self.alike and vehicle.speed_deviation > 0.0)
@@ -315,15 +284,13 @@ class Cover:
         return laws + (" whose drivers are alike (speed_deviation 0)" if self.alike else "")
 
     def check(self, name: str, vehicle: VehicleType) -> None:
-        """Raise `InputError` for a vehicle that is not covered, for a controller that needs it."""
+        """Raise `InputError` for a vehicle that the controller `name` does not cover."""
         if vehicle not in self:
-            raise InputError(
-                f"{name} is for {self}, got model {vehicle.model!r} with a speed_deviation of "
-                f"{vehicle.speed_deviation:g}"
-            )
+            given = f"{vehicle.model!r} with a speed_deviation of {vehicle.speed_deviation:g}"
+            raise InputError(f"{name} is for {self}, got model {given}")
 
 
-#: What a controller covers that says nothing else, and what one does that may collide.
+#: What a controller covers by default, and what one that may collide covers.
 ORDINARY, NOTHING = Cover(), Cover(laws=())
 
 
@@ -337,8 +304,8 @@ def cover_of(controller: object) -> Cover:
 class Controller(Protocol):
     """A recipe for sessions: hashable, picklable, never changed by a run.
 
-    It promises that no vehicles collide and each is served wherever it starts, if the vehicles are
-    `ORDINARY`. One that promises less or more says so by an attribute `covers`, a `Cover`.
+    It promises that no `ORDINARY` vehicles collide and that each is served. A controller that
+    promises less or more has an attribute `covers`, a `Cover`.
     """
 
     @property
@@ -358,15 +325,12 @@ def as_controller(what: str, value: object) -> Controller:
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
     hint = "; make it by scenarios.controllers.controller_named" if named else ""
-    raise InputError(f"{what} is no controller: {why}{hint}")
+    raise InputError(f"{what} is not a controller: {why}{hint}")
 
 
 @dataclass(frozen=True)
 class Unregulated:
-    """All vehicles go at once: what happens without any rule.
-
-    For tests of the host and for teaching. It collides as soon as there is cross traffic.
-    """
+    """All vehicles go at once, for tests of the host and for teaching: cross traffic collides."""
 
     name = Name("unregulated")
     covers = NOTHING

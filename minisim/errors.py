@@ -1,7 +1,6 @@
 """What minisim raises, and the checks that turn bad input into one clear sentence.
 
-A message names the value, where it came from and what is allowed, so that the command line can
-print the message as it is.
+A message names the value, its origin and what is allowed, so the command line prints it unchanged.
 """
 
 from __future__ import annotations
@@ -36,12 +35,12 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched, and the caller did not ask to record it and go on.
+    """Two bodies touched, and the run was not told to record that and go on.
 
     Attributes:
-        collisions: the `minisim.engine.collision.Collision`s of the step at which the run stopped.
-        replay: a function that repeats the run until a little later and returns a `Run` with the
-            trajectories of the last seconds, 10 by default. None on a copy from another process.
+        collisions: the `minisim.engine.collision.Collision`s of the last step.
+        replay: repeats the run until a little later and returns a `Run` with the trajectories of
+            the last seconds, 10 by default. None on a copy from another process.
     """
 
     def __init__(
@@ -100,8 +99,19 @@ def number(
     if not math.isfinite(result):
         raise InputError(f"{name} must be a finite number, got {show(value)}")
     if not (low <= result <= high and above < result < below):
-        raise InputError(f"{name} must be {_range(low, high, above, below)}, got {show(value)}")
+        words = ("at least", "at most", "above", "below")
+        allowed = " and ".join(limits(low, high, above, below, words))
+        raise InputError(f"{name} must be {allowed}, got {show(value)}")
     return result
+
+
+def limits(
+    low: float, high: float, above: float, below: float, words: tuple[str, str, str, str]
+) -> list[str]:
+    """The finite limits of a range, each after its word or sign (≥, ≤, >, <)."""
+    least = f"{words[2]} {above:g}" if above >= low else f"{words[0]} {low:g}"
+    most = f"{words[3]} {below:g}" if below <= high else f"{words[1]} {high:g}"
+    return [limit for limit in (least, most) if "inf" not in limit]
 
 
 def integer(name: str, value: object, *, low: int, high: int | None = None) -> int:
@@ -119,13 +129,12 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
-    raise InputError(
-        f"unknown {name} {show(value)}; allowed: {', '.join(options)}{nearest(value, options)}"
-    )
+    known = f"{', '.join(options)}{nearest(value, options)}"
+    raise InputError(f"unknown {name} {show(value)}; allowed: {known}")
 
 
 def nearest(value: object, allowed: Iterable[str]) -> str:
-    """The question whether the nearest of `allowed` was meant, upper case or lower; else ""."""
+    """The question whether the nearest of `allowed` was meant, in any case of letters; else ""."""
     options = {option.casefold(): option for option in allowed}
     text = value.casefold() if isinstance(value, str) else ""
     close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)
@@ -135,7 +144,7 @@ def nearest(value: object, allowed: Iterable[str]) -> str:
 def instance(name: str, value: object, kind: type | tuple[type, ...]) -> None:
     """Raise `InputError` unless `value` is a `kind`.
 
-    A class is refused where an instance belongs, even if it has the methods of a protocol.
+    A class is not an instance of a protocol, even if it has the methods.
     """
     if not isinstance(value, kind) or isinstance(value, type):
         kinds = kind if isinstance(kind, tuple) else (kind,)
@@ -150,9 +159,9 @@ def kind_word(kind: type) -> str:
 
 
 def printable(name: str, value: object, *, empty: bool = False) -> str:
-    """Return `value` if it is a text of one line that can be printed and stored, or raise.
+    """Return `value` if it is a text of one line without control characters, or raise.
 
-    Control characters and lone surrogates cannot; `empty` says whether "" is allowed.
+    `empty` says whether "" is allowed. Lone surrogates are refused, too.
     """
     if not isinstance(value, str):
         raise InputError(f"{name} must be a text, got {show(value)}")
@@ -178,9 +187,8 @@ def items(name: str, value: object, of: str, *, ordered: bool = True) -> list[An
 
 def numbers(name: str, value: object) -> tuple[float, ...]:
     """Return `value`, any sequence of finite numbers, as a tuple of floats, or raise."""
-    return tuple(
-        number(f"{name}[{i}]", item) for i, item in enumerate(items(name, value, "numbers"))
-    )
+    given = items(name, value, "numbers")
+    return tuple(number(f"{name}[{i}]", item) for i, item in enumerate(given))
 
 
 def show(value: object) -> str:
@@ -193,7 +201,7 @@ def show(value: object) -> str:
 
 
 def told(error: BaseException, folder: str | os.PathLike[str] = "/") -> str:
-    """An error of a caller's own code, preceded by the last line in the folder that led to it."""
+    """An error of a caller's own code, after the last line in the folder that led to it."""
     if isinstance(error, SyntaxError):
         return f"{Path(error.filename or '').name}, line {error.lineno}: SyntaxError: {error.msg}"
     lines = [
@@ -202,9 +210,3 @@ def told(error: BaseException, folder: str | os.PathLike[str] = "/") -> str:
         if Path(frame.filename).is_relative_to(folder)
     ]
     return f"{lines[-1] if lines else ''}{type(error).__name__}: {error}"
-
-
-def _range(low: float, high: float, above: float, below: float) -> str:
-    least = f"above {above:g}" if math.isfinite(above) else f"at least {low:g}"
-    most = f"below {below:g}" if math.isfinite(below) else f"at most {high:g}"
-    return " and ".join(bound for bound in (least, most) if "inf" not in bound) or "a finite number"

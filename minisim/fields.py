@@ -1,4 +1,4 @@
-"""The fields of recipes: what a parameter is, and a function for each kind of it."""
+"""What a parameter of a recipe is, and a function to declare each kind of parameter."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from minisim.errors import (
     instance,
     integer,
     kind_word,
+    limits,
     number,
     numbers,
     printable,
@@ -24,8 +25,8 @@ from minisim.errors import (
 )
 from minisim.spelling import read
 
-#: Returns the value of a field, perhaps in another form, or raises `InputError`. Its arguments are
-#: what messages call the field, and the field's value.
+#: Returns a field's value, perhaps in another form, or raises `InputError`. It takes what messages
+#: call the field, and the value.
 Check = Callable[[str, Any], Any]
 
 KEY = "parameter"
@@ -37,26 +38,16 @@ _SWITCHES = {"true": True, "on": True, "false": False, "off": False}
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is declared about a field.
+    """What is declared about a field."""
 
-    Attributes:
-        meaning: what it means, in a few words.
-        unit: such as "m"; empty if it has none.
-        allowed: the values that it takes, in words.
-        check: see `Check`.
-        label: what messages call it; if empty, the name of the field.
-        optional: whether None is allowed too.
-        words: the words allowed, for a field that takes one of several.
-        kinds: word -> what makes the value of that name, for a field that holds another recipe.
-    """
-
-    meaning: str
-    unit: str
-    allowed: str
+    meaning: str  # in a few words
+    unit: str  # such as "m"; empty if it has none
+    allowed: str  # the values that it takes, in words
     check: Check
-    label: str = ""
-    optional: bool = False
-    words: tuple[str, ...] = ()
+    label: str = ""  # what messages call it; if empty, the name of the field
+    optional: bool = False  # whether None is allowed, too
+    words: tuple[str, ...] = ()  # those allowed, for a field that takes one of several
+    #: Word -> what makes the recipe of that name, for a field that holds another recipe.
     kinds: Mapping[str, Callable[..., Any]] = dataclasses.field(default_factory=dict)
 
     def title(self, name: str) -> str:
@@ -100,7 +91,7 @@ def whole(
 def word(meaning: str, among: Sequence[str], **common: Unpack[Common]) -> Any:
     """One of several words."""
     check = partial(choice, allowed=among)
-    return _field(meaning, check, " | ".join(among), words=tuple(among), **common)
+    return checked(meaning, check, " | ".join(among), words=tuple(among), **common)
 
 
 def switch(meaning: str, **common: Unpack[Common]) -> Any:
@@ -111,7 +102,7 @@ def switch(meaning: str, **common: Unpack[Common]) -> Any:
         instance(title, said, bool)
         return said
 
-    return _field(meaning, check, " | ".join(SWITCH), words=SWITCH, **common)
+    return checked(meaning, check, " | ".join(SWITCH), words=SWITCH, **common)
 
 
 def text(meaning: str, *, empty: bool = False, **common: Unpack[Common]) -> Any:
@@ -152,13 +143,13 @@ def part(
 ) -> Any:
     """Another object, of the class or protocol `kind`.
 
-    A text, or a table as in TOML, names it by a word in `kinds`, which maps each word to what makes
+    A text, or a table as in TOML, gives it by a word in `kinds`, which maps each word to what makes
     it: `on`, `noisy(delay=0.1)`. `off` means none.
     """
     classes = kind if isinstance(kind, tuple) else (kind,)
     if not kinds:
         check = _unchanged(partial(instance, kind=kind))
-        return _field(meaning, check, " | ".join(one.__name__ for one in classes), **common)
+        return checked(meaning, check, " | ".join(one.__name__ for one in classes), **common)
     nothing = ("off", "none") if common.get("optional") else ()
     wanted = f"{', '.join((*kinds, *nothing))} or {' or '.join(map(kind_word, classes))}"
 
@@ -169,7 +160,9 @@ def part(
             raise InputError(f"{title} must be {wanted}, got {show(made)}")
         return made
 
-    return _field(meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common)
+    return checked(
+        meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common
+    )
 
 
 def _form(kind: tuple[str, Callable[..., Any]]) -> str:
@@ -181,13 +174,6 @@ def _form(kind: tuple[str, Callable[..., Any]]) -> str:
 
 
 def checked(
-    meaning: str, check: Check, allowed: str, unit: str = "", **common: Unpack[Common]
-) -> Any:
-    """A field with a check of its own; `allowed` says in words which values pass."""
-    return _field(meaning, check, allowed, unit, **common)
-
-
-def _field(
     meaning: str,
     check: Check,
     allowed: str,
@@ -200,20 +186,19 @@ def _field(
     words: tuple[str, ...] = (),
     kinds: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
 ) -> Any:
+    """A field with a check of its own; `allowed` says in words which values pass."""
+
     def unless_none(title: str, value: Any) -> Any:
         none = value is None or (isinstance(value, str) and value.lower() == "none")
         return None if none else check(title, value)
 
-    if optional:
-        allowed = f"{allowed} | none"
-    it = Parameter(
-        meaning, unit, allowed, unless_none if optional else check, label, optional, words, kinds
-    )
+    said, tested = (f"{allowed} | none", unless_none) if optional else (allowed, check)
+    it = Parameter(meaning, unit, said, tested, label, optional, words, kinds)
     return dataclasses.field(default=default, default_factory=default_factory, metadata={KEY: it})
 
 
 def _unchanged(test: Callable[[str, Any], object]) -> Check:
-    """A check that returns the value as it is, such as an int where a float is allowed."""
+    """A check that returns the value unchanged, such as an int for a float."""
 
     def check(title: str, value: Any) -> Any:
         test(title, value)
@@ -223,12 +208,6 @@ def _unchanged(test: Callable[[str, Any], object]) -> Check:
 
 
 def _range(low: float, high: float, above: float = -math.inf, below: float = math.inf) -> str:
-    least = f"≥ {low:g}" if math.isfinite(low) else ""
-    most = f"≤ {high:g}" if math.isfinite(high) else ""
-    if math.isfinite(above) and above >= low:
-        least = f"> {above:g}"
-    if math.isfinite(below) and below <= high:
-        most = f"< {below:g}"
-    if least.startswith("≥") and most.startswith("≤"):
+    if above < low > -math.inf and below > high < math.inf:
         return f"{low:g} … {high:g}"
-    return ", ".join(filter(None, (least, most))) or "number"
+    return ", ".join(limits(low, high, above, below, ("≥", "≤", ">", "<"))) or "number"

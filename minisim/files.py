@@ -1,7 +1,6 @@
 """Files on disk: whether they can be written, and writers that never leave half a file.
 
-A writer writes beside its target and then renames. Whatever happens in between, a reader
-sees the old file or the whole new one.
+A writer writes beside its target and then renames, so a reader sees the old file or the new one.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def read_file(what: str, path: AnyPath, most: int = LARGEST) -> bytes:
             than `LARGEST`). Messages call the content `what`.
     """
     instance(f"{what} file", path, (str, os.PathLike))
-    try:
+    with _refused(f"read {what} from {os.fspath(path)}"):
         known = os.stat(path)
         pipe = stat.S_ISFIFO(known.st_mode)
         if not (pipe or stat.S_ISREG(known.st_mode) or stat.S_ISDIR(known.st_mode)):
@@ -52,8 +51,6 @@ def read_file(what: str, path: AnyPath, most: int = LARGEST) -> bytes:
             data = file.read(most + 1 if pipe else -1) if known.st_size <= most else None
         if data is None or len(data) > most:
             raise ValueError(f"it has more than {most >> 20} MiB")
-    except (OSError, ValueError) as error:
-        raise FileError(f"cannot read {what} from {os.fspath(path)}: {_reason(error)}") from error
     return data
 
 
@@ -61,13 +58,18 @@ def read_file(what: str, path: AnyPath, most: int = LARGEST) -> bytes:
 def replacing(path: AnyPath) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, and put it in place at the end.
 
-    If the block raises, `path` stays as it was and the temporary file is removed. A symbolic
-    link stays a link: the file that it points to is replaced.
+    If the block raises, `path` stays as it was and the temporary file is removed. A symbolic link
+    stays: the file that it points to is replaced.
 
     Raises:
         FileError: the folder is not writable, or `path` is not an ordinary file.
     """
-    target = _target(path)
+    instance("output file", path, (str, os.PathLike))
+    with _refused(f"write {os.fspath(path)!r}"):
+        target = Path(path).resolve()
+        ordinary = target.is_file() or not target.exists()
+    if not ordinary:
+        raise FileError(f"cannot write {path}: it is not an ordinary file")
     temporary = target.with_name(f".{target.stem}-{uuid.uuid4().hex}{target.suffix}")
     try:
         try:
@@ -79,6 +81,15 @@ def replacing(path: AnyPath) -> Iterator[Path]:
         raise FileError(f"cannot write {path}: {_reason(error)}") from error
 
 
+@contextmanager
+def _refused(what: str) -> Iterator[None]:
+    """If the block fails, raise a `FileError` that says what cannot be done."""
+    try:
+        yield
+    except (OSError, ValueError, RuntimeError) as error:  # a loop of links, a NUL in the name
+        raise FileError(f"cannot {what}: {_reason(error)}") from error
+
+
 def write_text(path: AnyPath, text: str) -> None:
     """Write text in UTF-8, whole or not at all; raises `FileError`."""
     with replacing(path) as part:
@@ -88,10 +99,8 @@ def write_text(path: AnyPath, text: str) -> None:
 def write_table(frame: pd.DataFrame, path: AnyPath) -> None:
     """Write a table, whole or not at all, as CSV or Parquet depending on the suffix of `path`.
 
-    Raises:
-        InputError: `path` has another suffix.
-        MissingExtraError: Parquet without pyarrow.
-        FileError: the file cannot be written; nothing is left behind.
+    Raises `InputError` for another suffix, `MissingExtraError` for Parquet without pyarrow, and
+    `FileError` for a file that cannot be written.
     """
     suffix = _table_suffix(path)
     with replacing(path) as part:
@@ -116,27 +125,21 @@ def markdown_table(
 def check_file(path: AnyPath, *suffixes: str) -> Path:
     """Return `path` if a file can be written there; leave no trace.
 
-    Args:
-        path: path of the file.
-        suffixes: the suffixes that it may have; if none is given, any.
-
     Raises:
-        InputError: `path` has another suffix.
+        InputError: `path` has none of `suffixes`, if there are any.
         FileError: its folder is missing or not writable, or it is not an ordinary file.
     """
     if suffixes:
         _check_suffix(path, suffixes)
     target = Path(path)
-    try:
+    with _refused(f"write {target}"):
         if target.is_dir():
-            raise FileError(f"cannot write {target}: it is a folder")
+            raise ValueError("it is a folder")
         if target.exists() and not target.is_file():
-            raise FileError(f"cannot write {target}: it is not an ordinary file")
+            raise ValueError("it is not an ordinary file")
         if not target.parent.is_dir():
-            raise FileError(f"cannot write {target}: there is no folder {target.parent}")
+            raise ValueError(f"there is no folder {target.parent}")
         _probe(target.parent)
-    except (OSError, ValueError) as error:
-        raise FileError(f"cannot write {target}: {_reason(error)}") from error
     return target
 
 
@@ -147,10 +150,7 @@ def check_table(path: AnyPath) -> Path:
 
 
 def check_apart(files: Mapping[str, Path | None]) -> None:
-    """Raise `InputError` if two options (name -> file) name the same file.
-
-    One would overwrite the other. Links are followed.
-    """
+    """Raise `InputError` if two options (name -> file) name the same file, perhaps by links."""
     seen: dict[str, str] = {}
     for option, path in files.items():
         if path is None:
@@ -163,13 +163,11 @@ def check_apart(files: Mapping[str, Path | None]) -> None:
 def make_folder(path: AnyPath) -> Path:
     """Make a writable folder, along with its parents; raises `FileError`."""
     folder = Path(path)
-    try:
+    with _refused(f"write to folder {folder}"):
         if folder.exists() and not folder.is_dir():
-            raise FileError(f"cannot write to folder {folder}: it is a file")
+            raise ValueError("it is a file")
         folder.mkdir(parents=True, exist_ok=True)
         _probe(folder)
-    except (OSError, ValueError) as error:
-        raise FileError(f"cannot write to folder {folder}: {_reason(error)}") from error
     return folder
 
 
@@ -177,9 +175,8 @@ def _table_suffix(path: AnyPath) -> str:
     instance("output file", path, (str, os.PathLike))
     suffix = _check_suffix(path, TABLE_SUFFIXES)
     if suffix == ".parquet" and importlib.util.find_spec("pyarrow") is None:
-        raise MissingExtraError(
-            "Parquet needs pyarrow: pip install 'minisim[parquet]' (or write .csv)"
-        )
+        wanted = "pip install 'minisim[parquet]' (or write .csv)"
+        raise MissingExtraError(f"Parquet needs pyarrow: {wanted}")
     return suffix
 
 
@@ -187,21 +184,8 @@ def _check_suffix(path: AnyPath, allowed: Sequence[str]) -> str:
     return choice(f"suffix of {os.fspath(path)}:", Path(path).suffix.lower(), allowed)
 
 
-def _target(path: AnyPath) -> Path:
-    """The file that `path` names, through symbolic links; raises `FileError`."""
-    instance("output file", path, (str, os.PathLike))
-    try:
-        target = Path(path).resolve()
-        ordinary = target.is_file() or not target.exists()
-    except (OSError, ValueError, RuntimeError) as error:  # a loop of links, a NUL in the name
-        raise FileError(f"cannot write {os.fspath(path)!r}: {error}") from error
-    if not ordinary:
-        raise FileError(f"cannot write {path}: it is not an ordinary file")
-    return target
-
-
 def _probe(folder: Path) -> None:
-    """Write and remove a temporary file; permissions alone do not show whether that works."""
+    """Write and remove a temporary file: permissions do not show whether that works."""
     with tempfile.TemporaryFile(dir=folder):
         pass
 

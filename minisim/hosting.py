@@ -47,7 +47,7 @@ from minisim.ticks import NEVER, first_tick, time_of
 RECORDS = ("junction", "all")
 ON_COLLISION = ("stop", "record")
 
-#: What may happen at a collision where SUMO or its cruise control drives.
+#: What may happen at a collision if SUMO or its cruise control drives.
 REACTIONS = (*ON_COLLISION, "teleport")
 
 #: What a scenario must have.
@@ -55,7 +55,7 @@ NEEDED = (
     "name", "profile_name", "density", "horizon", "warmup", "depart_speed", "site", "arrivals",
 )  # fmt: skip
 
-#: Commands grouped by what they address. Building a union of types at each check would be slow.
+#: Commands by what they address. Building a union of types at each check would be slow.
 TO_VEHICLES, TO_LANES = (Go, Hold, Advise, Brake), (Open, Close)
 
 #: How long a replay goes on after the collision [s].
@@ -63,7 +63,7 @@ AFTERMATH = 2.0
 
 
 class Alarm:
-    """When the clock wakes a session: periodically, as its plan says, and once whenever it asks."""
+    """When the clock wakes a session: by the period of its plan, and once whenever it asks."""
 
     def __init__(self, period: float | None, dt: float) -> None:
         self._dt = dt
@@ -90,7 +90,7 @@ class Alarm:
 
 @dataclass(frozen=True, eq=False)
 class Hosted:
-    """A run in any host, with its arguments checked and its session started."""
+    """A run in any host: its checked arguments and its started session."""
 
     scenario: ScenarioLike
     controller: Controller
@@ -102,22 +102,20 @@ class Hosted:
     arrivals: Arrivals
     session: Session
     plan: Plan
-    #: What the session had counted when the warm-up ended.
-    before: dict[str, float] = field(default_factory=dict)
+    before: dict[str, float] = field(default_factory=dict)  # counts at the end of the warm-up
 
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
 
         Raises:
-            ControllerError: the session raised an error of its own, which it names with file and
-                line, or answered with something that cannot be carried out.
+            ControllerError: the session raised an error, named with its file and line, or its
+                answer cannot be carried out.
         """
         try:
             answer = self.session.decide(view)
             if not isinstance(answer, Iterable):
-                raise InputError(
-                    f"decide() must return commands, such as [Go(3)] or [], got {show(answer)}"
-                )
+                wanted = "commands, such as [Go(3)] or []"
+                raise InputError(f"decide() must return {wanted}, got {show(answer)}")
             commands = list(answer)
             if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
                 self.before.update(self.session.counts)
@@ -141,11 +139,9 @@ class Hosted:
         try:
             counts = dict(session.counts) if isinstance(session, Counting) else {}
             counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
-            kinds = (
-                tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
-                if isinstance(session, Kinds)
-                else ()
-            )
+            kinds: tuple[str, ...] = ()
+            if isinstance(session, Kinds):
+                kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
         except Exception as error:
             raise _blamed(self.controller, error, session) from error
         return Run(
@@ -174,10 +170,8 @@ def begin(
 ) -> Hosted:
     """Check the arguments, draw the arrivals and start the controller's session.
 
-    Raises:
-        InputError: an argument is not allowed (`reactions` are those to a collision), or the
-            controller cannot serve the scenario.
-        ControllerError: as `start`.
+    Raises what `start` raises, and `InputError` for an argument that is not allowed; `reactions`
+    are the possible values of `on_collision`.
     """
     if record is not None:
         choice("record", record, RECORDS)
@@ -200,7 +194,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
 
     Raises:
         InputError: the controller cannot serve the site.
-        ControllerError: it raised another error, returned no session, or has a plan with a period
+        ControllerError: it raised another error, returned no session, or its plan has a period
             below the step or a distance beyond the approach lanes.
     """
     try:
@@ -222,7 +216,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
         marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
         marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}
-        # The default sight is no wish, so a road may be shorter.
+        # The road may be shorter than the default sight.
         marks |= {"sight": plan.sight if plan.sight != Plan.sight else 0.0}
         for name, distance in marks.items():
             number(f"{name} [m] of the plan, on these roads,", distance, high=road)
@@ -234,7 +228,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
 def _blamed(
     controller: Controller, error: Exception, code: object, when: str = ""
 ) -> ControllerError:
-    """What to raise for an error of a controller's own code: where it arose, and what it was."""
+    """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):
         raise error
     module = sys.modules.get(type(code).__module__)
@@ -247,10 +241,8 @@ def checked_window(window: object) -> tuple[float, float]:
     """Return a `record_window`, or raise `InputError`."""
     if not isinstance(window, tuple) or len(window) != 2:
         raise InputError(f"record_window must be (from, to) in seconds, got {show(window)}")
-    start = number("start of record_window [s]", window[0], low=0)
-    if window[1] == math.inf:
-        return start, math.inf
-    return start, number("end of record_window [s]", window[1], low=start)
+    start, end = number("start of record_window [s]", window[0], low=0), window[1]
+    return start, end if end == math.inf else number("end of record_window [s]", end, low=start)
 
 
 def _check_command(command: Command, tick: int, site: Site, vehicles: int) -> None:

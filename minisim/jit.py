@@ -1,11 +1,10 @@
-"""`njit`: numba's compiler, or plain Python where numba is missing or switched off.
+"""`njit`: numba's compiler, or plain Python if numba is missing or switched off.
 
-Switch it off with the environment variable `MINISIM_JIT=0`. Every kernel then runs as plain Python,
-which a debugger can follow.
+The environment variable `MINISIM_JIT=0` switches it off, so that a debugger can follow.
 
-Compiled code is cached on disk. It includes all functions that it calls and all constants that it
-reads, from any module, but numba only checks the file of the function itself. Our cache also checks
-all sources in the function's folder and in this one, and recompiles when any of them changes.
+Compiled code is cached on disk. It contains the functions that it calls and the constants that it
+reads, from any module, but numba checks only the file of the function itself. Our cache recompiles
+when any source in the function's folder or in this one changes.
 """
 
 from __future__ import annotations
@@ -43,8 +42,7 @@ def njit(function: _F) -> _F:
 def njit_inline(function: _F) -> _F:
     """The same for a helper in the inner loop, which is pasted into its compiled callers.
 
-    LLVM does not inline it by itself. Every call would then pass `Law` field by field and count
-    references to each array, which takes longer than the arithmetic.
+    LLVM does not do so, and a call that passes `Law` field by field costs more than the arithmetic.
     """
     return _compile(function, inline="always")
 
@@ -71,8 +69,8 @@ def _cache_class() -> Any:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            # numba reads an index's version first, and reads no further if it differs. The rest may
-            # hold classes that no longer exist.
+            # numba reads no further if the version of an index differs. The rest may hold classes
+            # that no longer exist.
             self._cache_file._version = self._cache_file._source_stamp = sources
 
     return SourcesCache

@@ -1,8 +1,8 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
-Everything that depends on `Law.model` is in this module. The equations are in
-`minisim.carfollowing`, and the table of models is in `minisim.vehicle`. The hosts move vehicles by
-these functions, and `baselines.prediction` predicts by them.
+Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the table of
+models in `minisim.vehicle`. The hosts move vehicles by these functions, and `baselines.prediction`
+predicts by them.
 """
 
 from __future__ import annotations
@@ -27,17 +27,24 @@ from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
 from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
-from minisim.vehicle import MODELS
+from minisim.vehicle import MODELS, POSITION_EPS
 
-#: A held vehicle aims to stop this far before its hold line [m]. It may stop up to 0.3 m before the
-#: line. The margin exceeds `minisim.control.COMMIT_MARGIN`, so it never looks unable to stop.
+#: A held vehicle aims to stop this far before its hold line [m]; at most it stops 0.3 m before it.
+#: The margin exceeds `minisim.control.COMMIT_MARGIN`, so the vehicle never looks unable to stop.
 STOP_MARGIN = 0.25
 
 #: How far a recording of the junction alone reaches before its entry and past its exit [m].
 RECORD_BEFORE, RECORD_PAST = 60.0, 30.0
 
+#: SUMO's vehicle has left a lane once it is past its end. One that slows down for a turn often gets
+#: to the very end, and a light may change then [m].
+PAST_THE_END = 1e-9
+
 #: Values of `Law.model`.
 IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
+
+#: How far before a red light SUMO's vehicles stop (`jmStoplineGap`'s default) [m].
+STOP_LINE_GAP = 1.0
 
 
 class Law(NamedTuple):
@@ -58,7 +65,8 @@ class Law(NamedTuple):
     hold: float  # s of the hold line
     leave: float  # s up to which a vehicle at least stays in view
     room: float  # see `minisim.junction.partings.turning_room`
-    margin: float  # see `minisim.vehicle.Model`
+    margin: float  # see `minisim.vehicle.VehicleType`
+    sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # the most at insertion
     wake_on_clear: bool
@@ -71,12 +79,11 @@ class Law(NamedTuple):
 def build_law(
     site: Site,
     plan: Plan,
-    *,
-    depart_speed: float | None,
-    record: str | None,
-    record_window: tuple[float, float],
+    depart_speed: float | None = None,
+    record: str | None = None,
+    record_window: tuple[float, float] = (0.0, math.inf),
 ) -> Law:
-    """Collect the scalars of a run."""
+    """The scalars of a run."""
     vehicle = site.vehicle
     entry = site.intersection.approach_length
     near = record == "junction"
@@ -92,11 +99,12 @@ def build_law(
         semi_implicit=MODELS[vehicle.model].stepwise,
         length=vehicle.length,
         width=vehicle.width,
-        entry=entry,
+        entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
         room=turning_room(site.intersection, site.vehicle),
-        margin=MODELS[vehicle.model].margin,
+        margin=vehicle.margin,
+        sumo=vehicle.sumo is not None,
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
@@ -115,11 +123,10 @@ def build_law(
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """How much weight this run's law gives a vehicle ahead: from 0, none at all, to infinity.
+    """The weight that this run's law gives a vehicle ahead, from 0 to infinity; the most decides.
 
-    Under the IDM it is the ratio of the desired gap to the actual one; under Krauß's law it is the
-    inverse of the safe speed. If there are several vehicles ahead, the one with the most weight
-    decides.
+    It is the ratio of the desired gap to the actual one under the IDM, and the inverse of the safe
+    speed under Krauß's law.
     """
     if law.model == KRAUSS:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
@@ -129,10 +136,10 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
-    """Within how much a vehicle must be able to stop behind a leader, times 2·b_max [m²/s²].
+    """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader comes to rest no sooner than its brakes can stop it, and what corners need in a turn
-    stays free.
+    The leader stops no sooner than its brakes can stop it, and what corners need in a turn stays
+    free.
     """
     room = gap - law.room
     if law.semi_implicit:
@@ -142,7 +149,7 @@ def room_behind(gap: float, v_leader: float, law: Law) -> float:
 
 @njit_inline
 def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
-    """Whether a stop after a step to `v_new` might take more than this room; quick and cautious."""
+    """Whether a stop after a step to `v_new` may take more than this room: quick and cautious."""
     top = v_new if v_new > v else v
     return top * (top + 2.0 * law.b_max * law.dt) > room
 
@@ -151,10 +158,10 @@ def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
 def keep_room(v: float, room: float, law: Law) -> float:
     """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
 
-    With it no vehicle runs into its leader, under any law and at any step: who could stop behind it
-    before the step still can after it, at worst by braking as hard as the leader. No law promises
-    that by itself: the IDM brakes late where the step is long or `acceleration` large, and Krauß's
-    law takes it that nobody brakes harder than b. In ordinary traffic the bound is idle.
+    With it, no vehicle runs into its leader under any law at any step: a vehicle that can stop
+    behind its leader before the step still can after it, at worst by braking as hard as the leader.
+    No law promises that by itself: the IDM brakes late at long steps or a large `acceleration`, and
+    Krauß's law assumes that no vehicle brakes harder than b. Ordinary traffic is not affected.
     Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
     for both vehicles and a reaction time of one step.
     """
@@ -168,8 +175,7 @@ def keep_room(v: float, room: float, law: Law) -> float:
 def follow(v: float, v0: float, z: float, law: Law) -> float:
     """The acceleration that the car-following law gives.
 
-    At a desired speed of 0, this is what the IDM tends to as the desired speed falls to 0:
-    comfortable braking plus the leader's share.
+    At a desired speed of 0 it is the limit of the IDM: comfortable braking and the leader's share.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
@@ -196,7 +202,7 @@ def within(v: float, acc: float, limit: float, law: Law) -> float:
 def insertable(gap: float, v_leader: float, law: Law) -> float:
     """Highest speed at which this run's law allows insertion; negative when there is none.
 
-    A law without a rule of its own allows any speed once the gap is at least the one at standstill.
+    A law without a rule allows any speed if the gap is at least the one at standstill.
     Source: `insertionFollowSpeed` of each of SUMO's models.
     """
     if law.model == IDM or law.model == IIDM:
@@ -226,14 +232,26 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
     return max((v_new - v) / law.dt, -law.b)
 
 
+@njit
+def krauss_stop(v: float, room: float, law: Law) -> float:
+    """The acceleration with which a vehicle may still stop in `room` [m], as Krauß's law has it.
+
+    Source: SUMO's `MSCFModel_Krauss::stopSpeed`.
+    """
+    v_new = stepwise_towards(0.0, room - STILL, law.b, law.dt) if room >= STILL else 0.0
+    return (v_new - v) / law.dt
+
+
 @njit_inline
 def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
-    The hold line is like the end of the road: the vehicle brakes comfortably, and no earlier than
-    it must. If that no longer suffices, it brakes as hard as it must to stop before the junction.
+    The vehicle brakes comfortably for its hold line, no earlier than it must. If that does not
+    suffice, it brakes as hard as it must to stop before the junction.
     """
     to_line = law.hold - s
+    if law.sumo and law.model == KRAUSS:
+        return stop_at_line(v, to_line, law)
     if law.semi_implicit:
         return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
     distance = to_line - STOP_MARGIN
@@ -246,6 +264,16 @@ def hold(v: float, s: float, law: Law) -> float:
         return -law.b
     to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
     return -max(law.b, v * v / (2.0 * to_junction))
+
+
+@njit
+def stop_at_line(v: float, to_line: float, law: Law) -> float:
+    """`hold` as SUMO has it: a vehicle stops 1 m before a line, or nearer if it must.
+
+    Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
+    """
+    braking = braking_distance(v, law.b, law.dt)
+    return krauss_stop(v, to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS), law)
 
 
 @njit

@@ -1,4 +1,4 @@
-"""Names of recipes: what rows, figures and messages call them, as command lines have it."""
+"""Names of recipes: what rows, figures and messages call them, spelled as on command lines."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from collections.abc import Callable, Iterator, Mapping
 from numbers import Integral, Real
 from typing import Any
 
-from minisim.parameters import SWITCH, default_of, parameters
-
-_NO_KINDS: Mapping[str, Callable[..., Any]] = {}
+from minisim.fields import SWITCH
+from minisim.parameters import default_of, parameters
 
 
 def spelled(name: str, recipe: object) -> str:
     """A recipe's name on command lines and in files: `dim:gate=harmonious,order=lanes`.
 
-    Only parameters that differ from their defaults are spelled. A value that has no text form,
-    such as a matrix, becomes its class and a digest, so different recipes get different names.
+    It has the parameters that differ from their defaults. A value without a text form, such as a
+    matrix, becomes its class and a digest, so different recipes get different names.
     """
     arguments = _arguments(recipe)
     return f"{name}:{arguments}" if arguments else name
@@ -36,9 +35,9 @@ class Name:
 
 
 def name_of(controller: Any) -> str:
-    """A controller's name; with its parameters, where it is one constant for the whole class.
+    """A controller's name, with its parameters if the whole class has one constant name.
 
-    So two recipes of a dataclass have different names, even if their author gave them only one.
+    So recipes that differ have different names, even if their author gave them only one.
     """
     name: str = controller.name
     same = inspect.getattr_static(type(controller), "name", None) == name
@@ -54,11 +53,11 @@ def _arguments(recipe: Any) -> str:
 
 
 def _fields(recipe: Any) -> Iterator[tuple[str, Mapping[str, Callable[..., Any]], Any]]:
-    """Name, kinds (as in `part`) and default of what the constructor of a recipe takes."""
+    """Name, kinds (as in `part`) and default of each parameter of a recipe."""
     known = {name: it.kinds for name, it, _ in parameters(recipe.__class__)}
     for field in dataclasses.fields(recipe) if dataclasses.is_dataclass(recipe) else ():
         if field.init and (field.name in known or not known):
-            yield field.name, known.get(field.name, _NO_KINDS), default_of(field)
+            yield field.name, known.get(field.name, {}), default_of(field)
 
 
 def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:

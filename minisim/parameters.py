@@ -25,40 +25,16 @@ from functools import cache
 from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
 
 from minisim.errors import InputError, show
-from minisim.fields import (
-    KEY,
-    SWITCH,
-    Check,
-    Parameter,
-    checked,
-    part,
-    real,
-    reals,
-    switch,
-    text,
-    whole,
-    word,
-)
+from minisim.fields import KEY, Parameter
+from minisim.fields import checked as checked
+from minisim.fields import part as part
+from minisim.fields import real as real
+from minisim.fields import reals as reals
+from minisim.fields import switch as switch
+from minisim.fields import text as text
+from minisim.fields import whole as whole
+from minisim.fields import word as word
 from minisim.spelling import bound
-
-__all__ = [
-    "SWITCH",
-    "Check",
-    "Declared",
-    "Parameter",
-    "checked",
-    "declared",
-    "default_of",
-    "parameters",
-    "part",
-    "real",
-    "reals",
-    "refuse_idle",
-    "switch",
-    "text",
-    "whole",
-    "word",
-]
 
 _T = TypeVar("_T")
 
@@ -86,18 +62,15 @@ def declared(*, kw_only: bool) -> Callable[[type[_T]], type[_T]]: ...
 def declared(
     cls: type[_T] | None = None, /, *, kw_only: bool = False
 ) -> type[_T] | Callable[[type[_T]], type[_T]]:
-    """Make a frozen dataclass that checks its declared fields on construction.
-
-    Its constructor raises `InputError` for an unknown or missing argument, too.
-    """
+    """Make a frozen dataclass whose constructor raises `InputError` for any wrong argument."""
 
     def make(kind: type[_T]) -> type[_T]:
         between = kind.__dict__.get("__post_init__")
 
         def check_all(self: Any) -> None:
-            for name, title, check in _checks(self.__class__):
+            for name, it, _ in parameters(self.__class__):
                 value = getattr(self, name)
-                fit = check(title, value)
+                fit = it.check(it.title(name), value)
                 if fit is not value:
                     object.__setattr__(self, name, fit)
             if between is not None:
@@ -134,7 +107,7 @@ def refuse_idle(recipe: Any, need: str, *names: str) -> None:
 
 
 def _check_arguments(made: type) -> None:
-    """Let the constructor of a dataclass raise `InputError` for arguments that it does not take."""
+    """Let the constructor of a dataclass refuse arguments by `InputError`, not `TypeError`."""
     make = made.__init__  # type: ignore[misc]  # a dataclass's own
     signature = inspect.signature(made)
 
@@ -146,18 +119,12 @@ def _check_arguments(made: type) -> None:
     made.__init__ = init  # type: ignore[misc]
 
 
-@cache
-def _checks(kind: Any) -> tuple[tuple[str, str, Check], ...]:
-    return tuple((name, it.title(name), it.check) for name, it, _ in parameters(kind))
-
-
 def default_of(field: Field[Any]) -> Any:
     """The default of a dataclass's field, `MISSING` if it has none."""
     return field.default_factory() if field.default_factory is not MISSING else field.default
 
 
 def _documented(about: str, kind: type) -> str:
-    """The docstring of a class with its parameters."""
     lines = [
         f"    {name}: {it.meaning}{f' [{it.unit}]' if it.unit else ''} ({it.allowed})"
         + ("." if default is MISSING else f"; {_shown(default)} by default.")
@@ -168,7 +135,7 @@ def _documented(about: str, kind: type) -> str:
 
 
 def _shown(default: Any) -> str:
-    """A default in a few words: recipes by their class, with … where they are not its default."""
+    """A default in a few words: a recipe's class, with … if it has parameters of its own."""
     if not dataclasses.is_dataclass(default):
         return show(default)
     kind: Any = type(default)

@@ -20,9 +20,7 @@ FACTORS = "speed_factor"
 
 
 def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0) -> Arrivals:
-    """Read an arrival table from a CSV file with the columns `COLUMNS`, its lanes named by letter.
-
-    A column `speed_factor` may be there too.
+    """Read an arrival table from a CSV file: `COLUMNS`, lanes by letter, perhaps `FACTORS`.
 
     Args:
         path: the file.
@@ -31,7 +29,7 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
             "07:00". Vehicles that come earlier are left out.
 
     Raises:
-        InputError: a start that is no time, or after which nobody comes.
+        InputError: a start that is not a time, or is later than every vehicle.
         FileError: unreadable, a column that is missing or unknown, a broken line (named by its
             number), or a lane or manoeuvre that does not exist with n arms.
     """
@@ -45,10 +43,8 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
     factors = np.array(table.get(FACTORS, ()), float) if FACTORS in columns else None
     arrivals = Arrivals(time, lane, manoeuvre, factors)
     if begin and len(time) and time.max() < begin:
-        raise InputError(
-            f"{path}: nobody comes from {show(start)} on; the last vehicle comes at "
-            f"{clock(time.max())}"
-        )
+        last = f"the last vehicle comes at {clock(time.max())}"
+        raise InputError(f"{path}: no vehicle comes from {show(start)} on; {last}")
     return arrivals.between(begin, math.inf) if begin else arrivals
 
 
@@ -73,18 +69,11 @@ def seconds_of(start: object) -> float:
     if isinstance(start, str):
         parts = re.fullmatch(r"([0-9]{1,2}):([0-5][0-9])(?::([0-5][0-9]))?", start.strip())
         try:
-            value = (
-                float(start)
-                if parts is None
-                else sum(
-                    int(part or 0) * unit
-                    for part, unit in zip(parts.groups(), (3600, 60, 1), strict=True)
-                )
-            )
+            hour, minute, second = map(int, parts.groups("0")) if parts else (0, 0, float(start))
         except ValueError:
-            raise InputError(
-                f"start must be a time of day such as 07:00 or seconds, got {show(start)}"
-            ) from None
+            wanted = "a time of day such as 07:00 or seconds"
+            raise InputError(f"start must be {wanted}, got {show(start)}") from None
+        value = 3600 * hour + 60 * minute + second
     return number("start [s]", value, low=0, high=MAX_TIME)
 
 
@@ -100,13 +89,12 @@ def _lines(path: AnyPath) -> list[tuple[str, list[str]]]:
     try:
         reader = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""))
         lines = [(f"{path}, line {reader.line_num}", [c.strip() for c in row]) for row in reader]
-    except UnicodeDecodeError as error:
-        utf16 = " (it looks like UTF-16)" * (data[:2] in (b"\xff\xfe", b"\xfe\xff"))
-        raise FileError(
-            f"cannot read arrivals from {path}: it is not UTF-8 text{utf16}, byte {error.start}"
-        ) from error
-    except csv.Error as error:
-        raise FileError(f"cannot read arrivals from {path}: {error}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        why = str(error)
+        if isinstance(error, UnicodeDecodeError):
+            utf16 = " (it looks like UTF-16)" * (data[:2] in (b"\xff\xfe", b"\xfe\xff"))
+            why = f"it is not UTF-8 text{utf16}, byte {error.start}"
+        raise FileError(f"cannot read arrivals from {path}: {why}") from error
     filled = [line for line in lines if any(line[1])]
     if not filled:
         raise FileError(f"{path} is empty; it needs the columns {', '.join(COLUMNS)}")
@@ -114,7 +102,7 @@ def _lines(path: AnyPath) -> list[tuple[str, list[str]]]:
 
 
 def _header(where: str, header: list[str]) -> list[str]:
-    """The names of the columns; raises `FileError` for a missing, a repeated or another one."""
+    """The names of the columns; raises `FileError` for a missing, repeated or unknown one."""
     if len(header) == 1 and (mark := re.search("[;\t|]", header[0])):
         raise FileError(f"{where}: separate columns by commas, not by {mark[0]!r}")
     for column in header:
@@ -131,10 +119,9 @@ def _header(where: str, header: list[str]) -> list[str]:
 
 def _row(where: str, columns: list[str], cells: list[str], arms: int) -> list[float]:
     if len(cells) != len(columns):
-        raise FileError(
-            f"{where}: expected {len(columns)} values, {', '.join(columns)}, got {len(cells)}"
-            f"{'; write decimals with a point' * (len(cells) > len(columns))}"
-        )
+        point = "; write decimals with a point" * (len(cells) > len(columns))
+        wanted = f"{len(columns)} values, {', '.join(columns)}"
+        raise FileError(f"{where}: expected {wanted}, got {len(cells)}{point}")
     return [_value(where, *pair, arms) for pair in zip(columns, cells, strict=True)]
 
 
@@ -148,11 +135,9 @@ def _value(where: str, column: str, cell: str, arms: int) -> float:
     ranges = {FACTORS: (LEAST_FACTOR, MOST_FACTOR), "manoeuvre": (1, arms - 1)}
     low, high = ranges.get(column, (0.0, MAX_TIME))
     try:
-        return number(
-            column, int(cell) if column == "manoeuvre" else float(cell), low=low, high=high
-        )
+        value = int(cell) if column == "manoeuvre" else float(cell)
+        return number(column, value, low=low, high=high)
     except ValueError:
-        point = "; write decimals with a point" if "," in cell else ""
-        raise FileError(
-            f"{where}: {column} must be a number {low:g} … {high:g}, got {show(cell)}{point}"
-        ) from None
+        point = "; write decimals with a point" * ("," in cell)
+        wanted = f"a number {low:g} … {high:g}"
+        raise FileError(f"{where}: {column} must be {wanted}, got {show(cell)}{point}") from None

@@ -47,8 +47,8 @@ class Simulation:
         record: None, "junction" (60 m before it to 30 m past it) or "all": keep trajectories.
         record_window: start and end of the recording [s].
         on_collision: "stop" raises `CollisionError`; "record" notes each pair once and goes on.
-            "teleport", for a `CruiseVehicle` only, also does what SUMO did in the published runs:
-            a vehicle that comes closer than `min_gap` to the one ahead on its exit has arrived.
+            "teleport", for a `CruiseVehicle` only, also lets a vehicle closer than `min_gap` to
+            the one ahead on its exit arrive, as SUMO did in the published runs.
 
     Raises:
         InputError: a value that is not allowed, or a scenario that the controller cannot serve.
@@ -73,16 +73,9 @@ class Simulation:
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
         self._road = build_road(self.site, plan)
-        self._law = build_law(
-            self.site,
-            plan,
-            depart_speed=scenario.depart_speed,
-            record=record,
-            record_window=hosted.record_window,
-        )
+        self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
-        self._advice = self._vehicles["advice"]
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
@@ -105,7 +98,7 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether the horizon has been reached or every vehicle has arrived."""
+        """Whether the horizon is reached or every vehicle has arrived."""
         return self._done or self.tick >= self._horizon_tick
 
     @property
@@ -120,25 +113,16 @@ class Simulation:
             CollisionError: two bodies touched, unless collisions are only recorded.
             ControllerError: the controller answered with something that is not a command.
         """
-        target = min(
-            first_tick(number("until [s]", until, low=0), self.site.dt), self._horizon_tick
-        )
+        number("until [s]", until, low=0)
+        target = min(first_tick(until, self.site.dt), self._horizon_tick)
         if not self._started:
             self._started = True
             self._decide()
+        world = self._vehicles, self._lanes, self._road, self._law, self._cruise, self._trace
         while self.tick < target and not self._done:
+            end = min(target, self._alarm.tick)
             self.tick, reasons, self._traced, self._seen = kernel.advance(
-                self._vehicles,
-                self._lanes,
-                self._road,
-                self._law,
-                self._cruise,
-                self._trace,
-                self._traced,
-                self._bodies,
-                self._observed,
-                self.tick,
-                min(target, self._alarm.tick),
+                *world, self._traced, self._bodies, self._observed, self.tick, end
             )
             if reasons & kernel.TRACE_FULL:
                 self._keep_trace()
@@ -160,16 +144,11 @@ class Simulation:
     def result(self) -> Run:
         """The result so far."""
         self._keep_trace()
-        horizon = self._horizon_tick * self.site.dt
+        end = self._horizon_tick * self.site.dt if self._done else self.time
+        demand, movements = self._hosted.arrivals.time, self.site.intersection.movements
         return self._hosted.result(
             collisions=self.collisions,
-            columns=collect_trips(
-                self._vehicles,
-                self._hosted.arrivals.time,
-                self.site.intersection.movements,
-                self.site.dt,
-                horizon if self._done else self.time,
-            ),
+            columns=collect_trips(self._vehicles, demand, movements, self.site.dt, end),
             trace=np.concatenate([*self._traces, self._trace[:0]]),
             rows=self._vehicles[["id", "path"]].copy(),
         )
@@ -182,20 +161,17 @@ class Simulation:
     def _apply(self, command: Command) -> None:
         match command:
             case Advise(vehicle, speed):
-                self._advice[self._row[vehicle]] = speed
-            case Brake(vehicle, deceleration):
-                self._brake(self._row[vehicle], deceleration)
+                self._vehicles["advice"][self._row[vehicle]] = speed
+            case Brake(vehicle, asked) if not self._vehicles["cleared"][self._row[vehicle]]:
+                limited = min(asked, self._law.b_max)
+                brake = -limited if limited > 0.0 else math.inf
+                self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
             case Open(lane) | Close(lane):
                 self._lanes["open"][lane] = isinstance(command, Open)
             case Wake():
                 self._alarm.set(command)
-
-    def _brake(self, row: int, deceleration: float) -> None:
-        if not self._vehicles["cleared"][row]:
-            limited = min(deceleration, self._law.b_max)
-            self._vehicles["brake"][row] = -limited if limited > 0.0 else math.inf
 
     def _check_collisions(self) -> None:
         now = collisions_now(self._vehicles, self._road, self.site, self.time)
@@ -236,11 +212,9 @@ def simulate(
     """Run a scenario under a controller; see `Simulation` for the arguments and errors.
 
     Example:
-        >>> import minisim
         >>> from minisim.testing import small_scenario
         >>> from minisim.control import Unregulated
-        >>> run = minisim.simulate(small_scenario(density=0), Unregulated())
-        >>> run.summary()["trips"]
+        >>> simulate(small_scenario(density=0), Unregulated()).summary()["trips"]
         0
     """
     return Simulation(

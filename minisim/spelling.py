@@ -5,7 +5,7 @@
 Values are numbers, words, quoted texts, lists in brackets, and nested recipes. `true`, `false` and
 `none` may be upper or lower case. Text is parsed as Python source and never evaluated. A table, as
 in TOML, means the same: `{name = "dim", gate = "harmonious", perception = {name = "noisy",
-intent_error = 0.15}}`. What a value means is for the parameter to say (`minisim.parameters`).
+intent_error = 0.15}}`. The parameter says what a value means (`minisim.parameters`).
 """
 
 from __future__ import annotations
@@ -50,10 +50,8 @@ def parse_arguments(name: str, text: str) -> Call:
     if not isinstance(tree, ast.Call) or not isinstance(tree.func, ast.Name):
         wrong = "; a digest (#…) stands for a value that only Python can give" * ("#" in text)
         wrong += "; a bracket is missing" * (text.count("(") != text.count(")"))
-        raise InputError(
-            f"cannot read {show(text)}, the parameters of {name}: they are written key=value, with "
-            f"commas between them and paths in quotes{wrong}"
-        )
+        wanted = f"key=value, with commas between them and paths in quotes{wrong}"
+        raise InputError(f"cannot read {show(text)}, the parameters of {name}: write {wanted}")
     return _call(name, tree, source)
 
 
@@ -69,16 +67,13 @@ def call_of(value: Mapping[str, Any]) -> Call:
 def read(
     title: str, value: Any, kinds: Mapping[str, Callable[..., Any]], nothing: Sequence[str] = ()
 ) -> Any:
-    """What a value means where a recipe is wanted; anything but a text or table is its own.
+    """The recipe that a text or table stands for; any other value is returned unchanged.
 
     Args:
         title: what messages call the recipe.
         value: such as "noisy(delay=0.1)"; a table needs no name if there is only one kind.
-        kinds: word -> what makes the recipe of that name.
+        kinds: word -> what makes the recipe of that name. Another word is an `InputError`.
         nothing: words that mean None.
-
-    Raises:
-        InputError: an unknown word (with the nearest one), or as `build`.
     """
     if isinstance(value, Mapping):
         value = call_of({**({"name": next(iter(kinds))} if len(kinds) == 1 else {}), **value})
@@ -92,16 +87,10 @@ def read(
 
 
 def build(title: str, make: Callable[..., Any], call: Call) -> Any:
-    """Call `make` with the arguments of `call`.
+    """Call `make`, a class or function, with the arguments of `call`; messages call it `title`.
 
-    Args:
-        title: what messages call the recipe.
-        make: a class or function. Declared parameters (`minisim.parameters`) take words and nested
-            recipes; the values of others must fit a simple annotation.
-        call: the arguments.
-
-    Raises:
-        InputError: no such parameter (with the nearest one), or a value that is not allowed.
+    Declared parameters (`minisim.parameters`) take words and nested recipes; other values must fit
+    a simple annotation. `InputError` tells of an unknown parameter or a value that is not allowed.
     """
     try:
         signature = inspect.signature(make)
@@ -123,7 +112,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
 def bound(
     title: str, signature: inspect.Signature, places: Sequence[Any], named: Mapping[str, Any]
 ) -> inspect.BoundArguments:
-    """The arguments by parameter; raises `InputError` for an unknown, missing or surplus one."""
+    """The arguments by parameter; `InputError` for an unknown, missing or surplus one."""
     taken = [it for it in signature.parameters.values() if it.kind not in _VARIABLE]
     names = [it.name for it in taken]
     if inspect.Parameter.VAR_KEYWORD not in {it.kind for it in signature.parameters.values()}:
@@ -145,15 +134,14 @@ def bound(
 def _hints(make: Callable[..., Any]) -> dict[str, Any]:
     """Annotations by parameter; empty if one of them cannot be resolved."""
     try:
-        return typing.get_type_hints(
-            vars(make).get("__init__", make) if isinstance(make, type) else make
-        )
+        of = vars(make).get("__init__", make) if isinstance(make, type) else make
+        return typing.get_type_hints(of)
     except Exception:  # the annotations are the caller's own, and may be anything
         return {}
 
 
 def _check_simple(title: str, hint: Any, value: Any) -> None:
-    """Check a value if its annotation is float, int, str or bool, or an optional one of these."""
+    """Check a value that is annotated as float, int, str or bool, or as a union of these."""
     if isinstance(value, Call):
         raise InputError(f"{title} has no recipe {value}; a text that looks like one needs quotes")
     union = typing.get_origin(hint) in (typing.Union, types.UnionType)
@@ -186,7 +174,6 @@ def _call(name: str, node: ast.Call, source: str) -> Call:
 
 
 def _parsed(name: str, node: ast.expr, source: str) -> Any:
-    """The value of a piece of source."""
     match node:
         case ast.Constant(value=bool() | int() | float() | str() | None as value):
             return value
@@ -204,7 +191,6 @@ def _parsed(name: str, node: ast.expr, source: str) -> Any:
 
 
 def _written(node: ast.AST, source: str) -> str:
-    """A piece of the source as it is written."""
     return ast.get_source_segment(source, node) or ""
 
 

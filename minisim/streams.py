@@ -1,7 +1,7 @@
 """Named random streams: one `SeedSequence` per run, one child per purpose.
 
-Draws from one stream cannot shift another. So a seed gives the same arrivals for every controller
-(common random numbers), no matter what the controller draws.
+Draws from one stream cannot shift another, so a seed gives the same arrivals for every controller,
+whatever it draws (common random numbers).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from minisim.errors import choice, integer
 
-#: Order matters: it is the spawn key. Append only.
+#: The place of a name is its spawn key: append only.
 STREAMS = ("arrivals", "manoeuvres", "perception", "drivers", "humans")
 
 
@@ -26,15 +26,10 @@ def stream(seed: int, name: str) -> np.random.Generator:
 
 
 class Draws:
-    """Random numbers by purpose: they are the same whatever the order of the draws.
+    """Random numbers by purpose, the same in any order of the draws.
 
-    A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step. So an extra
-    question never shifts the answers to others, as it would in a stream. The hash is BLAKE2b
-    (RFC 7693); its key is drawn from the stream.
-
-    Args:
-        seed: the run's seed.
-        name: the stream's name.
+    A number is a keyed hash of a few integers, such as a purpose, a vehicle and a step, so an extra
+    draw never shifts others. The hash is BLAKE2b (RFC 7693); its key is drawn from the stream.
     """
 
     def __init__(self, seed: int, name: str) -> None:

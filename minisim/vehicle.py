@@ -1,4 +1,4 @@
-"""Vehicle types (size and car-following parameters) and the table of car-following models."""
+"""Vehicle types, which are sizes and car-following parameters, and the car-following models."""
 
 from __future__ import annotations
 
@@ -7,37 +7,30 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from minisim.errors import InputError
-from minisim.parameters import declared, real, word
+from minisim.parameters import declared, real, switch, word
+
+#: SUMO's `POSITION_EPS` [m].
+POSITION_EPS = 0.1
 
 
 class Model(NamedTuple):
-    """A car-following model. Its equations are in `minisim.carfollowing`.
-
-    `minisim.laws` says how a run applies them.
-
-    Attributes:
-        braking: how hard it makes a vehicle brake for a stationary obstacle [m/s²], given the
-            vehicle's acceleration and comfortable deceleration.
-        stepwise: whether it gives the next speed, at which a vehicle drives the whole step
-            (`minisim.carfollowing.semi_implicit`); otherwise the step is ballistic.
-        margin: a vehicle is inserted this far past its own length, and counts as arrived this
-            far before the end of the road [m].
-        sumo: SUMO's model of the same law; empty if SUMO has none.
-        stand_ins: SUMO's models of other laws that can drive such vehicles.
-    """
+    """A car-following model: `minisim.carfollowing` has its equations, `minisim.laws` its use."""
 
     meaning: str
+    #: How hard a vehicle brakes for a stationary obstacle [m/s²], given its acceleration and
+    #: comfortable deceleration.
     braking: Callable[[float, float], float]
+    #: Whether it gives the next speed, at which a vehicle drives the whole step
+    #: (`minisim.carfollowing.semi_implicit`); otherwise the step is ballistic.
     stepwise: bool = False
-    margin: float = 0.0
-    sumo: str = ""
-    stand_ins: tuple[str, ...] = ("Krauss",)
+    sumo: str = ""  # SUMO's model of the same law; empty if it has none
+    stand_ins: tuple[str, ...] = ("Krauss",)  # SUMO's models of other laws for such vehicles
 
 
 def _idm_braking(a: float, b: float) -> float:
     """How hard the IDM brakes, plus a quarter [m/s²].
 
-    It brakes at k²/b, where k = v²/2s is just enough. Its free-road term reduces that by up to a:
+    It brakes at k²/b, less up to a by its free-road term; k = v²/2s is just enough. So
     k²/b − a = k at k = (b + √(b² + 4ab))/2.
     """
     return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
@@ -51,11 +44,10 @@ MODELS: Mapping[str, Model] = {
     "krauss": Model(
         "SUMO's default law without its random part", lambda _, b: b, stepwise=True, sumo="Krauss"
     ),
-    # A cruise control brakes as hard as the vehicle can. The margin is SUMO's `POSITION_EPS`,
-    # where it inserts a vehicle with `departPos="base"`, the position used in the published runs.
+    # A cruise control brakes as hard as the vehicle can.
     "cc": Model(
         "cruise control, only for a `CruiseVehicle`",
-        lambda *_: 0.0, stepwise=True, margin=0.1, sumo="CC", stand_ins=(),
+        lambda *_: 0.0, stepwise=True, sumo="CC", stand_ins=(),
     ),
 }  # fmt: skip
 
@@ -65,13 +57,13 @@ class VehicleType:
     """Size and car-following parameters of a kind of vehicle (SI units).
 
     The defaults are SUMO's passenger car (`vType` defaults of vClass "passenger": length 5,
-    width 1.8, minGap 2.5, accel 2.6, decel 4.5, tau 1.0, emergencyDecel 9), so that runs
-    can be compared with SUMO's. The exponent is from Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
+    width 1.8, minGap 2.5, accel 2.6, decel 4.5, tau 1.0, emergencyDecel 9), for runs comparable
+    with SUMO's. The exponent is from Treiber, Hennecke, Helbing 2000 (PRE 62:1805).
 
-    The headway has a lower bound because no law reacts faster than the longest step allows
-    (Treiber, Kanagaraj 2015 on dt and T). The brakes must be able to do what the law itself asks
-    (`needed_braking`). Under any law but cruise control a vehicle also brakes, as hard as it can if
-    need be, for a leader that it could not stop behind (`minisim.laws.keep_room`).
+    The headway has a lower bound: no law reacts faster than the longest step allows (Treiber,
+    Kanagaraj 2015 on dt and T). The brakes must do what the law itself asks (`needed_braking`).
+    Except under cruise control, a vehicle also brakes for a leader that it could not stop behind,
+    as hard as it can if it must (`minisim.laws.keep_room`).
     """
 
     length: float = real(
@@ -88,17 +80,18 @@ class VehicleType:
     )  # fmt: skip
     headway: float = real("time headway T", "s", default=1.0, low=0.5, high=10)
     min_gap: float = real("bumper gap at standstill s0", "m", default=2.5, low=0.5, high=20)
-    exponent: float = real(
-        "free-road exponent δ; Krauß's law has none", default=4.0, low=1, high=50
-    )
-    max_deceleration: float = real(
-        "what the brakes can do at most", "m/s²", default=9.0, low=0, high=1000
-    )
+    exponent: float = real("free-road δ; Krauß's law has none", default=4.0, low=1, high=50)
+    max_deceleration: float = real("of the brakes", "m/s²", default=9.0, low=0, high=1000)
     # SUMO's speedFactor is cut to the same range.
     speed_deviation: float = real(
         "standard deviation of each driver's factor on the speed limit (mean 1, cut to 0.2 … 2); "
         "0 makes all drivers alike",
         default=0.0, low=0, high=0.5,
+    )  # fmt: skip
+    sumo: str | None = word(
+        "the version of SUMO whose vehicles it drives like, from insertion to arrival, at stop "
+        "lines and inside the junction; only with krauss; none for minisim's own rules",
+        ("1.18",), optional=True, default=None, label="SUMO version of a vehicle",
     )  # fmt: skip
     model: str = word(
         f"car following: {'; '.join(f'{name}, {it.meaning}' for name, it in MODELS.items())}",
@@ -108,6 +101,10 @@ class VehicleType:
     def __post_init__(self) -> None:
         if self.model == "cc" and not isinstance(self, CruiseVehicle):
             raise InputError("the car-following model 'cc' goes with a CruiseVehicle")
+        if self.sumo is not None and self.model not in ("krauss", "cc"):
+            raise InputError(
+                f"sumo={self.sumo!r} goes with the car-following model 'krauss', not {self.model!r}"
+            )
         if self.max_deceleration < self.needed_braking:
             raise InputError(
                 f"max_deceleration must be at least {self.needed_braking:.2f} m/s², got "
@@ -120,8 +117,21 @@ class VehicleType:
         """How hard the model makes a vehicle brake for a stationary obstacle [m/s²]."""
         return MODELS[self.model].braking(self.acceleration, self.deceleration)
 
+    @property
+    def margin(self) -> float:
+        """It is inserted this far past its length, and arrives this far before the end [m].
+
+        SUMO does so where vehicles depart at "base", as in the published runs.
+        """
+        return 0.0 if self.sumo is None else POSITION_EPS
+
+    @property
+    def looks_out(self) -> bool:
+        """Whether it lets vehicles pass that cross its way inside the junction."""
+        return self.sumo == "1.18"
+
     def top_speed(self, limit: float) -> float:
-        """Upper bound on this type's speed where the speed limit is `limit` [m/s]."""
+        """Upper bound on this type's speed on a road with the speed limit `limit` [m/s]."""
         return 2.0 * limit
 
 
@@ -129,20 +139,18 @@ class VehicleType:
 class CruiseVehicle(VehicleType):
     """A vehicle under cruise control with an engine that lags: SUMO's car-following model `CC`.
 
-    It ignores speed limits: it drives at `cruise_speed` until a controller advises another
-    speed. Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`.
-    It keeps no distance to stop in (SUMO's speed mode 0), so that vehicles may collide as in SUMO.
-    The defaults come from SUMO's model (`MSCFModel_CC`, from Plexe) unless the authors' vehicle
-    type overrides them; the base class's headway and spacing are the ACC's.
+    It drives at `cruise_speed`, whatever the speed limit, until a controller advises another speed.
+    Equations: `minisim.carfollowing.cruise_control`, `distance_control`, `engine_lag`. It keeps no
+    distance to stop in (SUMO's speed mode 0), so vehicles may collide as in SUMO. The defaults are
+    those of SUMO's model (`MSCFModel_CC`, from Plexe) unless the authors' vehicle type overrides
+    them; headway and spacing are the ACC's.
     """
 
     cruise_speed: float = real(
         "desired speed until advised otherwise (SUMO's ccDesiredSpeed)", "m/s",
         default=14.0, low=0, high=100,
     )  # fmt: skip
-    cruise_gain: float = real(
-        "the cruise control's gain (ccKp)", "1/s", default=1.0, above=0, high=100
-    )
+    cruise_gain: float = real("of the control (ccKp)", "1/s", default=1.0, above=0, high=100)
     cruise_acceleration: float = real(
         "its largest acceleration (ccAccel)", "m/s²", default=1.5, above=0, high=100
     )
@@ -166,8 +174,12 @@ class CruiseVehicle(VehicleType):
     )  # fmt: skip
     headway: float = real("the ACC's time headway", "s", default=1.5, low=0.5, high=10)
     max_speed: float = real(
-        "none is faster before or inside the junction, whatever is desired (maxSpeed)", "m/s",
+        "upper bound before and inside the junction (maxSpeed)", "m/s",
         default=55.55, above=0, high=100,
+    )  # fmt: skip
+    obeys: bool = switch(
+        "whether it keeps to limits and lights by itself, but late: it brakes once it is in a "
+        "turn, runs amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
     )  # fmt: skip
     sumo: str = word(
         "the version of SUMO whose radar it has; that of the published runs saw more",

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from scenarios.profiles import AS_RUN, FAIR, PAPER, PROFILES, Profile
     from scenarios.scenario import Scenario
 
-_LIBRARY = ("five_way", "four_way", "from_bearings", "regular", "three_way")
-
 __all__ = [
     "AS_RUN",
     "FAIR",
@@ -31,5 +29,5 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'scenarios' has no attribute {name!r}")
-    home = "library" if name in _LIBRARY else "scenario" if name == "Scenario" else "profiles"
+    home = "library" if name.islower() else "scenario" if name == "Scenario" else "profiles"
     return getattr(importlib.import_module(f"scenarios.{home}"), name)

@@ -48,33 +48,24 @@ class Look(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """A controller with some of its parameters, as studies compare it.
+    """A controller with some of its parameters, as studies compare it."""
 
-    Attributes:
-        arguments: those that differ from the defaults, as written in a spec.
-        look: its look in figures; None means grey.
-        rival: whether it is compared with all others on equal terms.
-    """
-
-    arguments: str = ""
-    look: Look | None = None
-    rival: bool = False
+    arguments: str = ""  # those that differ from the defaults, as written in a spec
+    look: Look | None = None  # in figures; None means grey
+    rival: bool = False  # whether it is compared with all others on equal terms
 
 
 class Entry(NamedTuple):
-    """A row of the table of controllers.
+    """A row of the table of controllers."""
 
-    Attributes:
-        name: the controller's name, without parameters.
-        make: its class, which declares the parameters; its docstring's first line is the help text.
-        variants: those that have a look or are rivals.
-        as_run: what the bare name means under the profile `as_run`; empty means the same as usual.
-    """
+    name: str  # without parameters
+    make: type[Any]  # declares the parameters; its docstring's first line is the help text
+    variants: tuple[Variant, ...] = (Variant(),)  # those that have a look or are rivals
+    as_run: str = ""  # what the bare name means under the profile `as_run`, if not the same
 
-    name: str
-    make: type[Any]
-    variants: tuple[Variant, ...] = (Variant(),)
-    as_run: str = ""
+
+def _rival(look: Look) -> tuple[Variant]:
+    return (Variant("", look, rival=True),)
 
 
 #: Our controllers, the paper's four first; figures show rivals in this order.
@@ -90,21 +81,11 @@ CONTROLLERS: Mapping[str, Entry] = MappingProxyType({
             Variant("order=lanes,priorities=waiting"),
             Variant("monitor=on", Look("DIM with safety monitor", "purple", "H", "-.")),
         ), as_run="dim-as-run"),
-        Entry("fixed-time", FixedTime, (
-            Variant("", Look("fixed-time signal", "vermillion", "s", "--"), rival=True),
-        )),
-        Entry("adaptive", Adaptive, (
-            Variant("", Look("adaptive signal", "orange", "^", "-."), rival=True),
-        )),
-        Entry("v2ic", V2IC, (
-            Variant("", Look("V2I-C", "green", "D", ":"), rival=True),
-        ), as_run="v2ic-as-run"),
-        Entry("all-way-stop", AllWayStop, (
-            Variant("", Look("all-way stop", "ink", "X", "--"), rival=True),
-        )),
-        Entry("reservation", Reservation, (
-            Variant("", Look("reservation", "purple", "v", "-."), rival=True),
-        )),
+        Entry("fixed-time", FixedTime, _rival(Look("fixed-time signal", "vermillion", "s", "--"))),
+        Entry("adaptive", Adaptive, _rival(Look("adaptive signal", "orange", "^", "-."))),
+        Entry("v2ic", V2IC, _rival(Look("V2I-C", "green", "D", ":")), as_run="v2ic-as-run"),
+        Entry("all-way-stop", AllWayStop, _rival(Look("all-way stop", "ink", "X", "--"))),
+        Entry("reservation", Reservation, _rival(Look("reservation", "purple", "v", "-."))),
         Entry("longest-queue", LongestQueue, (
             Variant("", Look("longest queue first", "brown", "<", ":"), rival=True),
         )),
@@ -128,11 +109,11 @@ RIVALS = tuple(name for name, variant in VARIANTS.items() if variant.rival)
 #: Spellings of the variants that never collide and that serve any number of arms.
 SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":")[0]].make).laws)
 
-#: How a class of a caller's own is written: module or file, class, arguments.
+#: A class of a caller's own: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 
 #: The same with a slip: a dot for the colon, no brackets, or one too few.
-_ALMOST = re.compile(r"([\w./-]+)[:.]([A-Z]\w*)(\W.*)?", re.DOTALL)
+_ALMOST = re.compile(r"([\w./-]+)[:.]([A-Z]\w*)(|\W.*)", re.DOTALL)
 
 #: What is allowed besides the known names.
 OWN = "a class of your own, such as mymodule:MyController(k=3)"
@@ -143,13 +124,9 @@ def controller_named(
 ) -> Controller:
     """The controller that a string or table names; a controller is returned as it is.
 
-    Args:
-        spec: see the module's docstring.
-        profile: under `as_run`, a bare "dim" or "v2ic" means what was run for the paper.
-
-    Raises:
-        InputError: an unknown name or parameter (with the nearest one), a value that is not
-            allowed, a class that cannot be loaded or made, or one that is not a controller.
+    Under the profile `as_run`, a bare "dim" or "v2ic" means what was run for the paper. Raises
+    `InputError` for an unknown name or parameter (with the nearest one), a value that is not
+    allowed, a class that cannot be loaded or made, or one that is not a controller.
     """
     as_run = profile_named(profile).name == AS_RUN.name
     if not isinstance(spec, str | Mapping):
@@ -189,15 +166,12 @@ def _unknown(text: str, head: str) -> InputError:
     """What is wrong with a text that names no controller, and what may be meant."""
     known = [*CONTROLLERS, *plugins()]
     name = re.split(r"[^\w-]", text, maxsplit=1)[0]
-    meant = name.casefold()
-    if meant in known and name != text:
-        arguments = _bare(text.removeprefix(name))
-        hints = [f"{meant}:{arguments}" if arguments else meant]
+    module = text.rstrip(":")
+    if name.casefold() in known and name != text:
+        hints = [f"{name.casefold()}:{_bare(text.removeprefix(name))}".rstrip(":")]
     elif almost := _ALMOST.fullmatch(text):
-        module, kind, rest = almost.groups()
-        hints = [f"{module}:{kind}({_bare(rest)})" if rest else f"{module}:{kind}"]
-    elif text.rstrip(":") and has_source(text.rstrip(":")):
-        module = text.rstrip(":")
+        hints = [f"{almost[1]}:{almost[2]}({_bare(almost[3])})".removesuffix("()")]
+    elif module and has_source(module):
         hints = [f"{module}:{kind}" for kind in controllers_in(module)]
     else:
         return InputError(
@@ -221,17 +195,14 @@ def maker_of(name: str) -> Any:
     """The class (or plugin's function) for a name or `module:Class`; raises `InputError`."""
     if name in CONTROLLERS:
         return CONTROLLERS[name].make
-    if name in plugins():
-        make = _loaded(name, plugins()[name])
-    else:
-        module, _, kind = name.rpartition(":")
-        make = load_class(module, kind)
+    make = _loaded(name) if name in plugins() else load_class(*name.rsplit(":", 1))
     if isinstance(make, type) and not is_maker(make):
         as_controller(name, make)  # says what it lacks
     return make
 
 
-def _loaded(name: str, plugin: EntryPoint) -> Any:
+def _loaded(name: str) -> Any:
+    plugin = plugins()[name]
     try:
         return plugin.load()
     except (Exception, SystemExit) as error:  # another author's code may raise anything
@@ -253,13 +224,14 @@ def plugins() -> Mapping[str, EntryPoint]:
 
 def unused_plugins() -> dict[str, str]:
     """Registered controllers whose name was taken before -> why they are not used."""
-    return {
-        f"{point.name} of {package_of(point)}": f"not used: "
-        f"{package_of(plugins()[point.name]) if point.name in plugins() else 'minisim'} has a "
-        f"controller of that name"
-        for point in entry_points(group="minisim.controllers")
-        if point.name in CONTROLLERS or plugins()[point.name] != point
-    }
+    unused = {}
+    for point in entry_points(group="minisim.controllers"):
+        used = plugins().get(point.name)
+        if used is None or used != point:
+            owner = package_of(used) if used else "minisim"
+            why = f"not used: {owner} has a controller of that name"
+            unused[f"{point.name} of {package_of(point)}"] = why
+    return unused
 
 
 def package_of(plugin: EntryPoint) -> str:

@@ -1,7 +1,7 @@
 """Turns a path on which the protocol is unsafe into arrivals that make simulated vehicles collide.
 
-The model has no clock. It gives the order of the vehicles, and says that the last one comes while
-the others are on their way. The simulator finds out when that is.
+The model has no clock: it gives the order of the vehicles, and the simulator finds out when the
+last one has to come.
 """
 
 from __future__ import annotations
@@ -29,12 +29,8 @@ def colliding_arrivals(scenario: Scenario, dim: Dim, paths: Sequence[Path]) -> A
     """Arrivals in the order of one of `paths` that end in a collision; None if there are none.
 
     All vehicles want to enter the road at time 0, except the last one. It comes after the shortest
-    delay that ends in a collision on any path.
-
-    Args:
-        scenario: junction and profile; its demand is not used.
-        dim: the rules under which the paths were found.
-        paths: paths to unsafe states (`dim.proofs.modelcheck.explore`).
+    delay that ends in a collision on any path. The scenario gives junction and profile, `dim` the
+    rules under which the paths to unsafe states were found (`dim.proofs.modelcheck.explore`).
     """
     for step in range(round(LATEST / scenario.profile.dt)):
         for path in paths:

@@ -1,4 +1,4 @@
-"""Keys of a file of experiments, and what they are where the file leaves them out."""
+"""Keys of a file of experiments, and their defaults."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
-from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,11 +33,12 @@ CONTROLLERS = {
     "dim:gate=harmonious": "DIM, harmonious gate",
     "fixed-time": "fixed-time signal",
 }
-#: Column of a sweep, averaged over seeds -> its heading.
-METRICS = {
-    name: heading(name)
-    for name in ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
-}
+#: Columns of a sweep that are averaged over seeds.
+METRICS = ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
+
+#: Of the table.
+HEADINGS = ("veh/h/lane", "controller", *map(heading, METRICS), "collisions")
+
 PROFILE = "fair"
 
 
@@ -46,13 +47,13 @@ class Tour:
     """What the tour simulates."""
 
     densities: tuple[float, ...] = reals(
-        "mean inflows a lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
+        "mean inflows per lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
     )
-    seeds: int = whole("runs a point", low=2, default=5)
+    seeds: int = whole("runs per point", low=2, default=5)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
     film_start: float = real("of the animation, at the highest density", "s", low=0, default=600.0)
     film_seconds: float = real("length of the animation", "s", above=0, default=60.0)
-    controllers: tuple[str, ...] = field(default=tuple(CONTROLLERS))
+    controllers: tuple[str, ...] = tuple(CONTROLLERS)
 
     def __post_init__(self) -> None:
         if not self.densities:
@@ -88,11 +89,7 @@ def _recipe(density: float, controller: str, seed: int, horizon: float) -> Recip
 
 
 def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.DataFrame:
-    """Run the tour and average its rows; see `average`.
-
-    Raises:
-        MinisimError: a run failed.
-    """
+    """Run the tour and `average` its rows; raises `MinisimError` if a run failed."""
     with workers(jobs) as executor:
         rows = sweep(tour.recipes(), executor, progress)
     failed = rows[rows["error"].notna()]
@@ -106,11 +103,10 @@ def run_tour(tour: Tour, jobs: int, progress: Callable[[int, int], None]) -> pd.
 
 
 def average(rows: pd.DataFrame) -> pd.DataFrame:
-    """Means over seeds with the half widths of their 95 % intervals.
+    """Means over seeds: one row per controller and density.
 
-    Returns:
-        One row per controller and density: `controller`, `density`, `seeds`, `trips`, `collisions`
-        (sums), and each of `METRICS` with its `…_ci95`.
+    Columns: `controller`, `density`, `seeds`, the sums `trips` and `collisions`, and each of
+    `METRICS` with `…_ci95`, the half width of its 95 % interval.
     """
     runs = rows.groupby(["controller", "density"], sort=False)
     points = runs.agg(
@@ -126,7 +122,7 @@ def average(rows: pd.DataFrame) -> pd.DataFrame:
 def demo_title(tour: Tour) -> str:
     """What the table shows, in one line."""
     return (
-        f"4 arms, profile {PROFILE}, {tour.horizon:g} s simulated, {tour.seeds} seeds a point: "
+        f"4 arms, profile {PROFILE}, {tour.horizon:g} s simulated, {tour.seeds} seeds per point: "
         "mean ± 95 % confidence interval"
     )
 
@@ -134,35 +130,26 @@ def demo_title(tour: Tour) -> str:
 def demo_table(points: pd.DataFrame) -> Table:
     """The points as a table for a terminal."""
     table = Table(box=box.SIMPLE_HEAD)
-    for k, title in enumerate(_headings()):
+    for k, title in enumerate(HEADINGS):
         table.add_column(title, justify="left" if k == 1 else "right")
-    rows = _cells(points)
-    for row, following in zip(rows, [*rows[1:], None], strict=True):
-        table.add_row(*row, end_section=following is not None and following[0] != row[0])
+    for _, rows in itertools.groupby(_cells(points), key=lambda row: row[0]):
+        for row in rows:
+            table.add_row(*row)
+        table.add_section()
     return table
 
 
 def write_tables(points: pd.DataFrame, tour: Tour, folder: Path) -> None:
-    """Write demo.csv and demo.md, each whole or not at all; raises `FileError`."""
+    """Write demo.csv and demo.md; raises `FileError`."""
     write_table(points, folder / "demo.csv")
-    table = markdown_table(_headings(), _cells(points), words=(1,))
+    table = markdown_table(HEADINGS, _cells(points), words=(1,))
     write_text(folder / "demo.md", f"{demo_title(tour)}. minisim {__version__}.\n\n{table}\n")
 
 
-def _headings() -> list[str]:
-    return ["veh/h/lane", "controller", *METRICS.values(), "collisions"]
-
-
 def _cells(points: pd.DataFrame) -> list[list[str]]:
-    return [
-        [
-            f"{point['density']:g}",
-            CONTROLLERS.get(point["controller"], point["controller"]),
-            *(
-                str(Interval(point[metric], point[f"{metric}_ci95"], point["seeds"]))
-                for metric in METRICS
-            ),
-            str(point["collisions"]),
-        ]
-        for point in points.to_dict("records")
-    ]
+    cells = []
+    for point in points.to_dict("records"):
+        name = CONTROLLERS.get(point["controller"], point["controller"])
+        means = (Interval(point[m], point[f"{m}_ci95"], point["seeds"]) for m in METRICS)
+        cells.append([f"{point['density']:g}", name, *map(str, means), str(point["collisions"])])
+    return cells

@@ -1,11 +1,10 @@
 """Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
 
-All take the same keywords, `Options`.
+All take the same keywords, `Options`, and call `from_bearings`.
 """
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +12,7 @@ from dataclasses import fields
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
-from minisim.errors import InputError, choice, instance, integer, numbers, show
+from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Way
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
@@ -22,9 +21,9 @@ from scenarios.scenario import Scenario
 
 Side = Literal["left", "right"]
 
-#: Number of arms -> distance of the entries from the centre in the authors' networks [m]. Their
-#: approach lanes are 495.84, 492.8 and 491.6 m long. The first two follow from the default kerb
-#: radius, but netconvert rounds to centimetres, and 3 mm change when a vehicle enters a zone.
+#: Number of arms -> distance of the entries from the centre in the authors' networks [m]. The first
+#: two are those of the default kerb radius, but rounded to centimetres by netconvert, and 3 mm
+#: change when a vehicle enters a zone.
 PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
@@ -51,7 +50,7 @@ class Options(TypedDict, total=False):
     recorded: Arrivals | None
 
 
-#: The mean inflow a lane unless it is told [veh/h].
+#: Mean inflow per lane by default [veh/h].
 DENSITY = 350.0
 
 #: Keywords that recorded arrivals replace.
@@ -65,14 +64,13 @@ _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 def _shown(make: _Maker) -> _Maker:
     """Give `make` a signature in which help and completion see `Options` and their defaults."""
     defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
-    own = inspect.signature(make).parameters.values()
-    kept = [parameter for parameter in own if parameter.kind is not parameter.VAR_KEYWORD]
+    *own, _ = inspect.signature(make).parameters.values()  # the last is `options`
     options = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=defaults[key])
         for key in Options.__annotations__
     ]
     # mypy does not know that functions take this attribute, which `inspect.signature` reads.
-    make.__signature__ = inspect.Signature([*kept, *options])  # type: ignore[attr-defined]
+    make.__signature__ = inspect.Signature([*own, *options])  # type: ignore[attr-defined]
     return make
 
 
@@ -111,11 +109,8 @@ def from_bearings(
 ) -> Scenario:
     """A junction with arms at these bearings [degrees clockwise from north].
 
-    The other functions of this module call this one.
-
-    Raises:
-        InputError: an unknown keyword (with the nearest one), arms closer than 30°, an unknown
-            profile, impossible demand, a demand beside recorded arrivals, horizon ≤ 0.
+    `InputError` for an unknown keyword (with the nearest one), arms closer than 30°, an unknown
+    profile, impossible demand, a demand beside recorded arrivals, or a horizon ≤ 0.
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
@@ -142,9 +137,8 @@ def from_bearings(
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
     """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
 
-    Raises:
-        InputError: an unknown name (with the nearest one), or one of `custom` and bearings without
-            the other.
+    `InputError` for an unknown name (with the nearest one), or for one of `custom` and bearings
+    without the other.
     """
     instance("scenario", name, str)
     if name == "custom":
@@ -156,24 +150,20 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     makers = {"three-way": three_way, "four-way": four_way, "five-way": five_way}
     if name in makers:
         return makers[name](**options)
-    count = name.removesuffix("-way")
-    if name.endswith("-way") and count.isascii() and count.isdigit() and len(count) <= 3:
-        return regular(int(count), **options)
-    counts = [n for n in re.findall("[0-9]+", name) if len(n) <= 2 and 3 <= int(n) <= 12]
-    near = [f"{int(n)}-way" for n in counts] or difflib.get_close_matches(
-        name, [*makers, "custom"], n=1, cutoff=0.5
-    )
+    if count := re.fullmatch("([0-9]{1,3})-way", name):
+        return regular(int(count[1]), **options)
+    counts = [f"{n}-way" for n in range(3, 13) if str(n) in re.findall("[0-9]+", name)]
+    near = nearest(counts[0] if counts else name, [*counts, *makers, "custom"])
     raise InputError(
         f"unknown scenario {show(name)}; allowed: {', '.join(makers)}, N-way (such as 6-way), "
-        f"custom{f'; did you mean {near[0]!r}?' if near else ''}"
+        f"custom{near}"
     )
 
 
 def _regular(name: str, n: int, density: float | None, options: Mapping[str, Any]) -> Scenario:
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
-        published = {"ways": published_ways(n), "junction_radius": PUBLISHED_RADII[n]}
-        options = {**published, **options}
+        options = {"ways": published_ways(n), "junction_radius": PUBLISHED_RADII[n], **options}
     bearings = [360.0 * i / n for i in range(n)]
     return from_bearings(bearings, density, **{"name": name, **options})
 

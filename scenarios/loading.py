@@ -13,13 +13,14 @@ import io
 import os
 import pickle
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from minisim.errors import InputError, choice, told
+from minisim.errors import InputError, nearest, told
 from minisim.results.metrics import METRICS, Asked, Metric, asked_metrics, listed, metric_of
 
 #: File -> its text at the last import.
@@ -29,12 +30,14 @@ _texts: dict[Path, bytes] = {}
 def load_class(module: str, name: str) -> type:
     """A class, given its own name and the name of its module or the path of its file.
 
-    Raises:
-        InputError: no such module or class, or one that cannot be imported; the message names the
-            file and line if they are known.
+    `InputError` for no such module or class, or one that cannot be imported; it names the file and
+    line if they are known.
     """
-    kind: type = _member(*_place(module), name, "controller", _is_class, _controllers)
-    return kind
+    loaded = _module(*_place(module))
+    kind = getattr(loaded, name, None)
+    if isinstance(kind, type):
+        return kind
+    raise _missing(module, name, "controller", _controllers(loaded))
 
 
 def controllers_in(module: str) -> list[str]:
@@ -52,10 +55,6 @@ def is_maker(kind: type) -> bool:
     return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
 
 
-def _is_class(value: object) -> bool:
-    return isinstance(value, type)
-
-
 def _controllers(module: ModuleType) -> list[str]:
     """Those that the module or its parts define, not what it imports from elsewhere."""
     return [
@@ -66,10 +65,7 @@ def _controllers(module: ModuleType) -> list[str]:
 
 
 def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
-    """The metrics asked for, ours by name; `module:name` is a caller's `Metric` or function.
-
-    Raises `InputError` as `asked_metrics` and `load_class` do.
-    """
+    """The metrics asked for, ours by name; `module:name` is a caller's; raises `InputError`."""
     asked = asked_metrics(_loaded(it) for it in listed(metrics))
     return tuple(it.name if it.name in METRICS else it for it in asked)
 
@@ -77,50 +73,37 @@ def metrics_named(metrics: str | Iterable[Asked]) -> tuple[str | Metric, ...]:
 def _loaded(metric: Asked) -> Asked:
     if not isinstance(metric, str) or ":" not in metric:
         return metric
-    module, _, name = metric.rpartition(":")
+    module, name = metric.rsplit(":", 1)
     return _metric(*_place(module), name)
 
 
 def _metric(folder: str, module: str, name: str) -> Metric:
     """A metric by its place, in this process or in another one on the same machine."""
-    made = _member(folder, module, name, "metric", _is_metric, _metrics)
-    metric: Metric = made if isinstance(made, Metric) else metric_of(made)
+    loaded = _module(folder, module)
+    made = getattr(loaded, name, None)
+    if not isinstance(made, Metric | FunctionType):
+        public = {key: it for key, it in vars(loaded).items() if not key.startswith("_")}
+        others = [key for key, it in public.items() if isinstance(it, Metric | FunctionType)]
+        raise _missing(module, name, "metric", others)
+    metric = made if isinstance(made, Metric) else metric_of(made)
     object.__setattr__(metric, "place", (folder, module, name))
     return metric
 
 
-def _is_metric(value: object) -> bool:
-    return isinstance(value, (Metric, FunctionType))
-
-
-def _metrics(module: ModuleType) -> list[str]:
-    return [key for key, it in vars(module).items() if _is_metric(it) and not key.startswith("_")]
-
-
-def _reduced(metric: Metric) -> Any:
+def _pickled_metric(metric: Metric) -> Any:
     place = getattr(metric, "place", None)
     return object.__reduce_ex__(metric, 4) if place is None else (_metric, place)
 
 
-copyreg.pickle(Metric, _reduced)
+copyreg.pickle(Metric, _pickled_metric)
 
 
-def _member(
-    folder: str,
-    module: str,
-    name: str,
-    what: str,
-    fits: Callable[[object], bool],
-    others: Callable[[ModuleType], list[str]],
-) -> Any:
-    """What a module calls `name`, if it fits; otherwise `InputError` with the nearest of others."""
-    loaded = _module(folder, module)
-    value = getattr(loaded, name, None)
-    if fits(value):
-        return value
-    if names := others(loaded):
-        choice(f"{what} of {module}", name, names)
-    raise InputError(f"{module} has no {name!r}, and no other {what} either")
+def _missing(module: str, name: str, what: str, others: list[str]) -> InputError:
+    """What is wrong if a module has nothing of this name, and which of the others is nearest."""
+    if not others:
+        return InputError(f"{module} has no {name!r}, and no other {what} either")
+    allowed = f"allowed: {', '.join(others)}{nearest(name, others)}"
+    return InputError(f"unknown {what} of {module} {name!r}; {allowed}")
 
 
 def _module(folder: str, name: str) -> ModuleType:
@@ -169,7 +152,7 @@ def _from_file(folder: Path, name: str) -> ModuleType:
     _texts[file] = text
     for kind in vars(module).values():
         if isinstance(kind, type) and kind.__module__ == name:
-            copyreg.pickle(kind, _Reduce(folder, name))
+            copyreg.pickle(kind, partial(_pickled, str(folder), name))
     return module
 
 
@@ -202,22 +185,15 @@ def _found_in(folder: Path) -> Iterator[None]:
         sys.dont_write_bytecode = written
 
 
-class _Reduce:
-    """Pickles an object with the folder and name of its module."""
-
-    def __init__(self, folder: Path, name: str) -> None:
-        self._origin = str(folder), name
-
-    def __call__(self, value: object) -> tuple[Any, ...]:
-        buffer = io.BytesIO()
-        pickler = pickle.Pickler(buffer, pickle.HIGHEST_PROTOCOL)
-        pickler.dispatch_table = {
-            kind: reduce
-            for kind, reduce in copyreg.dispatch_table.items()
-            if not (isinstance(reduce, _Reduce) and reduce._origin == self._origin)
-        }
-        pickler.dump(value)
-        return _restored, (*self._origin, buffer.getvalue())
+def _pickled(folder: str, name: str, value: object) -> tuple[Any, ...]:
+    """Pickle an object of a module together with the module's folder and name."""
+    buffer = io.BytesIO()
+    pickler = pickle.Pickler(buffer, pickle.HIGHEST_PROTOCOL)
+    pickler.dispatch_table = {
+        kind: reduce for kind, reduce in copyreg.dispatch_table.items() if kind.__module__ != name
+    }
+    pickler.dump(value)
+    return _restored, (folder, name, buffer.getvalue())
 
 
 def _restored(folder: str, name: str, data: bytes) -> Any:

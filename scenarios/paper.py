@@ -19,7 +19,7 @@ from minisim.errors import InputError, choice, integer
 from minisim.vehicle import CruiseVehicle
 from scenarios.controllers import controller_named
 from scenarios.library import MAKERS
-from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS, Profile
+from scenarios.profiles import AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS, Profile
 from scenarios.published import (
     PUBLISHED_ARMS,
     RENAMED,
@@ -52,6 +52,10 @@ PHASES = (2, 1, 0, 3)
 SERIES: Mapping[str, str] = {
     "dim": "dim", "fts": "fixed-time", "ats": "adaptive", "v2ic": "v2ic"
 }  # fmt: skip
+
+
+#: The series of the two signals.
+SIGNALS = ("fts", "ats")
 
 
 class Cell(NamedTuple):
@@ -103,10 +107,10 @@ class Ran(NamedTuple):
 #: trips have a speed factor of 1.00 and the 0.16 s of waiting that such a vehicle starts with.
 RAN: dict[tuple[str, str], Ran] = {
     ("v2ic", "4:3:2:1"): Ran(shares="balanced", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN),
+    ("fts", "4:3:2:1"): Ran(green=5.0, profile=AS_RUN_OBEYING),
     ("ats", "4:3:2:1"): Ran(controller="actuated"),
     ("v2ic", "4:1:4:1"): Ran(shares="4:4:1:1", controller="v2ic-as-run:approach_speed=14"),
-    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN),
+    ("fts", "4:1:4:1"): Ran(shares="4:4:1:1", profile=AS_RUN_OBEYING),
     ("ats", "4:1:4:1"): Ran(shares="4:4:1:1"),
 }
 
@@ -171,14 +175,24 @@ def replay(
         recorded=published_arrivals(split, density, arms, controller),
     )
     vehicle, junction = made.profile.vehicle, made.intersection
-    if not isinstance(vehicle, CruiseVehicle) or junction.ways is None:
+    if vehicle.sumo is None or junction.ways is None:
         return made
-    signals = controller == "fts"  # its network has none
-    turnarounds = "" if sumo != "1.18" or signals or arms != 4 else TURNAROUNDS[split]
+    if sumo != "1.18":
+        turnarounds = ""
+        if isinstance(vehicle, CruiseVehicle):
+            vehicle = replace(vehicle, sumo=sumo, obeys=False)
+        else:
+            vehicle = replace(vehicle, sumo=None)
+    elif controller in SIGNALS:
+        turnarounds = "" if split == RENAMED else TURNAROUNDS[split]
+    else:
+        turnarounds = TURNAROUNDS[split] if arms == 4 else ""
+    waits = controller not in SIGNALS or (controller == "fts" and split == RENAMED)
+    ways = published_ways(arms, turnarounds, waits=waits)
     return replace(
         made,
-        intersection=replace(junction, ways=published_ways(arms, turnarounds)),
-        profile=replace(made.profile, vehicle=replace(vehicle, sumo=sumo)),
+        intersection=replace(junction, ways=ways),
+        profile=replace(made.profile, vehicle=vehicle),
     )
 
 
@@ -193,7 +207,8 @@ def controller_of(
     cell = _cell(split, density, arms, controller)
     ran = _ran(cell, as_labelled)
     if cell.controller == "fts":
-        return FixedTime(greens=ran.green or GREENS[cell.density], order=PHASES)
+        green = 19.75 if cell.split == RENAMED and cell.density == 300 else GREENS[cell.density]
+        return FixedTime(greens=ran.green or green, order=PHASES)
     if cell.controller == "ats":
         actuated = ran.controller == "actuated"
         return Actuated(order=PHASES, presence=False) if actuated else Adaptive(order=PHASES)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from minisim.errors import choice, number
 from minisim.parameters import declared, part, real, text
 from minisim.vehicle import CruiseVehicle, VehicleType
@@ -40,6 +42,16 @@ PAPER = Profile(
 #: 14 m/s roads of the authors' network.
 FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 
+_CRUISING = CruiseVehicle(
+    length=4.0,
+    min_gap=2.0,
+    acceleration=4.0,
+    deceleration=1.5,
+    max_deceleration=1000.0,
+    cruise_acceleration=4.0,
+    max_speed=20.0,
+)
+
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
 #: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel`
 #: is a slip of the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed
@@ -47,15 +59,16 @@ FAIR = Profile(name="fair", vehicle=VehicleType(), speed_limit=14.0)
 #: which the authors' DIM has none of: the strongest braking that the cruise control asks for.
 AS_RUN = Profile(
     name="as_run",
-    vehicle=CruiseVehicle(
-        length=4.0,
-        min_gap=2.0,
-        acceleration=4.0,
-        deceleration=1.5,
-        max_deceleration=1000.0,
-        cruise_acceleration=4.0,
-        max_speed=20.0,
-    ),
+    vehicle=_CRUISING,
+    speed_limit=14.0,
+    depart_speed=0.0,
+    dt=0.01,
+)
+
+#: `AS_RUN` in SUMO's speed mode 31, set by the driver of the fixed-time signal at unequal inflow.
+AS_RUN_OBEYING = Profile(
+    name="as_run_obeying",
+    vehicle=replace(_CRUISING, obeys=True),
     speed_limit=14.0,
     depart_speed=0.0,
     dt=0.01,
@@ -76,6 +89,7 @@ AS_RUN_SIGNALS = Profile(
         max_deceleration=1000.0,
         speed_deviation=0.1,
         model="krauss",
+        sumo="1.18",
     ),
     speed_limit=14.0,
     depart_speed=0.0,
@@ -83,7 +97,7 @@ AS_RUN_SIGNALS = Profile(
 )
 
 #: The profiles of the published runs; they use the junctions in the authors' networks.
-PUBLISHED_PROFILES = (AS_RUN, AS_RUN_SIGNALS)
+PUBLISHED_PROFILES = (AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS)
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (PAPER, FAIR, *PUBLISHED_PROFILES)}
 

@@ -11,7 +11,7 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.errors import choice
 from minisim.junction.movements import ARM_NAMES, movements_of
-from minisim.junction.paths import Way
+from minisim.junction.paths import Way, distances_along
 from minisim.recorded import read_arrivals
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
@@ -28,13 +28,17 @@ TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
 
 
 @lru_cache
-def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]:
+def published_ways(
+    arms: int, turnarounds: str | None = None, *, waits: bool = True
+) -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
 
     Args:
         arms: how many.
         turnarounds: arms at whose far end the road leads back; None is as in the networks of the
             authors.
+        waits: whether vehicles that turn far have a place to wait inside. Those in the networks of
+            the signals have none.
 
     Raises:
         InputError: another number of arms.
@@ -47,17 +51,20 @@ def published_ways(arms: int, turnarounds: str | None = None) -> tuple[Way, ...]
         rows = list(csv.DictReader(text))
     exits = movements_of(arms).exits.tolist()  # the rows are in their order
     return tuple(
-        _way(row, ARM_NAMES[exit_arm] in turnarounds)
+        _way(row, ARM_NAMES[exit_arm] in turnarounds, waits)
         for row, exit_arm in zip(rows, exits, strict=True)
     )
 
 
-def _way(row: dict[str, str], turns_back: bool) -> Way:
-    numbers = [float(number) for number in row["points"].split()]
-    points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
+def _way(row: dict[str, str], turns_back: bool, waits: bool) -> Way:
+    points = np.array(row["points"].split(), dtype=float).reshape(-1, 2)
+    length, wait = float(row["length_m"]), float(row["wait_m"])
+    if wait > 0.0 and not waits:  # the same curve without a point there
+        points = np.delete(points, np.abs(distances_along(points) - wait).argmin(), axis=0)
+        length, wait = round(float(distances_along(points)[-1]), 2), 0.0
     return Way(
-        points, float(row["length_m"]), float(row["wait_m"]), speed=float(row["speed_mps"]),
-        major=row["major"] == "1",
+        tuple((float(x), float(y)) for x, y in points),
+        length, wait, speed=float(row["speed_mps"]), major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
         turns_back=turns_back,
     )  # fmt: skip

@@ -1,9 +1,7 @@
-"""The recipe of a run. Python, the command line, files and studies all start from one.
+"""The recipe of a run. It gives the same numbers in Python, on the command line and in files.
 
-    run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
-    run.summary()
-
-The same recipe gives the same numbers, wherever it comes from.
+run = Recipe(four_way(250.0), Dim(gate="harmonious"), seed=1, humans=0.2).run()
+run.summary()
 """
 
 from __future__ import annotations
@@ -37,8 +35,7 @@ def _controller(title: str, value: Any) -> Any:
 class Recipe:
     """One run: what is simulated, which controller decides, and the seed.
 
-    Raises:
-        InputError: a value that is not allowed, or humans with a controller other than DIM.
+    `InputError` for a value that is not allowed, or humans with a controller other than DIM.
     """
 
     scenario: Scenario = part("what is simulated", Scenario)
@@ -52,7 +49,7 @@ class Recipe:
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
     label: str = text(
-        "what rows call the controller; its own name where empty", empty=True, default=""
+        "what rows call the controller; its own name if empty", empty=True, default=""
     )
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
@@ -88,14 +85,9 @@ class Recipe:
     def run(self, host: Host | None = None, **options: Any) -> Run:
         """Simulate it, and record what its metrics need.
 
-        Args:
-            host: `minisim.simulate` unless given; takes the same arguments.
-            options: more arguments of the host, such as `record`.
-
-        Raises:
-            InputError: an option that is not allowed, or a scenario that the controller cannot
-                serve.
-            CollisionError: a collision, where `on_collision` is "stop".
+        `host` is `minisim.simulate` by default; `options` are more of its arguments, such as
+        `record`. Raises `InputError` for an option that is not allowed or a scenario that the
+        controller cannot serve, and `CollisionError` for a collision if `on_collision` is "stop".
         """
         from minisim.simulation import simulate
 

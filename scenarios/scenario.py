@@ -40,13 +40,14 @@ class Scenario:
             self.recorded.check(n)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
                 raise InputError(
-                    f"nobody comes within the horizon of {self.horizon:g} s: the first recorded "
-                    f"arrival is at {clock(first)}; `start` says where in the table a run begins"
+                    f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
+                    f"recorded arrival is at {clock(first)}; `start` says where in the table a run "
+                    f"begins"
                 )
 
     @property
     def profile_name(self) -> str:
-        """Name of the profile."""
+        """The name of its profile."""
         return self.profile.name
 
     @property
@@ -63,8 +64,9 @@ class Scenario:
     def rates(self) -> tuple[float, ...]:
         """Mean inflow of each lane [veh/h]."""
         n = self.intersection.n
-        recorded = self.recorded
-        return recorded.rates(n, self.horizon) if recorded is not None else self.demand.rates(n)
+        if self.recorded is not None:
+            return self.recorded.rates(n, self.horizon)
+        return self.demand.rates(n)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""

@@ -9,14 +9,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, integer, number, numbers
+from minisim.errors import InputError, integer, numbers
+
+#: Of every interval here.
+CONFIDENCE = 0.95
 
 #: A queue is growing if its increase exceeds this many standard deviations of chance; a normal
 #: variable does so in 1 % of cases.
 GROWTH_SCORE = 2.326
 
-#: The shortest horizon that can show growth, in travel times on a free road. At this length, the
-#: roads are full at the start of the second quarter.
+#: The shortest horizon that can show growth, in travel times on a free road. In a shorter one, the
+#: roads are still filling in the second quarter, so the last one has more vehicles in any case.
 FILLING = 4.0
 
 
@@ -28,61 +31,48 @@ class Interval(NamedTuple):
     size: int
 
     def __str__(self) -> str:
-        return f"{self.mean:.1f}" if math.isnan(self.half_width) else (
-            f"{self.mean:.1f} ± {self.half_width:.1f}"
-        )  # fmt: skip
+        half_width = "" if math.isnan(self.half_width) else f" ± {self.half_width:.1f}"
+        return f"{self.mean:.1f}{half_width}"
 
 
-def mean_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
-    """Mean and Student-t confidence interval of independent values, t·s/√n (Student 1908).
+def mean_interval(values: Iterable[float]) -> Interval:
+    """Mean and 95 % confidence interval of independent values, t·s/√n (Student 1908).
 
-    Raises:
-        InputError: no values, a value that is not finite, or a confidence outside (0, 1).
+    `InputError` for no values, or for one that is not finite.
     """
-    mean, half_width, count = prediction_interval(values, confidence)
+    mean, half_width, count = prediction_interval(values)
     return Interval(mean, half_width / math.sqrt(count + 1.0), count)
 
 
-def prediction_interval(values: Iterable[float], confidence: float = 0.95) -> Interval:
+def prediction_interval(values: Iterable[float]) -> Interval:
     """Interval for one more independent value, t·s·√(1 + 1/n) about the mean of n values.
 
-    Compare a single published run with this interval, not with the one for the mean. It contains
-    the next normally distributed value with probability `confidence` (Hahn & Meeker 1991,
-    Statistical Intervals, §4.7).
-
-    Raises:
-        InputError: as for `mean_interval`.
+    It contains the next normally distributed value with probability 0.95 (Hahn & Meeker 1991,
+    Statistical Intervals, §4.7), such as a single published run. Raises as `mean_interval`.
     """
     from scipy.special import stdtrit  # takes a tenth of a second to import
 
     data = numbers("values", values)
-    number("confidence", confidence, above=0, below=1)
-    count = len(data)
-    if not count:
+    if not (count := len(data)):
         raise InputError("a mean needs at least one value")
     mean = math.fsum(data) / count
     if count == 1:
         return Interval(mean, math.nan, 1)
     variance = math.fsum((value - mean) ** 2 for value in data) / (count - 1)
-    t = float(stdtrit(count - 1, (1.0 + confidence) / 2.0))
+    t = float(stdtrit(count - 1, (1.0 + CONFIDENCE) / 2.0))
     return Interval(mean, t * math.sqrt(variance * (1.0 + 1.0 / count)), count)
 
 
-def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Confidence interval for the mean of a Poisson variable, from a single value.
+def poisson_interval(count: int) -> tuple[float, float]:
+    """Exact 95 % confidence interval for the mean of a Poisson variable, from a single value.
 
-    Exact: at the upper end, `count` or fewer events have probability (1−confidence)/2; at the lower
-    end, `count` or more do (Garwood 1936). After 0 events the upper end is −ln((1−confidence)/2),
-    which is 3.7 for 0.95.
-
-    Raises:
-        InputError: `count` is not a count, or a confidence outside (0, 1).
+    At the upper end, `count` or fewer events have probability 2.5 %; at the lower end, `count` or
+    more do (Garwood 1936). After 0 events the upper end is 3.7. `InputError` for a negative count.
     """
     from scipy.special import gammainccinv, gammaincinv
 
     integer("count", count, low=0)
-    number("confidence", confidence, above=0, below=1)
-    tail = (1.0 - confidence) / 2.0
+    tail = (1.0 - CONFIDENCE) / 2.0
     low = float(gammaincinv(count, tail)) if count else 0.0
     return low, float(gammainccinv(count + 1, tail))
 
@@ -94,13 +84,9 @@ def growing(growth: float, trips: int) -> bool:
     random walk of variance λ per second. The means of two windows of length T/4 that begin T/2
     apart differ with variance λ(T/2 − T/12) = 5/12 λT: the integral of the walk's covariance
     min(s, t) over both windows. λT is the expected number of trips. A queue with capacity to spare
-    returns to its mean and differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals,
-    0.2 % are classed as growing at a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3. Sums over
-    runs reveal slower growth: of cells of ten such hours, none is classed as growing at 0.95, 6 %
-    at 1, 98 % at 1.1.
-
-    A horizon of less than four travel times (`FILLING`) shows nothing: the roads are still filling
-    in the second quarter, so the last one has more vehicles in any case.
+    differs less. Of 2000 hours of an M/D/1 queue with 350 arrivals, 0.2 % are classed as growing at
+    a load of 0.95, 1 % at 1, 16 % at 1.1 and 88 % at 1.3; of cells of ten such hours, none at 0.95,
+    6 % at 1 and 98 % at 1.1. A horizon below `FILLING` shows nothing.
     """
     return growth > GROWTH_SCORE * math.sqrt(5.0 / 12.0 * trips)
 
@@ -108,11 +94,9 @@ def growing(growth: float, trips: int) -> bool:
 def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
     """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
 
-    The two-sample statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for
-    samples that do not overlap. scipy's own version takes a second to import.
-
-    Raises:
-        InputError: a sample is empty or contains a value that is not finite.
+    The statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for samples that
+    do not overlap; scipy's takes a second to import. `InputError` for an empty sample or a value
+    that is not finite.
     """
     samples = [np.sort(np.asarray(numbers("sample", s))) for s in (first, second)]
     if not all(map(len, samples)):

@@ -15,7 +15,6 @@ minisim's own tests use them, and yours can too: `pip install 'minisim[testing]'
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -23,10 +22,9 @@ from minisim.arrivals import Demand
 from minisim.control import Controller
 from minisim.errors import MissingExtraError
 from minisim.junction.geometry import MIN_ANGLE, Intersection
-from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
-from scenarios.profiles import FAIR, PAPER, PROFILES, Profile
+from scenarios.profiles import FAIR, PAPER, PROFILES
 from scenarios.scenario import Scenario
 
 try:
@@ -80,32 +78,20 @@ def vehicles(draw: st.DrawFn) -> VehicleType:
     return replace(made, max_deceleration=draw(floats(max(6.0, made.needed_braking), 12.0)))
 
 
-def movements(intersection: Intersection) -> st.SearchStrategy[Movement]:
-    """Any movement of the intersection."""
-    return st.sampled_from(intersection.movements)
-
-
 @st.composite
 def demands(draw: st.DrawFn, n: int, max_density: float = 350.0) -> Demand:
     """Balanced or split demand on n lanes, uniform or uneven turns, every arrival model."""
 
-    def shares(count: int) -> st.SearchStrategy[Sequence[float] | None]:
+    def shares(count: int) -> st.SearchStrategy[tuple[float, ...] | None]:
         some = st.lists(st.integers(0, 4), min_size=count, max_size=count).filter(any)
-        return st.none() | some
+        return st.none() | some.map(tuple)
 
-    split = draw(shares(n))
-    turns = draw(shares(n - 1))
     return Demand(
         density=draw(floats(20.0, max_density)),
-        split=None if split is None else tuple(split),
-        turns=None if turns is None else tuple(turns),
+        split=draw(shares(n)),
+        turns=draw(shares(n - 1)),
         model=draw(st.sampled_from(["poisson", "exponential", "shifted"])),
     )
-
-
-def profiles() -> st.SearchStrategy[Profile]:
-    """The ready-made profiles."""
-    return st.sampled_from([PAPER, FAIR])
 
 
 @st.composite
@@ -124,7 +110,7 @@ def scenarios(
         name="random",
         intersection=intersection,
         demand=draw(demands(intersection.n, max_density)),
-        profile=draw(profiles()),
+        profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=horizon,
     )
 

@@ -7,6 +7,8 @@ import hashlib
 import math
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +34,7 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import Run
 from minisim.testing import SmallScenario
@@ -42,6 +45,8 @@ from scenarios.paper import Cell, reference_rows
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.recipe import Recipe
 from scenarios.sweep.rows import identity_of
+from scenarios.sweep.store import Store
+from tests import ROOT
 
 
 def replayed(scenario: Scenario, *trips: tuple[float, int, int], horizon: float) -> Scenario:
@@ -58,7 +63,7 @@ def drained(scenario: Scenario, seed: int, horizon: float) -> Scenario:
 
 
 def queues(vehicle: VehicleType, limit: float = 14.0) -> Scenario:
-    """A scenario in which eight vehicles queue on each of two lanes, and two on each other one."""
+    """A scenario in which eight vehicles queue on each of two lanes, and two on each other lane."""
     profile = dataclasses.replace(FAIR, vehicle=vehicle, speed_limit=limit)
     scenario = four_way(0, profile=profile)
     road = dataclasses.replace(scenario.intersection, arm_length=100.0 + 8 * vehicle.length)
@@ -67,7 +72,7 @@ def queues(vehicle: VehicleType, limit: float = 14.0) -> Scenario:
 
 
 class Greens:
-    """A signal, and whenever a green ended, which vehicles that stood in it were left behind."""
+    """A signal, and for each green the vehicles that stood in it and were left behind."""
 
     name = "greens"
 
@@ -94,9 +99,8 @@ class _Watched:
             if isinstance(command, Close):
                 self._left.append(self._stood & {v.id for v in lane})
             if isinstance(command, Open):
-                self._green, self._stood = command.lane, set()
-        if any(isinstance(command, Open) for command in commands):
-            self._stood = {v.id for v in view.vehicles if v.lane == self._green and v.speed <= 0.1}
+                here = (v for v in view.vehicles if v.lane == command.lane)
+                self._green, self._stood = command.lane, {v.id for v in here if v.speed <= 0.1}
         return commands
 
 
@@ -112,15 +116,10 @@ def digest(run: Run) -> str:
 
 @dataclass(frozen=True)
 class Fixed:
-    """A controller that carries out the same plan and commands in every run.
-
-    Attributes:
-        plan: of its session.
-        first: its commands at time 0; none later.
-    """
+    """A controller with the same plan and commands in every run."""
 
     plan: Plan = field(default_factory=Plan)
-    first: tuple[Command, ...] = ()
+    first: tuple[Command, ...] = ()  # at time 0; none later
     name: str = "fixed"
 
     def start(self, site: Site) -> Session:
@@ -149,24 +148,20 @@ class Deadly:
     """A controller that kills its process, as a bug in compiled code or a lack of memory would.
 
     Attributes:
-        once: a file: where it is, the controller does nothing; it is made before the kill.
-            Empty kills every time.
+        once: as for `killing`, but empty kills every time.
     """
 
     once: str = ""
     name: str = "deadly"
 
     def start(self, site: Site) -> Session:
-        """Kill, or begin a run in which everyone may go (of a scenario without vehicles)."""
-        if not self.once or not Path(self.once).exists():
-            if self.once:
-                Path(self.once).touch()
-            os.kill(os.getpid(), signal.SIGKILL)
+        """Kill, or begin a run in which all vehicles may go (of a scenario without vehicles)."""
+        killing(self.once or "always")
         return Unregulated().start(site)
 
 
 def hardest_braking(run: Run) -> float:
-    """Of any vehicle in any step of a run that recorded all, from the speeds alone [m/s²]."""
+    """The hardest braking in a run that recorded all, from the speeds alone [m/s²]."""
     trace = run.trace[np.lexsort((run.trace["tick"], run.trace["row"]))]
     same = (np.diff(trace["row"]) == 0) & (np.diff(trace["tick"]) == 1)
     return float(-np.diff(trace["v"])[same].min(initial=0.0) / run.site.dt)
@@ -183,7 +178,7 @@ def as_run(scenario: SmallScenario) -> SmallScenario:
 
 
 def killing(once: str) -> int:
-    """A task that kills its process as `Deadly` does: "always", never (""), or where no file is."""
+    """A task that kills its process: "always", never (""), or if there is no such file yet."""
     if once and not Path(once).exists():
         if once != "always":
             Path(once).touch()
@@ -208,12 +203,9 @@ def view(*vehicles: Observed, time: float = 0.0) -> View:
 
 @dataclass(frozen=True)
 class Reading:
-    """A perception that errs in intents as told.
+    """A perception that errs in intents as told."""
 
-    Attributes:
-        read: a view, an ego and a vehicle -> the manoeuvre that the ego reads.
-    """
-
+    #: A view, an ego and a vehicle -> the manoeuvre that the ego reads.
     read: Callable[[View, Observed, Observed], int]
     period: float | None = 0.1
 
@@ -224,7 +216,7 @@ class Reading:
 
 
 def said(commands: Iterable[Command]) -> list[str]:
-    """Commands in words; as a reader would say it."""
+    """Commands in words."""
     return [f"{type(command).__name__} {dataclasses.astuple(command)[0]:g}" for command in commands]
 
 
@@ -240,7 +232,7 @@ def drive(
     until: float,
     vehicles: Callable[[float], tuple[Observed, ...]] = lambda time: (),
 ) -> dict[float, list[str]]:
-    """Commands by time of a session that a host wakes when it asked for it, and then only."""
+    """Commands by time of a session that a host wakes only when it asks for it."""
     session = controller.start(site)
     answers: dict[float, list[str]] = {}
     tick = 0
@@ -273,7 +265,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
     """A queue of the M/M/1 kind, with a little noise from the seed."""
     arms, density = experiment.scenario.intersection.n, experiment.scenario.density
     horizon = experiment.scenario.horizon
-    # The studies of perception name what errs, not a series; that of humans their share.
+    # Studies of perception label what errs, and that of humans their share.
     label, _, share = (experiment.label or "dim").partition("+humans=")
     base = CURVES[label][0] * (1.0 + 5.0 * float(share or 0.0))
     load = density / capacity_of(label, arms)
@@ -298,12 +290,12 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
         "depart_delay_s": 10.0 * max(load - 1.0, 0.0),
     }
     groups = ("human", "automated") if share else ()
-    return {
-        **{
-            f"kinds_{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
-            for k, group in enumerate(groups)
-            for key, value in times.items()
-        },
+    kinds = {
+        f"kinds_{group}_complete_{key}": (k + 1.0) * value if float(share) + k < 2.0 else None
+        for k, group in enumerate(groups)
+        for key, value in times.items()
+    }
+    return kinds | {
         **identity_of(experiment), "trips": trips, "unfinished": 9, "collisions": 0, **times,
         **{f"complete_{key}": value for key, value in times.items()},
         **lanes, **tally(experiment, trips), "queue_growth": excess, "growing": excess > 0.0,
@@ -312,7 +304,7 @@ def synthetic_row(experiment: Recipe) -> dict[str, Any]:
 
 
 def tally(experiment: Recipe, trips: int) -> dict[str, float]:
-    """Counts of `dim.senses.tally`, in proportion to the intent errors; none where none errs."""
+    """Counts of `dim.senses.tally`, in proportion to the intent errors, if there are any."""
     controller = experiment.controller
     if not isinstance(controller, Dim) or controller.perception.period is None:
         return {}
@@ -331,7 +323,7 @@ def synthetic_find(experiments: Sequence[Recipe]) -> list[Mapping[str, Any] | No
 
 
 def free_flow(seconds: float) -> dict[str, float | None]:
-    """Columns of a run of an hour with this travel time on a free road."""
+    """Columns of a run of an hour with this travel time on a free road [s]."""
     return {
         "horizon_s": 3600.0, "warmup_s": 0.0, "travel_time_s": seconds + 10.0, "time_loss_s": 10.0,
         "complete_travel_time_s": seconds, "complete_time_loss_s": 30.0,
@@ -346,3 +338,23 @@ def share(part: float) -> settings:
 def reference_value(cell: Cell, metric: str, lane: str = "all") -> float:
     """One published mean [s]."""
     return float(reference_rows(cell, metric, lane)["value"].item())
+
+
+def python(
+    *arguments: str, cwd: Path = ROOT, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with the project's code in a process of its own, and wait for it."""
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+    )  # fmt: skip
+
+
+def stored(path: Path) -> int:
+    """The number of rows in a store, even while a process makes it."""
+    try:
+        with Store(path, create=False) as store:
+            return len(store)
+    except FileError:
+        assert not path.exists() or not path.stat().st_size, "never a broken store"
+        return 0

@@ -61,7 +61,7 @@ TRIPS = (
 
 
 class Case(NamedTuple):
-    """One run, and what sets it apart from the plain one."""
+    """One run; `extra` sets it apart from the plain one."""
 
     profile: str
     arms: int
@@ -102,7 +102,7 @@ def cases() -> Iterator[Case]:
 
 
 def recipe_of(case: Case) -> Recipe:
-    """What is run; raises `InputError` where the controller does not serve the profile."""
+    """What is run; raises `InputError` if the controller does not serve the profile."""
     extra = dict(case.extra)
     options: dict[str, Any] = {
         "profile": case.profile,
@@ -116,31 +116,25 @@ def recipe_of(case: Case) -> Recipe:
     else:
         make = MAKERS.get(case.arms) or partial(regular, case.arms)
         scenario = make(300.0, **options)
-    vehicle = scenario.profile.vehicle
-    if "model" in extra or "deviation" in extra:
-        vehicle = replace(
-            vehicle,
-            model=extra.get("model", vehicle.model),
-            speed_deviation=extra.get("deviation", vehicle.speed_deviation),
-        )
+    fields = {"model": "model", "deviation": "speed_deviation"}
+    if change := {field: extra[key] for key, field in fields.items() if key in extra}:
+        vehicle = replace(scenario.profile.vehicle, **change)
         scenario = replace(scenario, profile=replace(scenario.profile, vehicle=vehicle))
     controller: Any = controller_named(case.controller, case.profile)
+    changes: dict[str, Any] = {"monitor": Monitor()} if extra.get("monitor") else {}
     if "noise" in extra:
         error, kind, shared, lasting = extra["noise"]
-        senses = NoisyPerception(error, kind, shared=shared, persistent=lasting)
-        controller = replace(controller, perception=senses)
+        changes["perception"] = NoisyPerception(error, kind, shared=shared, persistent=lasting)
     if "confidence" in extra:
-        senses = NoisyPerception(0.15, "missed", confidence=extra["confidence"])
-        controller = replace(controller, perception=senses)
-    if extra.get("monitor"):
-        controller = replace(controller, monitor=Monitor())
+        changes["perception"] = NoisyPerception(0.15, "missed", confidence=extra["confidence"])
+    controller = replace(controller, **changes) if changes else controller
     return Recipe(
         scenario, controller, case.seed, humans=extra.get("humans", 0.0), on_collision="record"
     )
 
 
 def run_of(case: Case) -> Run:
-    """The run, with everything recorded, or the junction alone where steps are short."""
+    """The run, with everything recorded, or only the junction if steps are short."""
     record = "junction" if case.profile == "as_run" else "all"
     return recipe_of(case).run(record=record)
 

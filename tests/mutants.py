@@ -6,9 +6,9 @@
     python tests/mutants.py table                  # how many, by module
     python tests/mutants.py sample 80              # names of mutants drawn at random, to `run`
 
-As it comes, mutmut has pytest collect the tests anew for every mutant, which takes longer than to
-run them. Here they are collected once, and each mutant is tried in a fork of that process: by the
-tests that reach the changed function, fast ones first, up to the first that fails.
+mutmut itself has pytest collect the tests anew for every mutant, which takes longer than running
+them. Here they are collected once, and each mutant is tried in a fork of that process by the tests
+that reach the changed function, fast ones first, up to the first that fails.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from scipy.stats import binomtest
 
 from minisim.files import markdown_table
 
-#: A mutant is tried with so many seconds of tests, as they take with the original.
+#: Each mutant gets the tests that take so many seconds with the original.
 BUDGET = float(os.environ.get("MUTANTS_BUDGET", "12"))
 
 #: CPU time that a test may take with a mutant [s]: so much, and so many times its usual time.
@@ -48,14 +48,12 @@ FAILS, HANGS = 1, 36
 
 
 class EmptyCaches:
-    """A plugin of pytest: nothing that a function of `dim` once answered outlives a test.
+    """A plugin of pytest that empties the caches of `dim` before each test.
 
-    A cached answer of the original would hide a mutant, and a test that is served from a cache
-    would not be known to reach the function behind it.
+    A cached answer would hide a mutant, and that the test reaches the function behind it.
     """
 
     def pytest_runtest_setup(self) -> None:
-        """Before each test."""
         for name, module in list(sys.modules.items()):
             if name.partition(".")[0] == "dim":
                 for value in vars(module).values():

@@ -95,7 +95,10 @@ class GapSession(PhaseSession):
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
             if v.id not in self._passed:
-                self._left[v.lane] = view.time
+                past = free - v.distance - v.length
+                self._left[v.lane] = view.time - (
+                    past / v.speed if self._exact and v.speed > 0.0 else 0.0
+                )
             elif self._signal.presence and v.distance >= 0.0:
                 self._left[v.lane] = max(self._left[v.lane], view.time - self._ago)
         self._passed = {v.id for v in passed}

@@ -32,7 +32,7 @@ class Adaptive:
     goes on while the other lanes are empty.
 
     A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
-    its way. Time loss is relative to the speed limit, whatever speed a driver would like.
+    its way. Time loss is relative to the speed that the driver would like (`MSE2Collector`).
     Defaults are SUMO's, except for greens and amber, which are from the authors' network.
     """
 
@@ -77,8 +77,12 @@ class DelaySession(PhaseSession):
     def see(self, view: View) -> None:
         """Note when and where a vehicle comes onto a detector."""
         for v in view.vehicles:
-            if v.id not in self._entered and 0.0 < v.distance <= self._signal.detector_range:
-                self._entered[v.id] = view.time, v.distance
+            reach = self._signal.detector_range
+            if v.id not in self._entered and 0.0 < v.distance <= reach:
+                # SUMO also counts the part of the step after the entry.
+                past = (reach - v.distance) if self._exact and v.speed > 0.0 else 0.0
+                since = view.time - (past / v.speed if past else 0.0)
+                self._entered[v.id] = since, v.distance + past
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
@@ -88,10 +92,11 @@ class DelaySession(PhaseSession):
         self._entered = {v.id: self._entered[v.id] for v in approaching}
         limit, now = self._speed_limit, view.time
         times = [
-            v.distance / limit
+            self.duration(v.distance / limit)
             for v in approaching
             if v.lane == lane
-            and time_loss(*self._entered[v.id], now, v.distance, limit) > signal.min_time_loss
+            and time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
+            > signal.min_time_loss
         ]
         in_time = [time for time in times if elapsed + time <= signal.max_green]
         prolongation = max(0.0, signal.min_green - elapsed, *in_time)

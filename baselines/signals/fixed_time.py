@@ -150,6 +150,8 @@ class FixedTimeSession:
         self.plan = Plan(wake_on_clear=True, sight=stopping_sight(site))
         self._program = program
         self._heads = Heads(site)
+        # In SUMO, a switch acts on the move that ends at its time.
+        self._early = site.dt if site.vehicle.looks_out else 0.0
         self._half_step = site.dt / 2.0
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -157,6 +159,6 @@ class FixedTimeSession:
 
         Timers ring on whole steps: a switch less than half a step away is due.
         """
-        now = view.time + self._half_step
+        now = view.time + self._half_step + self._early
         wanted = self._program.colours(now)
-        return [*self._heads.show(view, wanted), Wake(self._program.next_switch(now))]
+        return [*self._heads.show(view, wanted), Wake(self._program.next_switch(now) - self._early)]

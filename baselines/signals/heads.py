@@ -1,18 +1,20 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. At the end of a green, vehicles that can no longer stop
-comfortably keep their right of way; all others stop.
+depend on the length of an amber. Where vehicles look out for those that cross (`VehicleType`), it
+turns green at once, as the published signals did. At the end of a green, vehicles that can no
+longer stop comfortably keep their right of way; all others stop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from minisim.carfollowing import braking_distance
 from minisim.control import (
     COMMIT_MARGIN,
     Close,
@@ -28,6 +30,7 @@ from minisim.control import (
 from minisim.errors import InputError, choice, integer, items
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked
+from minisim.vehicle import CruiseVehicle
 
 #: The fastest driver's factor on the speed limit, where drivers differ (`VehicleType`).
 FASTEST_DRIVER = 2.0
@@ -59,7 +62,15 @@ class Heads:
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
-        self._deceleration = site.vehicle.deceleration
+        b, dt = site.vehicle.deceleration, site.dt
+        self._stops = lambda v: can_stop(v, b)
+        self._open = [Colour.GREEN]
+        if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
+            self._open += [Colour.AMBER]
+            self._stops = lambda _: True  # dead, see there
+        elif site.vehicle.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
+            self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
+        self._at_once = site.vehicle.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * n
 
@@ -72,7 +83,7 @@ class Heads:
         self._let_go.intersection_update(v.id for v in view.vehicles)
         for lane, colour in enumerate(wanted):
             if colour is not Colour.GREEN:
-                if self.colours[lane] is Colour.GREEN:
+                if self.colours[lane] in self._open and colour not in self._open:
                     commands += self._close(lane, view)
                 self.colours[lane] = colour
         for lane, colour in enumerate(wanted):
@@ -82,7 +93,7 @@ class Heads:
         return commands
 
     def _close(self, lane: int, view: View) -> list[Command]:
-        going = committed([v for v in view.vehicles if v.lane == lane], self._deceleration)
+        going = committed([v for v in view.vehicles if v.lane == lane], self._stops)
         self._let_go.update(v.id for v in going)
         return [Close(lane), *(Go(v.id) for v in going)]
 
@@ -93,7 +104,7 @@ class Heads:
             for other, colour in enumerate(self.colours)
         ):
             return False
-        return not any(
+        return self._at_once or not any(
             (v.distance < 0.0 or v.id in self._let_go)
             and self._crossed[lane][self._rows[v.lane][v.manoeuvre]]
             for v in view.vehicles
@@ -130,14 +141,14 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
     return order
 
 
-def committed(lane: Iterable[Observed], deceleration: float) -> list[Observed]:
+def committed(lane: Iterable[Observed], stops: Callable[[Observed], bool]) -> list[Observed]:
     """The vehicles before the junction that keep their right of way when their lane is closed.
 
-    Comfortable braking [m/s²] can no longer stop them, or a vehicle behind them, before the
-    junction. `lane` holds the vehicles of one lane, front to back.
+    They, or a vehicle behind them, can no longer stop before the junction. `lane` holds the
+    vehicles of one lane, front to back.
     """
     approaching = [v for v in lane if v.distance >= 0.0]
-    last = max((i for i, v in enumerate(approaching) if not can_stop(v, deceleration)), default=-1)
+    last = max((i for i, v in enumerate(approaching) if not stops(v)), default=-1)
     return approaching[: last + 1]
 
 

@@ -15,6 +15,9 @@ from baselines.signals.heads import Colour, Heads, full_order, stopping_sight
 from minisim.control import Command, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, number
 
+#: Views are exact to a microsecond [s].
+TICK = 1e-6
+
 
 def check_greens(shortest: float, longest: float) -> None:
     """Raise `InputError` if the longest green is below the shortest [s]."""
@@ -63,6 +66,9 @@ class PhaseSession:
         self._order = full_order(order, site.intersection.n)
         self._heads = Heads(site)
         self._dt = site.dt
+        self._exact = site.vehicle.looks_out  # times its events like SUMO
+        self._early = site.dt - TICK if self._exact else site.dt / 2.0
+        self._rang = 0.0  # when the last timer was due
         self._min_green, self._amber = min_green, amber
         self._lane = self._next = self._order[0]
         self._colour = Colour.GREEN
@@ -83,18 +89,25 @@ class PhaseSession:
     def decide(self, view: View) -> Iterable[Command]:
         """End the phase or the amber when it is time, and turn the heads.
 
-        Timers ring on whole steps: what is less than half a step away is due.
+        Timers ring on whole steps: what is less than half a step away is due. In SUMO, what is less
+        than a whole step away is due, an event counts from the one before, and it acts on the move
+        that ends at its time (`MSEventControl::execute`).
         """
+        if self._exact and view.time > 0.0:
+            view = view._replace(time=round(view.time + self._dt, 6))
         self.see(view)
-        if view.time + self._dt / 2.0 >= self._due:
+        while view.time + self._early >= self._due:
+            self._rang = self._due
             self._go_on(view)
         wanted = [Colour.RED] * len(self._order)
         wanted[self._lane] = self._colour
         commands = self._heads.show(view, wanted)
         if self._began is None and self._heads.colours[self._lane] is Colour.GREEN:
             self._began = view.time
-            self._due = view.time + self._min_green
-        return commands if math.isinf(self._due) else [*commands, Wake(self._due)]
+            self._due = self._since(view) + self._min_green
+        if math.isinf(self._due):
+            return commands
+        return [*commands, Wake(self._due - (self._dt + self._early if self._exact else 0.0))]
 
     def _go_on(self, view: View) -> None:
         if self._began is None:  # the amber is over; the green comes when the way is clear
@@ -103,14 +116,22 @@ class PhaseSession:
         # Times in views are exact to a microsecond.
         verdict = self.judge(view, self._lane, round(view.time - self._began, 6))
         if verdict.lane == self._lane:
-            self._due = view.time + max(verdict.after, self._dt)
+            self._due = self._since(view) + max(verdict.after, 0.0 if self._exact else self._dt)
             return
         self._next, self._began = verdict.lane, None
         if self._amber > 0.0:
             self._colour = Colour.AMBER
-            self._due = view.time + max(self._amber, self._dt)
+            self._due = self._since(view) + max(self._amber, self._dt)
         else:
             self._go_on(view)
+
+    def _since(self, view: View) -> float:
+        """The time from which the next timer counts [s]."""
+        return self._rang if self._exact else view.time
+
+    def duration(self, time: float) -> float:
+        """A time as its timers measure it [s]: SUMO's count milliseconds."""
+        return round(time, 3) if self._exact else time
 
 
 def on_detector(view: View, detector_range: float) -> list[Observed]:

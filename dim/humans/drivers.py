@@ -1,11 +1,11 @@
 """Human drivers: which vehicles have one, what they signal, and which gaps they accept.
 
 The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20, two-way stop
-control, base values for a two-lane major street. They are for drivers that have stopped at a stop
-sign on the minor street: streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in
-right-hand traffic. At an unsignalised junction of equal roads, an all-way stop (HCM chapter 21),
-all drivers stop and none accepts gaps. Drivers here do both: among themselves, the first
-to stop goes first, and they accept gaps between vehicles that need not stop.
+control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
+in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
+junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
+Drivers here do both: among themselves, the first to stop goes first, and they accept gaps between
+vehicles that need not stop.
 """
 
 from __future__ import annotations
@@ -25,17 +25,14 @@ from minisim.streams import Draws
 #: on, which is false for turns that no indicator announces.
 TRUSTS = ("motion", "signals", "silence")
 
-#: What a draw is for.
-_HUMAN, _CARELESS, _GAP = range(3)
+_HUMAN, _CARELESS, _GAP = range(3)  # what a draw is for
 
 
 @declared(kw_only=True)
 class Humans:
-    """How people drive. Triples are for the near turn, straight on, and the far turn.
+    """How people drive. Triples are for the near turn, straight on, and the far turn."""
 
-    Sources: critical gaps HCM exhibit 20-17, follow-up times exhibit 20-18.
-    """
-
+    # Critical gaps: HCM exhibit 20-17; follow-up times: exhibit 20-18.
     critical_gaps: tuple[float, float, float] = reals(
         "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
         count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
@@ -44,17 +41,16 @@ class Humans:
         "shortest time between two drivers of one lane", "s",
         count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
     )  # fmt: skip
-    # Log-normal over drivers, as in the usual maximum-likelihood estimate (Tian et al. 1999,
-    # Transp. Res. A 33:187). In the HCM all drivers are alike; we know of no published value for
-    # these junctions.
+    # Log-normal over drivers, as usual (Tian et al. 1999, Transp. Res. A 33:187). In the HCM all
+    # drivers are alike; we know of no published value for these junctions.
     deviation: float = real(
         "standard deviation of a driver's critical gap over its mean; 0 makes all alike",
         low=0, high=1, default=0.0, label="deviation of critical gaps",
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A vehicle with the right of way moves off within a few steps. A driver must look for
-    # longer than that to see it coming.
+    # (AASHTO). A driver must look for longer than a vehicle with the right of way takes to move
+    # off, which is a few steps.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
@@ -81,10 +77,7 @@ class Driver(NamedTuple):
 
 
 class Drivers:
-    """The drivers of one run, by lane and rank in it. They depend on seed and share only.
-
-    A vehicle with a human driver at some share has one at every larger share.
-    """
+    """The drivers of a run, by lane and rank in it; a human at one share is one at any larger."""
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
         self._share = share
@@ -103,16 +96,14 @@ class Drivers:
 
 
 class Readings:
-    """The ways that a vehicle's indicator and motion leave open to it, as others see them.
-
-    Where two ways of a lane are `CLEARANCE` apart, a vehicle's place shows which of them it takes.
-    """
+    """The ways that a vehicle's indicator and place leave open to it, as others see them."""
 
     def __init__(self, humans: Humans, site: Site, drivers: Drivers) -> None:
         self.turns = turns(site.intersection)
         self._silent = (humans.unsignalled[0], 1.0, humans.unsignalled[1])
         self.drivers = drivers
         self._rows = site.intersection.movements.rows
+        # Beyond the parting of two ways, a vehicle's place shows which of them it takes.
         self._parting = parting(site.intersection, CLEARANCE).tolist()
 
     def index(self, vehicle: Observed) -> int:

@@ -2,22 +2,21 @@
 
 DIM yields. A human in the yellow zone may start at any time, so it counts as crossing: a DIM
 vehicle enters only if it is in harmony with everything the human may do. A human stops at the hold
-line as at an all-way stop (a junction of equal roads) and looks. After its reaction time it goes if
+line as at an all-way stop and looks at positions, speeds and indicators; it sees no right of way.
+After its reaction time it goes if
 
 - every human that stopped before it and is in its way has gone,
 - every vehicle inside is out of its way,
 - no DIM vehicle is rolling through its yellow zone, and none arrives within the critical gap.
 
-It sees positions, speeds and indicators, never a right of way.
-
-No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`). When a human
-starts, the DIM vehicles in conflict with it stand or are outside the yellow zone, and get no
-right of way until it has left. A standing DIM vehicle has none: with the junction empty, it would
-have moved off one step after being granted it, before a driver can look.
+No vehicles collide, unless some trust silence (`dim.humans.drivers.TRUSTS`). When a human starts,
+the DIM vehicles in conflict with it stand or are outside the yellow zone, and get no right of way
+until it has left. A standing DIM vehicle has none: with the junction empty, it would have moved off
+one step after being granted it, before a driver can look.
 
 No vehicles wait in a circle: DIM waits for humans, and no human waits for a DIM vehicle that
-stands. So drivers must be able to recognise DIM vehicles, say by marker lamps for automated driving
-(SAE J3134). Otherwise each would let the other go first.
+stands. So drivers must recognise DIM vehicles, say by marker lamps for automated driving (SAE
+J3134). Otherwise each would let the other go first.
 """
 
 from __future__ import annotations
@@ -34,10 +33,8 @@ from minisim.junction.conflicts import clearing_distances
 from minisim.junction.movements import Movements
 from minisim.parameters import declared, part, real, word
 
-#: A driver stands at the line when its front is at most this far before it [m].
-LINE = 1.0
-#: How often a driver at the junction looks at the others [s].
-LOOK = 0.2
+LINE = 1.0  #: a driver stands at the line when its front is at most this far before it [m]
+LOOK = 0.2  #: how often a driver at the junction looks at the others [s]
 
 
 @declared
@@ -87,15 +84,15 @@ class MixedSession:
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """What wrong perception has done to the DIM vehicles (`dim.senses.tally`)."""
+        """What wrong perception has done to DIM (`dim.senses.tally`)."""
         return self._dim.counts
 
     def decide(self, view: View) -> Iterable[Command]:
         """Let all vehicles decide, from the same view."""
         commands = [*self._dim.decide(view), *self._humans.decide(view)]
-        wakes = [command for command in commands if isinstance(command, Wake)]
+        wakes = [command.time for command in commands if isinstance(command, Wake)]
         others = [command for command in commands if not isinstance(command, Wake)]
-        return [*others, min(wakes, key=lambda wake: wake.time)] if wakes else others
+        return [*others, Wake(min(wakes))] if wakes else others
 
 
 def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, View], View]:
@@ -119,11 +116,7 @@ def _caution(mixed: Mixed, site: Site, readings: Readings) -> Callable[[View, Vi
 
 
 def _taken(
-    view: View,
-    ways: Mapping[int, list[int]],
-    drivers: Drivers,
-    start: float,
-    movements: Movements,
+    view: View, ways: Mapping[int, list[int]], drivers: Drivers, start: float, movements: Movements
 ) -> Iterable[Observed]:
     """The vehicles of a view as DIM interprets them.
 
@@ -169,14 +162,9 @@ class _Humans:
         for vehicle in view.vehicles:  # front to back
             if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
                 heads.setdefault(vehicle.lane, vehicle)
-        here = [
-            v
-            for v in heads.values()
-            if drivers[v.lane, v.rank].human and v.distance <= self._yellow
-        ]
-        rolling = [
-            v for v in heads.values() if v.speed > HALTING and not drivers[v.lane, v.rank].human
-        ]
+        people = [v for v in heads.values() if drivers[v.lane, v.rank].human]
+        here = [v for v in people if v.distance <= self._yellow]
+        rolling = [v for v in heads.values() if v.speed > HALTING and v not in people]
         before = self._standing
         self._standing = {
             v.id: before.get(v.id, now)
@@ -188,7 +176,7 @@ class _Humans:
         commands: list[Command] = []
         waiting: list[Observed] = []
         for vehicle in queue:
-            free = self._is_free(vehicle, waiting, crossing, rolling)
+            free = self._is_free(vehicle, (*waiting, *crossing), rolling)
             if free and self._is_ready(vehicle, now):
                 commands.append(Go(vehicle.id))
                 self._gone.add(vehicle.id)
@@ -206,24 +194,18 @@ class _Humans:
         return now + self._dt / 2.0 >= max(looked, followed)
 
     def _is_free(
-        self,
-        vehicle: Observed,
-        waiting: Iterable[Observed],
-        crossing: Iterable[Observed],
-        rolling: Iterable[Observed],
+        self, vehicle: Observed, there: Iterable[Observed], rolling: Iterable[Observed]
     ) -> bool:
         """Whether no vehicle is in the way of a driver at the line, or comes too soon."""
         own = self._readings.index(vehicle)
-        gap = (
-            self._drivers[vehicle.lane, vehicle.rank].gap
-            * self._humans.critical_gaps[self._readings.turns[own]]
-        )
+        mean_gap = self._humans.critical_gaps[self._readings.turns[own]]
+        gap = self._drivers[vehicle.lane, vehicle.rank].gap * mean_gap
         comes = [v for v in rolling if v.distance <= max(self._yellow, gap * v.speed)]
         clearing = self._clearing[own]
         trust = self._humans.trust
         # The distances are minus infinity where ways do not conflict.
         return not any(
             clearing[way] + min(other.distance, 0.0) > 0.0
-            for other in (*waiting, *crossing, *comes)
+            for other in (*there, *comes)
             for way in self._readings.possible(other, trust)
         )

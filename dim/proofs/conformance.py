@@ -2,8 +2,8 @@
 
     simulate(scenario, Checked(Dim()))
 
-behaves like `Dim()` on any host, but raises an error where the host or the session does something
-that `dim.proofs.protocol` does not allow. So what was proved about the model holds for the run.
+behaves like `Dim()` on any host, but raises an error if the host or the session does what
+`dim.proofs.protocol` does not allow. So what was proved about the model holds for the run.
 """
 
 from __future__ import annotations
@@ -57,10 +57,7 @@ class CheckedSession:
         self._going: set[int] = set()
 
     def decide(self, view: View) -> Iterable[Command]:
-        """DIM's commands, checked.
-
-        Raises `ConformanceError` if an event since the last view, or a command, is not possible.
-        """
+        """DIM's commands; `ConformanceError` if one, or what has happened, is not possible."""
         commands = list(self._session.decide(view))
         self._follow(view)
         self.state = self.protocol.look(self.state)
@@ -73,7 +70,7 @@ class CheckedSession:
         near = [v for v in view.vehicles if v.distance <= self._start]
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
         inside = {v.id: 1 << self.protocol.matrix.index(v.movement) for v in near if v.distance < 0}
-        for lane, vehicle in list(self._fronts.items()):
+        for lane, vehicle in self._fronts.items():
             now = fronts.get(lane)
             if now is not None and now.id == vehicle:
                 self._move(view, now)

@@ -1,9 +1,8 @@
 """Whether the protocol is safe and live, found by visiting all its states one by one.
 
-Safe: no two conflicting movements are inside at once. Live: whenever vehicles are there, one of
-them can go on once all have looked; and since every move except slowing down takes a vehicle
-forward, the junction empties if no new ones come. Fair: no vehicle waits forever while others
-come and cross.
+Safe: no two conflicting movements are inside at once. Live: whenever vehicles are there, one can go
+on once all have looked; every move except slowing down takes a vehicle forward, so the junction
+empties if no new ones come. Fair: no vehicle waits forever while others come and cross.
 """
 
 from __future__ import annotations
@@ -17,19 +16,14 @@ import networkx as nx
 from dim.proofs.protocol import TURN, WAITING, Event, Protocol, State
 from minisim.errors import InputError, instance, integer
 
-#: The most states to visit: they take about a gigabyte of memory.
-MAX_STATES = 3_000_000
+MAX_STATES = 3_000_000  #: the most states to visit: they take about a gigabyte of memory
 
 Path = tuple[Event, ...]
-
-#: States, and the event that happens in each.
-Steps = tuple[tuple[State, Event], ...]
+Steps = tuple[tuple[State, Event], ...]  #: states, and the event that happens in each
+Visited = Callable[[int], object]  #: called with the number of states visited
 
 #: State -> the state from which it was first reached, and the event; nearest first.
 Reached = dict[State, tuple[State, Event] | None]
-
-#: Called with the number of states visited.
-Visited = Callable[[int], object]
 
 
 @dataclass(frozen=True)
@@ -46,10 +40,7 @@ class Exploration:
 
 @dataclass(frozen=True)
 class Lasso:
-    """How a lane's front vehicle waits forever: the events that lead there, then the repeated ones.
-
-    All vehicles look after each event, and a vehicle that can go on eventually does.
-    """
+    """How a lane's front vehicle waits forever: the events that lead there, then those repeated."""
 
     lane: int
     stem: Path
@@ -59,10 +50,7 @@ class Lasso:
 def explore(
     protocol: Protocol, max_states: int = MAX_STATES, progress: Visited | None = None
 ) -> Exploration:
-    """Visit every reachable state, nearest first, or stop after the nearest unsafe ones.
-
-    Raises `InputError` if there are more than `max_states`.
-    """
+    """Visit states, nearest first, up to the first unsafe ones; `InputError` beyond the limit."""
     instance("protocol", protocol, Protocol)
     integer("max_states", max_states, low=1)
     reached: Reached = {protocol.start: None}
@@ -101,12 +89,19 @@ def is_stuck(protocol: Protocol, state: State) -> bool:
 def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
     """For each lane, the shortest way for its front vehicle to wait forever, or None.
 
-    None is a proof over all states that it cannot. The proof assumes that all vehicles look between
-    any two events, that a vehicle that can go on eventually does, and that a turn of the rotating
-    priority is long enough for a decision.
+    None is a proof over all states that it cannot, if all vehicles look between any two events, a
+    vehicle that can go on eventually does, and a turn of the rotating priority is long enough for
+    a decision.
     """
     instance("protocol", protocol, Protocol)
-    reached = _reached(protocol)
+    reached: Reached = {protocol.start: None}
+    queue = deque([protocol.start])
+    while queue:
+        state = queue.popleft()
+        for event, after in prompt(protocol, state):
+            if after not in reached:
+                reached[after] = state, event
+                queue.append(after)
     return tuple(_starving(protocol, reached, lane) for lane in range(protocol.matrix.n))
 
 
@@ -118,7 +113,8 @@ def _starving(protocol: Protocol, reached: Reached, lane: int) -> Lasso | None:
                 if _waits(after, lane):
                     graph.add_edge(state, after, event=event)
     for part in list(nx.strongly_connected_components(graph)):
-        if not is_fair(protocol, _steps(graph, part)):
+        steps = graph.subgraph(part).edges(data=True)
+        if not is_fair(protocol, tuple((state, data["event"]) for state, _, data in steps)):
             graph.remove_nodes_from(part)
     return _shortest(protocol, graph, reached, lane) if graph else None
 
@@ -135,25 +131,7 @@ def _waits(state: State, lane: int) -> bool:
     return front is not None and front.phase == WAITING and not front.goes
 
 
-def _reached(protocol: Protocol) -> Reached:
-    """All states that `prompt` can reach."""
-    reached: Reached = {protocol.start: None}
-    queue = deque([protocol.start])
-    while queue:
-        state = queue.popleft()
-        for event, after in prompt(protocol, state):
-            if after not in reached:
-                reached[after] = state, event
-                queue.append(after)
-    return reached
-
-
-def _shortest(
-    protocol: Protocol,
-    graph: nx.DiGraph[State],
-    reached: Reached,
-    lane: int,
-) -> Lasso:
+def _shortest(protocol: Protocol, graph: nx.DiGraph[State], reached: Reached, lane: int) -> Lasso:
     """The fair lasso with the fewest events; `graph` is known to hold a fair cycle."""
     distance: dict[State, int] = {}
     for state, came_from in reached.items():
@@ -191,8 +169,8 @@ def _cycles(graph: nx.DiGraph[State], start: State, length: int) -> Iterator[Ste
 def is_fair(protocol: Protocol, steps: Steps) -> bool:
     """Whether `steps`, repeated forever, get somewhere and leave no other vehicle out.
 
-    A vehicle enters. One that can go on in every state does so. One that is inside in every state
-    leaves (or others follow on the same movement). A turn that can end in every state ends.
+    A vehicle enters. One that can go on in every state does so. One inside in every state leaves
+    (or others follow on the same movement). A turn that can end in every state ends.
     """
     events = {event for _, event in steps}
     states = [state for state, _ in steps]
@@ -209,16 +187,6 @@ def is_fair(protocol: Protocol, steps: Steps) -> bool:
         able &= {lane for lane, f in enumerate(state.fronts) if f and (f.goes or f.phase)}
     staying = {tuple(m) for k, m in enumerate(protocol.matrix.movements) if inside >> k & 1}
     return able <= moving and staying <= passing
-
-
-def _steps(graph: nx.DiGraph[State], part: set[State]) -> Steps:
-    """All steps that stay within `part`."""
-    return tuple(
-        (state, data["event"])
-        for state in part
-        for after, data in graph[state].items()
-        if after in part
-    )
 
 
 def _path(reached: Reached, state: State) -> Path:

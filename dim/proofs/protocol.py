@@ -2,11 +2,10 @@
 
 The protocol sees little of a vehicle's motion: it comes to the front of its lane, starts to roll,
 becomes committed, enters, leaves. So a state holds the front vehicle of each lane before the
-junction (the only one in its lane that decides anything) and the set of movements inside. That is
-enough, however many vehicles follow each other on one movement, so the model is finite without any
-limit on traffic. There is no time: whatever can happen next may happen, in any order and after any
-delay. Every simulated run is a path of this model (`dim.proofs.conformance` checks it), but few
-paths are runs.
+junction (the only one that decides anything) and the set of movements inside. However many vehicles
+follow each other on one movement, the model is finite. There is no time: whatever can happen next
+may happen, in any order and after any delay. Every simulated run is a path of this model
+(`dim.proofs.conformance` checks it), but few paths are runs.
 
 All vehicles look at the same moment, as in `dim.controller`, but after an arbitrary delay.
 """
@@ -24,7 +23,7 @@ from dim.perception import COMMITS
 from minisim.junction.movements import Movement
 from minisim.parameters import declared, part, word
 
-#: Which lane comes first where cliques tie. "fixed": the lanes' own order. "rotating": the lane
+#: Which lane comes first if cliques tie. "fixed": the lanes' own order. "rotating": the lane
 #: whose turn it is, then the others clockwise; a turn ends after a decision at the earliest.
 #: "waiting": the lane whose front vehicle came first, as if every vehicle remembered it forever.
 PRIORITIES = ("fixed", "rotating", "waiting")
@@ -105,11 +104,10 @@ class Protocol:
         that has just entered the junction."""
         for lane, front in enumerate(state.fronts):
             if front is None:
+                came = (*state.came, lane) if self.priorities == "waiting" else ()
                 for manoeuvre in range(1, self.matrix.n):
                     after = self._put(state, lane, Front(manoeuvre, WAITING, False))
-                    if self.priorities == "waiting":
-                        after = after._replace(came=(*state.came, lane))
-                    yield Event("arrive", lane, manoeuvre), after
+                    yield Event("arrive", lane, manoeuvre), after._replace(came=came)
 
     def moves(self, state: State) -> Iterator[Step]:
         """What the vehicles that are there can do."""
@@ -119,26 +117,20 @@ class Protocol:
                 continue
             manoeuvre, phase, goes = front
             if phase == WAITING and goes:
-                to = ROLLING if paper else COMMITTED
-                what = "roll" if paper else "commit"
-                yield (
-                    Event(what, lane, manoeuvre),
-                    self._put(state, lane, Front(manoeuvre, to, True)),
-                )
+                what, to = ("roll", ROLLING) if paper else ("commit", COMMITTED)
+                after = self._put(state, lane, Front(manoeuvre, to, True))
+                yield Event(what, lane, manoeuvre), after
             elif phase == ROLLING:  # with the right of way, or no longer able to stop without it
-                committed = Front(manoeuvre, COMMITTED, goes)
-                yield Event("commit", lane, manoeuvre), self._put(state, lane, committed)
+                after = self._put(state, lane, Front(manoeuvre, COMMITTED, goes))
+                yield Event("commit", lane, manoeuvre), after
             elif phase == COMMITTED and goes:
                 yield Event("enter", lane, manoeuvre), self._enter(state, lane, manoeuvre)
                 if not paper:  # behind a slow vehicle it may become able to stop again
-                    waiting = Front(manoeuvre, WAITING, True)
-                    yield Event("slow", lane, manoeuvre), self._put(state, lane, waiting)
-        inside = state.inside
-        while inside:
-            bit = inside & -inside
-            inside ^= bit
-            movement = self.matrix.movements[bit.bit_length() - 1]
-            yield Event("leave", *movement), state._replace(inside=state.inside ^ bit)
+                    after = self._put(state, lane, Front(manoeuvre, WAITING, True))
+                    yield Event("slow", lane, manoeuvre), after
+        for k, movement in enumerate(self.matrix.movements):
+            if state.inside >> k & 1:
+                yield Event("leave", *movement), state._replace(inside=state.inside ^ 1 << k)
 
     def look(self, state: State) -> State:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
@@ -147,41 +139,34 @@ class Protocol:
         are, and the gate "harmonious" keeps out any that conflict with a crossing one. Of the
         others, only the best clique goes.
         """
-        n, movements = self.matrix.n, self.matrix.movements
-        rows, bits = movements.rows, movements.bits
+        n, rows, bits = self.matrix.n, self.matrix.movements.rows, self.matrix.movements.bits
+        there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]
         occupied = state.inside
-        for lane, front in enumerate(state.fronts):
-            if front is not None and front.phase == COMMITTED:
+        for lane, front in there:
+            if front.phase == COMMITTED:
                 occupied |= bits[lane][front.manoeuvre]
         frozen = bool(occupied) and self.gate == "clear"
         case = 0
-        for lane, front in enumerate(state.fronts):
-            if front is not None and front.phase != COMMITTED:
-                foes = self._foes[rows[lane][front.manoeuvre]]
-                case += 0 if foes & occupied else front.manoeuvre * n**lane
-        chosen = 0 if frozen else self._table(state).lanes(case)
-        fronts = tuple(
-            front
-            if front is None
-            else Front(
-                front.manoeuvre,
-                front.phase,
-                front.phase == COMMITTED or (front.goes if frozen else bool(chosen >> lane & 1)),
-            )
-            for lane, front in enumerate(state.fronts)
-        )
+        for lane, front in there:
+            foes = self._foes[rows[lane][front.manoeuvre]]
+            if front.phase != COMMITTED and not foes & occupied:
+                case += front.manoeuvre * n**lane
+        table = _table(self.matrix, self.order, self.priorities, state.turn, state.came)
+        chosen = 0 if frozen else table.lanes(case)
+        fronts = list(state.fronts)
+        for lane, (manoeuvre, phase, went) in there:
+            goes = phase == COMMITTED or (went if frozen else bool(chosen >> lane & 1))
+            fronts[lane] = Front(manoeuvre, phase, goes)
         decided = state.decided or (self.priorities == "rotating" and not frozen and case > 0)
-        return state._replace(fronts=fronts, decided=decided)
+        return state._replace(fronts=tuple(fronts), decided=decided)
 
     def conflict(self, state: State) -> tuple[Movement, Movement] | None:
         """Two conflicting movements of different arms that are inside at once, or None if safe."""
-        inside = state.inside
-        while inside:
-            k = inside.bit_length() - 1
-            inside ^= 1 << k
-            if self._foes[k] & inside:
-                other = (self._foes[k] & inside).bit_length() - 1
-                return self.matrix.movements[other], self.matrix.movements[k]
+        movements = self.matrix.movements
+        for k in reversed(range(len(movements))):
+            foes = self._foes[k] & state.inside
+            if state.inside >> k & 1 and foes:
+                return movements[foes.bit_length() - 1], movements[k]
         return None
 
     def _enter(self, state: State, lane: int, manoeuvre: int) -> State:
@@ -197,18 +182,8 @@ class Protocol:
     @cached_property
     def _foes(self) -> tuple[int, ...]:
         """For each movement, the movements of other arms that conflict with it, as bits."""
-        movements, values = self.matrix.movements, self.matrix.values
-        return tuple(
-            sum(
-                1 << k
-                for k, other in enumerate(movements)
-                if other.origin != one.origin and not values[i, k]
-            )
-            for i, one in enumerate(movements)
-        )
-
-    def _table(self, state: State) -> DecisionTable:
-        return _table(self.matrix, self.order, self.priorities, state.turn, state.came)
+        conflicts = ~self.matrix.values & self.matrix.movements.apart
+        return tuple(sum(1 << k for k, foe in enumerate(row) if foe) for row in conflicts)
 
 
 @lru_cache(maxsize=4096)

@@ -1,9 +1,8 @@
 """Every case that can arise at a junction, checked one by one against brute force.
 
 The paper argues that each of the 255 cases of 4 arms has one solution, the same for every vehicle
-("Deadlock Analysis"). Here all cases of any matrix are tried. The right decision is found from the
-subsets of the participants, without a graph library. It agrees with `dim.decision` only if both are
-right, or both wrong in the same way.
+("Deadlock Analysis"). Here all cases of any matrix are tried, and the decision is compared with
+one that is found from the subsets of the participants, without a graph library.
 """
 
 from __future__ import annotations
@@ -23,15 +22,12 @@ from dim.perception import Percept
 from minisim.errors import InputError
 
 #: Up to this number of arms, the participants are listed in every order (120 per case with 5 arms);
-#: beyond it (720 with 6), only as each participant would list them: itself first, then the others
-#: around the junction, in either direction.
+#: beyond it, only as each participant would list them: itself first, then the others around the
+#: junction, in either direction.
 ALL_ORDERS = 5
 
-#: A set of lanes, bit i for lane i.
-Lanes = int
-
-#: Called with the number of cases done and the total.
-Progress = Callable[[int, int], object]
+Lanes = int  #: a set of lanes, bit i for lane i
+Progress = Callable[[int, int], object]  #: called with the number of cases done and the total
 
 
 class Cliques(NamedTuple):
@@ -98,15 +94,12 @@ def analyse(
     priorities: Sequence[int] | None = None,
     progress: Progress | None = None,
 ) -> Analysis:
-    """Try all cases of a matrix; 6 arms (46,655 cases) take about 20 s.
-
-    Raises `InputError`: unknown order, not a permutation, or too many cases (8 arms).
-    """
+    """Try all cases (20 s for 6 arms); `InputError` as `DecisionTable`, and from 8 arms on."""
     table = DecisionTable(matrix, order, priorities)
-    if len(table) > MAX_CASES:
+    n, total = matrix.n, len(table)
+    if total > MAX_CASES:
         raise InputError(
-            f"{matrix.n} arms have {len(table)} cases, too many to try them all "
-            f"(at most {MAX_CASES})"
+            f"{n} arms have {total} cases, too many to try them all (at most {MAX_CASES})"
         )
     checks = Case(table)
     failures: Counter[str] = Counter()
@@ -121,22 +114,21 @@ def analyse(
                 failures[name] += 1
                 examples[name] = min(examples.get(name, movements), movements, key=len)
         sizes[table.lanes(case).bit_count()] += 1
-        tied = len(cliques.largest)
+        tied, size = len(cliques.largest), cliques.largest[0].bit_count()
         if tied > max(ties, default=0):
             worst = {}
         ties[tied] += 1
         if tied == max(ties):
-            size = cliques.largest[0].bit_count()
             first, count = worst.get(size, (movements, 0))
             worst[size] = first, count + 1
-        if progress is not None and (case % 256 == 0 or case == len(table)):
-            progress(case, len(table))
+        if progress is not None and (case % 256 == 0 or case == total):
+            progress(case, total)
     claims = tuple(
-        Claim(name, text, len(table), failures[name], examples.get(name))
+        Claim(name, text, total, failures[name], examples.get(name))
         for name, text in Case.CLAIMS.items()
     )
     return Analysis(
-        matrix, table.order, table.priorities, len(table), claims,
+        matrix, table.order, table.priorities, total, claims,
         dict(sorted(sizes.items())), dict(sorted(ties.items())), dict(sorted(worst.items())),
     )  # fmt: skip
 
@@ -151,28 +143,24 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
         rest = subset & (subset - 1)
         lowest = (subset ^ rest).bit_length() - 1
         clique[subset] = clique[rest] and rest & ~friends[lowest] == 0
-    maximal = [
-        subset
-        for subset in range(1, 1 << k)
-        if clique[subset]
-        and not any(clique[subset | 1 << j] for j in range(k) if not subset >> j & 1)
-    ]
-    most = max((subset.bit_count() for subset in maximal), default=0)
 
     def lanes(subset: int) -> Lanes:
         return sum(1 << m.origin for j, m in enumerate(movements) if subset >> j & 1)
 
-    return Cliques(
-        tuple(map(lanes, maximal)),
-        tuple(lanes(subset) for subset in maximal if subset.bit_count() == most),
+    maximal = tuple(
+        lanes(subset)
+        for subset in range(1, 1 << k)
+        if clique[subset]
+        and not any(clique[subset | 1 << j] for j in range(k) if not subset >> j & 1)
     )
+    most = max(map(int.bit_count, maximal), default=0)
+    return Cliques(maximal, tuple(found for found in maximal if found.bit_count() == most))
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """The cliques that remain when the tie is broken by the paper's wording.
+    """What remains of tied cliques by the paper's wording, with the lanes by priority.
 
-    "The clique with the highest priority lanes" is one that holds the first lane, if any does, then
-    the second, and so on. `by_priority` lists the lanes, highest priority first.
+    "The clique with the highest priority lanes" holds the first lane, if any does, then the second…
     """
     left = tuple(cliques)
     for lane in by_priority:
@@ -232,7 +220,7 @@ class Case:
         )
 
     def _agents_say(self, case: int, movements: Movements) -> Lanes:
-        """The lanes whose agents go when each is asked on its own while no vehicle crosses."""
+        """The lanes whose agents go, each asked on its own, while no vehicle crosses."""
         lanes = tuple(m.origin for m in movements)
         percept = Percept(participants=lanes, crossing=(), case=case, occupied=0)
         return sum(1 << lane for lane in lanes if self._agents[lane].decide(percept))
@@ -258,8 +246,8 @@ def most_cliques(k: int) -> int:
     """The most maximal cliques that any graph of k ≥ 1 nodes can have.
 
     Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as close to it as
-    groups of 2, 3 and 4 nodes can come. The graph that reaches it has cliques of only one size, so
-    the number is also the bound for cliques that tie.
+    groups of 2, 3 and 4 nodes can come. That graph has cliques of only one size, so this is also
+    the bound for cliques that tie.
     """
     if k < 2:
         return 1

@@ -1,8 +1,8 @@
 """How a vehicle's intent is shown, how others read it, and how sure they are.
 
-A driver may turn without a signal, which no other vehicle can know. A shown intent may be misread,
-by each reader independently or by all in the same way. A table of probabilities, true manoeuvre ×
-read manoeuvre, describes both, and tells how likely a reading is to be right.
+A driver may turn without a signal, and a shown intent may be misread, by each reader on its own or
+by all alike. A table of probabilities, true manoeuvre × read manoeuvre, describes both, and tells
+how likely a reading is to be right.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ KINDS = ("missed", "symmetric")
 #: Error probabilities worth comparing, from zero to that of a missing turn signal.
 RATES = (0.0, 0.01, 0.02, 0.05, 0.10, 0.15, 0.25)
 
-#: What a draw is for.
-_SIGNAL, _READ, _SURE, _MISTAKEN = range(4)
+_SIGNAL, _READ, _SURE, _MISTAKEN = range(4)  # what a draw is for
 
 Table = tuple[tuple[float, ...], ...]
 
@@ -36,9 +35,7 @@ class Lane:
     silent: tuple[float, ...]  #: probability that each manoeuvre is driven without a signal
     error: float  #: how often a shown intent is misread
     kind: str  #: in what way it is misread, see `KINDS`
-    doubt: tuple[
-        float, ...
-    ]  #: how often a reading of each manoeuvre is wrong, if all are equally frequent
+    doubt: tuple[float, ...]  #: see `doubts`
 
     @classmethod
     def of(
@@ -57,10 +54,14 @@ class Lane:
 
         A vehicle that is misread at a small error rate is also misread at a larger one.
         """
-        shown = manoeuvre
-        if draws.uniform(_SIGNAL, vehicle) < self.silent[manoeuvre - 1]:
-            shown = self.straight
-        return self._misread(shown, draws.uniform(_READ, vehicle, *when))
+        silent = draws.uniform(_SIGNAL, vehicle) < self.silent[manoeuvre - 1]
+        shown, chance = self.straight if silent else manoeuvre, draws.uniform(_READ, vehicle, *when)
+        if chance >= self.error or (self.kind == "missed" and shown == self.straight):
+            return shown
+        if self.kind == "missed":
+            return self.straight
+        others = [m for m in range(1, len(self.silent) + 1) if m != shown]
+        return others[int(chance / self.error * len(others))]
 
     def confidence(
         self, draws: Draws, manoeuvre: int, read: int, vehicle: int, *when: int
@@ -68,14 +69,6 @@ class Lane:
         """How sure the reader is: of many readings with this confidence, this share is right."""
         chances = draws.uniform(_SURE, vehicle, *when), draws.uniform(_MISTAKEN, vehicle, *when)
         return confidence(self.doubt[read - 1], read == manoeuvre, chances)
-
-    def _misread(self, shown: int, chance: float) -> int:
-        if chance >= self.error or (self.kind == "missed" and shown == self.straight):
-            return shown
-        if self.kind == "missed":
-            return self.straight
-        others = [m for m in range(1, len(self.silent) + 1) if m != shown]
-        return others[int(chance / self.error * len(others))]
 
 
 def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str) -> Table:
@@ -113,12 +106,10 @@ def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float
     a·c^(a−1) on (0, 1), a = (1−e)/e. Their mean is 1−e, and they spread like a classifier's.
     Calibration then multiplies the density by c/(1−e) for right readings and by (1−c)/e for wrong
     ones: Beta(a+1, 1), the distribution of U^e, and Beta(a, 2), that of U^e·V^(e/(1−e)), for
-    uniform U and V. Here `doubt` is e, `chances` are U and V, and `right` says which case applies.
+    uniform U and V. Here `doubt` is e, and `chances` are U and V.
     """
-    if doubt <= 0.0:
-        return 1.0
-    if doubt >= 1.0:
-        return 0.0
+    if doubt <= 0.0 or doubt >= 1.0:
+        return float(doubt <= 0.0)
     u, v = chances
     sure = math.pow(u, doubt)
     return sure if right else sure * math.pow(v, doubt / (1.0 - doubt))

@@ -3,7 +3,7 @@
     simulate(scenario, Dim(perception=NoisyPerception(intent_error=0.15)))
 
 An ego always sees itself, and the order of the vehicles in each lane, exactly. Its view lacks the
-vehicles that it does not see, and never holds one that neither is nor was there.
+vehicles that it does not see, and holds none that were never there.
 """
 
 from __future__ import annotations
@@ -24,24 +24,20 @@ from minisim.streams import Draws
 #: than 85 % right on 3 and 4 arms; tail lights, Sensors 24(16), 5162 (2024), 85.2 %.
 CLASSIFIER = 0.15
 
-#: Shares of near and far turns that are driven without a signal: 29 % of right
-#: and 25 % of left turns in right-hand traffic (Sullivan, Bao, Goudy, Konet, "Characteristics of
-#: turn signal use at intersections in baseline naturalistic driving", AAP 74, 2015). SAE
-#: 2012-01-0261 (Ponziani) found 25 % of all turns.
+#: Shares of near and far turns without a signal: 29 % of right and 25 % of left turns in right-hand
+#: traffic (Sullivan, Bao, Goudy, Konet, "Characteristics of turn signal use at intersections in
+#: baseline naturalistic driving", AAP 74, 2015). SAE 2012-01-0261 (Ponziani): 25 % of all turns.
 UNSIGNALLED = (0.29, 0.25)
 
-#: Stands for all observers, or for all moments, where a draw asks for one.
-_ALL = -1
-
-#: What a draw is for; numbered above the purposes in `dim.senses.intent`.
-_POSITION, _SPEED = 8, 9
+_ALL = -1  # stands for all observers or all moments in a draw
+_POSITION, _SPEED = 8, 9  # what a draw is for; above the purposes in `dim.senses.intent`
 
 
 @declared
 class NoisyPerception:
     """How vehicles misperceive each other; by default they do not.
 
-    Parameters of errors that never happen are allowed, so that a series may begin without errors.
+    Parameters of errors that never happen are allowed: a series may begin without errors.
     """
 
     intent_error: float = real(
@@ -83,8 +79,8 @@ class NoisyPerception:
         "standard deviation of the others' speeds, drawn anew each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
-    # 10 Hz, like rotating lidars and V2V safety messages. What happens between two looks is seen
-    # late: that a vehicle is committed, up to one frame late, or 0.6 m at 20 km/h.
+    # 10 Hz, like rotating lidars and V2V safety messages. So what happens is seen up to one frame
+    # late, or 0.6 m at 20 km/h.
     frame: float = real("time between two looks", "s", low=0.01, high=1, default=0.1)
 
     @property
@@ -152,17 +148,16 @@ class _Senses:
         if seen.time != self._at_time:
             self._at_time = seen.time
             self._at = {v.id: self._bodies.body(v) for v in seen.vehicles}
-        at, reach = self._at, self._recipe.sensor_range
+        at, reach = self._at, self._recipe.sensor_range or math.inf
         eye = at.get(ego.id) or self._bodies.body(ego)
         for vehicle in vehicles:
             if vehicle.id == ego.id:
                 yield ego
                 continue
             body = at[vehicle.id]
-            if reach is not None and math.hypot(body.x - eye.x, body.y - eye.y) > reach:
-                continue
-            others = [b for v, b in at.items() if v != ego.id and v != vehicle.id]
-            if not (self._recipe.occlusion and self._bodies.hidden(eye, body, others)):
+            near = math.hypot(body.x - eye.x, body.y - eye.y) <= reach
+            others = (b for v, b in at.items() if v != ego.id and v != vehicle.id)
+            if near and not (self._recipe.occlusion and self._bodies.hidden(eye, body, others)):
                 yield vehicle
 
     def _key(self, lane: int, rank: int) -> int:
@@ -172,7 +167,7 @@ class _Senses:
     def _sense(self, vehicle: Observed, observer: int, moment: int) -> Observed:
         """One vehicle as an observer perceives it."""
         recipe, draws = self._recipe, self._draws
-        id, lane, manoeuvre, distance, speed, length, demand_time, rank = vehicle
+        id, lane, manoeuvre, distance, speed, length, demand_time, rank, factor = vehicle
         key = self._key(lane, rank)
         if recipe.misreads and manoeuvre != UNKNOWN:
             when = _ALL if recipe.persistent else moment
@@ -181,7 +176,9 @@ class _Senses:
             distance += recipe.position_noise * draws.normal(_POSITION, key, observer, moment)
         if recipe.speed_noise:
             speed += recipe.speed_noise * draws.normal(_SPEED, key, observer, moment)
-        return Observed(id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time, rank)
+        return Observed(
+            id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time, rank, factor
+        )
 
     def _read(self, lane: int, manoeuvre: int, vehicle: int, observer: int, when: int) -> int:
         """What a manoeuvre is taken for, or `UNKNOWN`."""
@@ -202,10 +199,7 @@ def with_ego(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, .
 
 
 def in_order(vehicles: tuple[Observed, ...], ego: Observed) -> tuple[Observed, ...]:
-    """Vehicles by lane and in their true order, without the overtaking that noise has caused.
-
-    No vehicle is put ahead of one that it follows. The ego keeps its place.
-    """
+    """Vehicles without the overtaking that noise has caused; the ego keeps its place."""
     ordered: list[Observed] = []
     at = next(k for k, v in enumerate(vehicles) if v.id == ego.id)
     for k, vehicle in enumerate(vehicles):

@@ -1,6 +1,6 @@
 """What can be seen from where: bodies near the junction, and lines of sight between them.
 
-Plain floats are used, since every vehicle asks about every other one ten times a second.
+Plain floats, since every vehicle asks about every other one ten times a second.
 """
 
 from __future__ import annotations

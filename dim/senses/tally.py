@@ -1,14 +1,10 @@
-"""What misperception does to a run of DIM: counts for its summary.
-
-A session of DIM whose perception errs, with or without human drivers, adds these to the summary of
-its run:
+"""What misperception does to a run of DIM, with or without human drivers: counts for its summary.
 
 - `crossings`: vehicles that entered the junction.
 - `false_grants`: how often a vehicle held the right of way although the same rules, applied to the
   true view, would have made it wait; counted once each time it holds the right of way.
 - `disagreement_s`: how long there were participants that had chosen different cliques [s].
-- `deadlock_s`: how long there were participants, but no vehicle crossed or had the right of way
-  [s].
+- `deadlock_s`: how long participants waited while none crossed or had the right of way [s].
 
 The last three compare the run with the truth, which no vehicle knows. If every reading is right,
 they are 0.
@@ -48,11 +44,7 @@ class Tally:
         }
 
     def count(
-        self,
-        true: View,
-        sights: Mapping[int, View],
-        table: DecisionTable,
-        going: set[int],
+        self, true: View, sights: Mapping[int, View], table: DecisionTable, going: set[int]
     ) -> None:
         """Add one look around to the counts.
 
@@ -80,11 +72,9 @@ class Tally:
         """The vehicles that would go if they saw `true`, with the same rules and the same state."""
         rightly = set()
         for vehicle in true.vehicles:
-            if vehicle.id not in sights:
-                continue
             agent = Agent(vehicle.id, vehicle.lane, self._rules)
             agent.right_of_way = vehicle.id in self._going
-            if agent.decide(truth, table):
+            if vehicle.id in sights and agent.decide(truth, table):
                 rightly.add(vehicle.id)
         return rightly
 

@@ -14,19 +14,12 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Polygon
 from matplotlib.text import Text
 from PIL import Image
 
 from figures import style
-from figures.film.encode import (
-    GIF_FPS,
-    animation_format,
-    palette_of,
-    write_gif,
-    write_html,
-    write_mp4,
-)
+from figures.film import encode
 from figures.film.frames import Frames
 from figures.junction import drawing
 from minisim.errors import InputError, number
@@ -58,8 +51,8 @@ def write_animation(
         MissingExtraError: .mp4 without ffmpeg.
         FileError: the file cannot be written.
     """
-    kind = animation_format(path)
-    fps = min(fps, GIF_FPS) if kind == "gif" else fps
+    kind = encode.animation_format(path)
+    fps = min(fps, encode.GIF_FPS) if kind == "gif" else fps
     times = frame_times(start, seconds, fps, run.site.dt)
     first, last = run.record_window[0], min(run.record_window[1], run.columns.end)
     half = run.site.dt / 2.0
@@ -78,11 +71,11 @@ def write_animation(
 
     with replacing(path) as part:
         if kind == "gif":
-            write_gif(frames(), picture.palette(), part, fps)
+            encode.write_gif(frames(), picture.palette(), part, fps)
         elif kind == "mp4":
-            write_mp4(frames(), part, fps)
+            encode.write_mp4(frames(), part, fps)
         else:
-            write_html(frames(), picture.palette(), part, fps, picture.title)
+            encode.write_html(frames(), picture.palette(), part, fps, picture.title)
 
 
 def frame_times(start: float, seconds: float, fps: float, dt: float) -> Floats:
@@ -107,7 +100,6 @@ class Picture:
         zone = max((marking.start for marking in plan.markings), default=0.0)
         self._reach = reach = max(40.0, intersection.junction_radius + zone + 4.0)
         self._axes = self._figure.add_axes((0.0, FOOT / HEIGHT, 1.0, WIDTH / HEIGHT))
-        self._axes.add_patch(Rectangle((-2e3, -2e3), 4e3, 4e3, facecolor=style.GRASS, zorder=0))
         drawing.draw_junction(self._axes, intersection, plan, reach)
         self._moving = self._add_moving()
         self._write_still()
@@ -133,7 +125,7 @@ class Picture:
 
     def palette(self) -> Image.Image:
         """An indexed image with every colour of the picture; the legend shows them all."""
-        return palette_of(self.draw(self._film.busiest))
+        return encode.palette_of(self.draw(self._film.busiest))
 
     def _add_moving(self) -> tuple[Artist, ...]:
         axes, run = self._axes, self.run
@@ -164,10 +156,9 @@ class Picture:
             f"{demand} · profile {scenario.profile_name} · seed {self.run.seed}"
         )
         vehicles = [
-            (style.RIGHT_OF_WAY, "has the right of way"),
-            (style.WAITING, "waits"),
+            (style.RIGHT_OF_WAY, "has the right of way"), (style.WAITING, "waits"),
             (style.FREE, "drives"),
-        ]
+        ]  # fmt: skip
         if self._film.human.any():
             vehicles.append((style.INK, "outline: human"))
         zones = [
@@ -205,20 +196,20 @@ class Picture:
         near = film.rows(now, 1.1 * self._reach)
         x, y, angle = film.x[near], film.y[near], film.angle[near]
         body, glass = drawing.body_shape(run.site.vehicle)
-        colours = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])[film.state[near]]
+        states = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])
         self._bodies.set_verts(list(drawing.place(body, x, y, angle)))
-        self._bodies.set_facecolor(colours.tolist())
-        self._bodies.set_edgecolor(
-            [style.INK if human else style.PAPER for human in film.human[near]]
-        )
-        self._bodies.set_linewidth([1.6 if human else 0.7 for human in film.human[near]])
+        self._bodies.set_facecolor(states[film.state[near]].tolist())
+        human = film.human[near]
+        self._bodies.set_edgecolor(np.where(human, style.INK, style.PAPER).tolist())
+        self._bodies.set_linewidth(np.where(human, 1.6, 0.7).tolist())
         self._glass.set_verts(list(drawing.place(glass, x, y, angle)))
         self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
         self._ways.set_segments(film.ways(near))
         opened = film.open_lanes(near)
-        self._holds.set_color(
-            [style.RIGHT_OF_WAY if i in opened else style.INK for i in range(film.n)]
-        )
+        colours = [
+            style.RIGHT_OF_WAY if i in opened else style.INK for i in range(run.site.intersection.n)
+        ]
+        self._holds.set_color(colours)
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:

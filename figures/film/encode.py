@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import html
 import io
-import os
 import shutil
 import struct
 import subprocess
@@ -24,7 +23,9 @@ import numpy.typing as npt
 from PIL import GifImagePlugin
 from PIL.Image import Dither, Image, Quantize, fromarray
 
-from minisim.errors import FileError, InputError, MissingExtraError
+from figures.style import suffix_of
+from minisim.errors import FileError, MissingExtraError
+from minisim.files import AnyPath
 
 FORMATS = ("gif", "mp4", "html")
 
@@ -37,17 +38,12 @@ GIF_FPS = 50.0
 COLOURS = 127
 
 
-def animation_format(path: str | os.PathLike[str]) -> str:
+def animation_format(path: AnyPath) -> str:
     """The suffix as one of `FORMATS`; .mp4 without ffmpeg raises `MissingExtraError`."""
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in FORMATS:
-        allowed = ", ".join(f".{name}" for name in FORMATS)
-        raise InputError(f"an animation file ends in {allowed}; got {str(path)!r}")
+    suffix = suffix_of(path, "an animation", FORMATS)
     if suffix == "mp4" and shutil.which("ffmpeg") is None:
-        raise MissingExtraError(
-            "an .mp4 needs the program ffmpeg, which was not found; "
-            "install it, or write a .gif or .html"
-        )
+        lacking = "an .mp4 needs the program ffmpeg, which was not found"
+        raise MissingExtraError(f"{lacking}; install it, or write a .gif or .html")
     return suffix
 
 
@@ -70,13 +66,10 @@ def write_gif(frames: Iterator[Image], palette: Image, path: Path, fps: float) -
         file.write(_colours(palette) + b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")
         for k, frame in enumerate(frames):
             delay = round(100.0 * (k + 1) / fps) - round(100.0 * k / fps)
-            indices = np.asarray(_indexed(frame, palette))
+            indices = _indexed(frame, palette)
             corner, part = _changed(indices, shown)
-            blocks = GifImagePlugin.getdata(
-                fromarray(part, "P"), corner, duration=10 * delay, transparency=COLOURS,
-                disposal=1,
-            )  # fmt: skip
-            file.write(b"".join(blocks))
+            shown_for = {"duration": 10 * delay, "transparency": COLOURS, "disposal": 1}
+            file.write(b"".join(GifImagePlugin.getdata(fromarray(part, "P"), corner, **shown_for)))
             shown = indices
         file.write(b";")
 
@@ -110,26 +103,24 @@ def write_html(frames: Iterator[Image], palette: Image, path: Path, fps: float, 
     frame can be shown without the ones before it.
     """
     template = Path(__file__).with_name("player.html").read_text(encoding="utf-8")
-    fields = {
-        "title": html.escape(title), "fps": f"{fps:g}", "width": palette.width,
-        "height": palette.height,
-    }  # fmt: skip
+    width, height = map(str, palette.size)
+    fields = {"title": html.escape(title), "fps": f"{fps:g}", "width": width, "height": height}
     for name, value in fields.items():
-        template = template.replace(f"{{{{{name}}}}}", str(value))
+        template = template.replace(f"{{{{{name}}}}}", value)
     before, after = template.split("{{frames}}")
     ground: Indices | None = None
     with path.open("w", encoding="utf-8") as file:
         file.write(before)
         for frame in frames:
-            indices = np.asarray(_indexed(frame, palette))
-            corner, part = _changed(indices, ground)
+            indices = _indexed(frame, palette)
+            (x, y), part = _changed(indices, ground)
             ground = indices if ground is None else ground
-            file.write(f'[{corner[0]}, {corner[1]}, "{_png(part, palette)}"],\n')
+            file.write(f'[{x}, {y}, "{_png(part, palette)}"],\n')
         file.write(after)
 
 
-def _indexed(frame: Image, palette: Image) -> Image:
-    return frame.quantize(palette=palette, dither=Dither.NONE)
+def _indexed(frame: Image, palette: Image) -> Indices:
+    return np.asarray(frame.quantize(palette=palette, dither=Dither.NONE))
 
 
 def _colours(palette: Image) -> bytes:

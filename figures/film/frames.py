@@ -1,6 +1,8 @@
-"""What `animate` draws at a given time: the recorded trajectories of a run, as arrays."""
+"""The recorded trajectories of a run as arrays, and what `animate` draws at a time."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -31,8 +33,7 @@ class Frames:
                 f"no vehicle was recorded from {start:g} s on; start later or raise the density"
             )
         site = run.site
-        self.start = start
-        self.run, self.n = run, site.intersection.n
+        self.run, self.start = run, start
         self.x, self.y = frame["x_m"].to_numpy(), frame["y_m"].to_numpy()
         self.angle, self.s = frame["angle_deg"].to_numpy(), frame["s_m"].to_numpy()
         self.path = movement_index(frame, site)
@@ -48,23 +49,20 @@ class Frames:
         human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
         self.human = human[frame["vehicle"].to_numpy()]
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
-        self.ticks, first = np.unique(ticks, return_index=True)
-        self.bounds = np.append(first, len(ticks))
+        shown, first = np.unique(ticks, return_index=True)
+        bounds = np.append(first, len(ticks)).tolist()
+        parts = [slice(*ends) for ends in pairwise(bounds)]
+        self._steps: dict[int, slice] = dict(zip(shown.tolist(), parts, strict=True))
+        self.busiest = float(shown[int(np.argmax(np.diff(bounds)))] * site.dt)
         crashed = np.isin(frame["vehicle"], [v for c in run.collisions for v in c.vehicles])
         gone = frame[(self.s > clear) & ~crashed].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
-        counts = np.diff(self.bounds)
-        self.busiest = float(self.ticks[int(np.argmax(counts))] * site.dt)
 
     def at(self, time: float) -> slice:
         """The rows of one step."""
-        tick = round(time / self.run.site.dt)
-        k = int(np.searchsorted(self.ticks, tick))
-        if k == len(self.ticks) or self.ticks[k] != tick:
-            return slice(0, 0)
-        return slice(int(self.bounds[k]), int(self.bounds[k + 1]))
+        return self._steps.get(round(time / self.run.site.dt), slice(0, 0))
 
     def rows(self, now: slice, reach: float) -> Rows:
         """The rows of one step that lie in the picture."""
@@ -128,11 +126,10 @@ class Frames:
         for collision in self.run.collisions:
             if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
                 continue
+            movements = map(site.intersection.parse, collision.movements)
             centres = [
-                site.intersection.path(site.intersection.parse(movement)).pose(
-                    s, site.vehicle.length
-                )[0]
-                for movement, s in zip(collision.movements, collision.positions, strict=True)
+                site.intersection.path(movement).pose(s, site.vehicle.length)[0]
+                for movement, s in zip(movements, collision.positions, strict=True)
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import cycle
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
-from dim import explain
-from dim.decision import Movements
+from dim import Explanation, explain
 from dim.proofs.verification import Analysis
 from figures import style
 from figures.junction import drawing
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES
 
-#: One colour for each tied clique; further cliques repeat the colours, dashed.
-CLIQUES = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
+#: Colours and dashes of tied cliques, so that they are told apart without colour too.
+CLIQUES = (
+    (style.BLUE, "-"), (style.VERMILLION, "--"), (style.GREEN, "-."), (style.PURPLE, ":"),
+    (style.ORANGE, "-"), (style.SKY, "--"),
+)  # fmt: skip
 
 
 def verification_figure(analysis: Analysis, intersection: Intersection) -> Figure:
@@ -34,7 +37,8 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
     _draw_counts(panels[0], analysis.sizes, "Who goes", "vehicles with the right of way")
     _draw_counts(panels[1], analysis.ties, "Ties", "cliques of the largest size")
     for axes, (size, (movements, count)) in zip(panels[2:], worst, strict=True):
-        _draw_worst(axes, analysis, movements, intersection)
+        told = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
+        draw_cliques(axes, told, intersection)
         vehicles = "1 vehicle" if size == 1 else f"{size} vehicles"
         axes.set_title(
             f"Worst case: {analysis.most_tied} cliques of {vehicles}\n"
@@ -52,25 +56,22 @@ def _draw_counts(axes: Axes, counts: Mapping[int, int], title: str, xlabel: str)
     style.plot_axes(axes, title, xlabel, "cases")
 
 
-def _draw_worst(
-    axes: Axes, analysis: Analysis, movements: Movements, intersection: Intersection
-) -> None:
-    """A case's harmony graph, one colour per tied clique; the thick one has the right of way."""
-    explanation = explain(movements, analysis.matrix, analysis.order, analysis.priorities)
-    places = {m: np.array(intersection.arms[m.origin].outward) for m in movements}
+def draw_cliques(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
+    """A harmony graph: tied cliques of two as lines, larger ones as areas; filled nodes go."""
+    places = {m: np.array(intersection.arms[m.origin].outward) for m in explanation.participants}
     axes.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
     axes.set_axis_off()
-    for k, clique in enumerate(explanation.tied):
-        dashes = "-" if k < len(CLIQUES) else (0, (3, 1.5))
-        colour = CLIQUES[k % len(CLIQUES)]
-        goes = clique == explanation.right_of_way
-        for pair in combinations(clique, 2):
-            ends = np.array([places[m] for m in pair])
-            axes.plot(
-                *ends.T, color=colour, linestyle=dashes, linewidth=6.0 if goes else 2.4,
-                zorder=2 if goes else 1, solid_capstyle="round",
-            )  # fmt: skip
-    for movement in movements:
+    for pair in explanation.edges:
+        ends = np.array([places[m] for m in pair])
+        axes.plot(*ends.T, color=style.FAINT, linewidth=11, solid_capstyle="round", zorder=1)
+    for clique, (colour, dashes) in zip(explanation.tied, cycle(CLIQUES), strict=False):
+        points = np.array([places[m] for m in clique])
+        if len(clique) > 2:
+            inner = shapely.Polygon(points).buffer(-0.075, join_style="mitre")
+            points = np.array(inner.exterior.coords)
+            axes.add_patch(Polygon(points, facecolor=colour, alpha=0.12, zorder=1.5))
+        width = 4.0 if clique == explanation.right_of_way else 2.4
+        axes.plot(*points.T, color=colour, linestyle=dashes, linewidth=width, zorder=2)
+    for movement, place in places.items():
         goes = movement in explanation.right_of_way
-        label = f"{ARM_NAMES[movement.origin]}{movement.manoeuvre}"
-        drawing.draw_node(axes, places[movement], 0.19, label, 12, 0.01, goes=goes)
+        drawing.draw_node(axes, place, str(movement), goes=goes)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 
 from dim import Explanation
-from figures import style
+from figures import plots, style
 from figures.junction import drawing
 from minisim.control import Plan, Site
 from minisim.junction.geometry import Intersection
@@ -27,35 +29,27 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
     right = figure.add_axes((0.518, 0.13, 0.462, 0.77))
     _draw_scene(left, explanation, site, plan)
     _draw_graph(right, explanation, site.intersection)
-    for axes, letter, title in (
-        (left, "A", "Vehicles and their movements"),
-        (right, "B", "Harmony graph"),
+    for x, letter, title in (
+        (0.02, "A", "Movements, and where they conflict (×)"),
+        (0.518, "B", "Harmony graph"),
     ):
-        x = axes.get_position().x0
         style.write(figure, x, 0.945, letter, 15, bold=True)
         style.write(figure, x + 0.028, 0.945, title, 12)
     words = f"Right of way: {', '.join(map(str, explanation.right_of_way))}"
     style.write(figure, 0.02, 0.08, words, 12.5, bold=True, colour=style.RIGHT_OF_WAY)
     style.write(figure, 0.02, 0.035, explanation.reason, 10)
-    _zone_legend(figure, plan)
-    return figure
-
-
-def _zone_legend(figure: Figure, plan: Plan) -> None:
-    """The zones on the lanes, from the outside in."""
     zones = drawing.zone_words(plan)
-    figure.legend(
-        [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in zones],
-        [*zones.values()], loc="center right", bbox_to_anchor=(0.98, 0.08),
-        ncols=max(len(zones), 1), frameon=False, fontsize=9, labelcolor=style.INK,
-        borderaxespad=0.0, handlelength=1.4, columnspacing=1.4,
+    swatches = [Patch(facecolor=style.ZONES.get(name, style.SKY)) for name in zones]
+    plots.legend(
+        figure, swatches, [*zones.values()], 0.08, loc="center right",
+        bbox_to_anchor=(0.98, 0.08), fontsize=9, handlelength=1.4, columnspacing=1.4,
     )  # fmt: skip
+    return figure
 
 
 def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) -> None:
     intersection, vehicle = site.intersection, site.vehicle
     reach = intersection.junction_radius + APPROACH
-    axes.add_patch(Rectangle((-reach, -reach), 2 * reach, 2 * reach, facecolor=style.GRASS))
     drawing.draw_junction(axes, intersection, plan, reach)
     drawing.draw_hold_lines(axes, intersection, plan)
     for movement in explanation.participants:
@@ -68,29 +62,36 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
         drawing.draw_vehicle(axes, path, front - 0.15, vehicle, colour)
         middle = plan.hold_distance + vehicle.length / 2.0
         x, y = _beside(intersection, movement.origin, middle, 0.075 * reach)
-        axes.text(
-            x, y, str(movement), ha="center", va="center", fontsize=13, fontweight="bold",
-            color=colour, zorder=9,
-        )  # fmt: skip
+        axes.text(x, y, str(movement), ha="center", va="center", fontsize=13, fontweight="bold",
+                  color=colour, zorder=9)  # fmt: skip
+    marks = conflict_points(explanation, intersection)
+    axes.plot(*marks.T, "x", color=style.INK, markersize=6.5, markeredgewidth=1.8, zorder=8)
+
+
+def conflict_points(explanation: Explanation, intersection: Intersection) -> Floats:
+    """Where the paths of participants in conflict meet, or come closest, shape (k, 2) [m]."""
+    ways = {
+        movement: shapely.LineString(path.position(np.linspace(path.entry, path.exit, 100)))
+        for movement in explanation.participants
+        for path in [intersection.path(movement)]
+    }
+    pairs = sorted({*combinations(explanation.participants, 2)} - {*explanation.edges})
+    closest = [shapely.shortest_line(ways[a], ways[b]).centroid.coords[0] for a, b in pairs]
+    return np.array(closest).reshape(-1, 2)
 
 
 def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection) -> None:
-    places = {
-        m.origin: np.array(intersection.arms[m.origin].outward) for m in explanation.participants
-    }
-    chosen = {m.origin for m in explanation.right_of_way}
+    places = {m: np.array(intersection.arms[m.origin].outward) for m in explanation.participants}
+    chosen = set(explanation.right_of_way)
     axes.set(xlim=(-1.5, 1.5), ylim=(-1.5, 1.5), aspect="equal")
     axes.set_axis_off()
-    for a, b in explanation.edges:
-        strong = {a.origin, b.origin} <= chosen
-        ends = np.array([places[a.origin], places[b.origin]])
-        axes.plot(
-            *ends.T, color=style.RIGHT_OF_WAY if strong else "#A7AEB8",
-            linewidth=7.0 if strong else 2.2, solid_capstyle="round", zorder=2 if strong else 1,
-        )  # fmt: skip
+    for pair in explanation.edges:
+        strong = chosen.issuperset(pair)
+        colour, width, order = (style.RIGHT_OF_WAY, 7.0, 2) if strong else ("#A7AEB8", 2.2, 1)
+        ends = np.array([places[movement] for movement in pair])
+        axes.plot(*ends.T, color=colour, linewidth=width, solid_capstyle="round", zorder=order)
     for movement in explanation.participants:
-        goes = movement.origin in chosen
-        drawing.draw_node(axes, places[movement.origin], 0.2, str(movement), 14, 0.01, goes=goes)
+        drawing.draw_node(axes, places[movement], str(movement), goes=movement in chosen)
     pairs = math.comb(len(explanation.participants), 2)
     tied = len(explanation.tied)
     cliques = "1 clique" if tied == 1 else f"{tied} cliques"

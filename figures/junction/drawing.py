@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import Circle, FancyArrowPatch, Polygon
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from figures import style
 from minisim.control import Marking, Plan
@@ -29,11 +29,11 @@ KERB_POINTS = 24
 def outline(intersection: Intersection, reach: float) -> Floats:
     """Edge of the asphalt, shape (k, 2) [m]; the arms reach `reach` from the centre."""
     width, arms = intersection.lane_width, intersection.arms
-    points = []
+    points: list[Floats] = []
     for arm, following in zip(arms, (*arms[1:], arms[0]), strict=True):
         ahead, clockwise = _axes_of(arm)
         points += [ahead * reach - clockwise * width, ahead * reach + clockwise * width]
-        points += list(_kerb(arm, following, width, intersection.junction_radius))
+        points += [*_kerb(arm, following, width, intersection.junction_radius)]
     return np.array(points)
 
 
@@ -51,16 +51,18 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     axes.set_axis_off()
     far = 1.5 * reach
+    axes.add_patch(Rectangle((-far, -far), 2 * far, 2 * far, facecolor=style.GRASS))
     axes.add_patch(Polygon(
         outline(intersection, far), facecolor=style.ASPHALT, edgecolor="#9AA2AD", linewidth=1.0,
         joinstyle="round", zorder=1,
     ))  # fmt: skip
-    for marking in plan.markings:
-        strips = [
-            lane_strip(intersection, i, marking.start, marking.end) for i in range(intersection.n)
-        ]
+    every = range(intersection.n)
+    for marking in plan.markings:  # the thin edges close the joints between zones
+        strips = [lane_strip(intersection, i, marking.start, marking.end) for i in every]
         colour = style.ZONES.get(marking.name, style.SKY)
-        axes.add_collection(PolyCollection(strips, facecolors=colour, linewidths=0, zorder=2))
+        axes.add_collection(PolyCollection(
+            strips, facecolors=colour, edgecolors=colour, linewidths=0.4, zorder=2
+        ))  # fmt: skip
     for i, arm in enumerate(intersection.arms):
         ahead, _ = _axes_of(arm)
         middle = np.outer([intersection.junction_radius, far], ahead)
@@ -154,25 +156,19 @@ def draw_way(
 
 def draw_hold_lines(axes: Axes, intersection: Intersection, plan: Plan) -> LineCollection:
     """Draw the hold lines; recolour the returned collection to show which lanes are open."""
-    lines = LineCollection(
-        list(hold_lines(intersection, plan)), colors=style.INK, linewidths=3.0, zorder=4,
-        capstyle="butt",
-    )  # fmt: skip
+    segments = list(hold_lines(intersection, plan))
+    lines = LineCollection(segments, colors=style.INK, linewidths=3.0, zorder=4, capstyle="butt")
     axes.add_collection(lines)
     return lines
 
 
-def draw_node(
-    axes: Axes, place: Floats, radius: float, label: str, size: float, below: float, *, goes: bool
-) -> None:
-    """Draw a node of a harmony graph, its label at `size` points, a little `below` the middle."""
+def draw_node(axes: Axes, place: Floats, label: str, *, goes: bool) -> None:
+    """Draw a node of a harmony graph; it is filled if its vehicle `goes`."""
+    colour = style.RIGHT_OF_WAY if goes else style.WAITING
+    face, ink = (colour, style.PAPER) if goes else (style.PAPER, colour)
     x, y = place
-    axes.add_patch(Circle(
-        (x, y), radius, facecolor=style.RIGHT_OF_WAY if goes else style.PAPER,
-        edgecolor=style.RIGHT_OF_WAY if goes else style.WAITING, linewidth=2.2, zorder=3,
-    ))  # fmt: skip
-    colour = style.PAPER if goes else style.WAITING
-    axes.text(x, y - below, label, ha="center", va="center", fontsize=size, zorder=4, color=colour)
+    axes.add_patch(Circle((x, y), 0.2, facecolor=face, edgecolor=colour, linewidth=2.2, zorder=3))
+    axes.text(x, y, label, ha="center", va="center", fontsize=13, zorder=4, color=ink)
 
 
 def _axes_of(arm: Arm) -> tuple[Floats, Floats]:

@@ -7,19 +7,19 @@ from functools import partial
 from importlib import resources
 from itertools import product
 
-import numpy as np
-import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon, Rectangle
+from matplotlib.patches import Rectangle
 
 from baselines import webster, webster_delay
-from dim import Dim, Explanation, HarmonyMatrix, explain
+from dim import Dim, HarmonyMatrix, explain
 from figures import style
 from figures.junction import drawing
+from figures.junction.all_cases import CLIQUES, draw_cliques
 from figures.junction.decision import decision_figure
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
+from minisim.junction.movements import Movement
 from scenarios.library import MAKERS, four_way
 from scenarios.scenario import Scenario
 
@@ -27,11 +27,6 @@ from scenarios.scenario import Scenario
 DECISIONS = {3: ("a1", "b1", "c1"), 4: ("a1", "b2", "c2", "d2"), 5: ("a1", "b2", "c2", "d2", "e2")}
 #: Metres shown around each junction of the map.
 MAP_REACH = 48.0
-
-#: Styles of tied cliques, told apart by colour, width and dashes.
-CLIQUES = (
-    (style.BLUE, "-"), (style.VERMILLION, "--"), (style.GREEN, "-."), (style.PURPLE, ":"),
-)  # fmt: skip
 
 
 def decision(arms: int) -> Figure:
@@ -63,18 +58,13 @@ def maps() -> Figure:
 def _draw_map(axes: Axes, scenario: Scenario) -> None:
     intersection = scenario.intersection
     plan = Dim().start(scenario.site()).plan
-    axes.add_patch(Rectangle(
-        (-MAP_REACH, -MAP_REACH), 2 * MAP_REACH, 2 * MAP_REACH, facecolor=style.GRASS
-    ))  # fmt: skip
     drawing.draw_junction(axes, intersection, plan, MAP_REACH)
     for name in axes.texts:
         name.set_fontsize(10)
     for path in intersection.paths:
         if path.movement.origin == 0:
-            drawing.draw_way(
-                axes, path, path.entry - plan.hold_distance, path.exit + 6.0, style.BLUE,
-                strong=False,
-            )  # fmt: skip
+            start, end = path.entry - plan.hold_distance, path.exit + 6.0
+            drawing.draw_way(axes, path, start, end, style.BLUE, strong=False)
     left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # no junction in the paper has a road there
     axes.plot([left, left + 20.0], [top, top], color=style.INK, linewidth=2.2, zorder=9,
               solid_capstyle="butt")  # fmt: skip
@@ -95,7 +85,8 @@ def worst_case() -> Figure:
     for k, (letter, case) in enumerate(zip("AB", cases, strict=True)):
         left = 0.02 + 0.49 * k
         told = explain(case, matrix)
-        _draw_cliques(figure.add_axes((left, 0.2, 0.47, 0.66)), told)
+        axes = figure.add_axes((left, 0.2, 0.47, 0.66))
+        draw_cliques(axes, told, site.intersection)
         style.write(figure, left, 0.945, letter, 15, bold=True)
         words = f"{len(told.edges)} of 6 pairs in harmony: {len(told.tied)} largest cliques"
         style.write(figure, left + 0.03, 0.945, words, 12)
@@ -107,30 +98,6 @@ def worst_case() -> Figure:
         names = " ".join(map(str, told.right_of_way))
         style.write(figure, left, 0.06, f"{names} holds the highest-priority lanes and goes.", 10.5)
     return figure
-
-
-def _draw_cliques(axes: Axes, told: Explanation) -> None:
-    """The harmony graph, with tied cliques of two as lines and larger ones as areas."""
-    axes.set(xlim=(-1.55, 1.55), ylim=(-1.3, 1.3), aspect="equal")
-    axes.set_axis_off()
-    corners = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)]
-    places = {m: np.array(corners[m.origin]) for m in told.participants}
-    for one, other in told.edges:
-        axes.plot(*np.array([places[one], places[other]]).T, color=style.FAINT, linewidth=11,
-                  solid_capstyle="round", zorder=1)  # fmt: skip
-    for clique, (colour, dashes) in zip(told.tied, CLIQUES, strict=False):
-        points = np.array([places[m] for m in clique])
-        if len(clique) > 2:
-            points = np.array(
-                shapely.Polygon(points).buffer(-0.075, join_style="mitre").exterior.xy
-            ).T
-            axes.add_patch(Polygon(points, facecolor=colour, alpha=0.12, zorder=1.5))
-        axes.plot(*points.T, color=colour, linestyle=dashes, linewidth=3.0, zorder=2)
-    for movement, (x, y) in places.items():
-        axes.add_patch(Circle((x, y), 0.2, facecolor=style.PAPER, edgecolor=style.INK,
-                              linewidth=1.8, zorder=5))  # fmt: skip
-        axes.text(x, y, str(movement), ha="center", va="center", fontsize=13, color=style.INK,
-                  fontweight="bold", zorder=6)  # fmt: skip
 
 
 def webster_table() -> Table:
@@ -152,7 +119,7 @@ def webster_table() -> Table:
          "expected delay [s]"),
         tuple(rows),
         notes=(
-            "Saturation flow 1500 veh/h, 2 s lost a phase. The paper rounds 5.08 and 7.11, and "
+            "Saturation flow 1500 veh/h, 2 s lost per phase. The paper rounds 5.08 and 7.11, and "
             "prints 19.75 where its own network file and the formula have 19.25. The formula of "
             "its text divides by C0 − L where it must multiply. The delay is Webster's for the "
             "long run; a run of an hour near x = 1 has less.",
@@ -166,21 +133,18 @@ def harmony_table(arms: int) -> Table:
     ours = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     paper = HarmonyMatrix.paper(arms)
     different = {pair for a, b in ours.disagreements(paper) for pair in ((a, b), (b, a))}
-    rows = tuple(
-        (str(row), *(
-            f"{int(paper[row, column])}{'≠' if (row, column) in different else ''}"
-            for column in paper.movements
-        ))
-        for row in paper.movements
-    )  # fmt: skip
-    said = (
-        "The corridors swept by the vehicles give the same matrix."
-        if not different
-        else f"≠ marks the {len(different) // 2} pairs where the geometry says otherwise."
-    )
+
+    def entry(pair: tuple[Movement, Movement]) -> str:
+        return f"{int(paper.harmony(*pair))}{'≠' if pair in different else ''}"
+
+    every = paper.movements
+    rows = tuple((str(row), *(entry((row, column)) for column in every)) for row in every)
+    said = "The corridors swept by the vehicles give the same matrix."
+    if different:
+        said = f"≠ marks the {len(different) // 2} pairs where the geometry says otherwise."
     return Table(
         f"Harmony matrix of the {arms}-way junction: 1 harmony, 0 conflict",
-        ("", *paper.movements.names), rows, notes=(said,),
+        ("", *every.names), rows, notes=(said,),
     )  # fmt: skip
 
 

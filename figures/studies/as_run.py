@@ -9,15 +9,8 @@ from figures import style
 from figures.studies.shared import paper_values as paper
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
+from scenarios.studies.shared import paper_comparison as grid
 from scenarios.studies.shared.archive import Archive, missing_note
-from scenarios.studies.shared.paper_comparison import (
-    Discrepancy,
-    causes,
-    compare,
-    discrepancies,
-    labels,
-    score,
-)
 from scenarios.studies.shared.study import Results
 
 #: Series -> why its published rules lead to collisions.
@@ -44,15 +37,15 @@ SHOWN = {
 
 def comparison_table(results: Results) -> Table:
     """Every value that the paper plots or prints, beside ours."""
-    table, study = compare(results.good), results.study.name
+    table, study = grid.compare(results.good), results.study.name
     return Table(
         f"The paper's values and ours, {paper.HEADINGS[study]} [s]",
         ("controller", "arms", "inflow", "metric", "veh/h/lane", "paper", "ours", "sd",
          "95 % prediction", "paper inside", "causes"),
         tuple(_compared(row, study) for row in table.to_dict("records")), labels=4,
         notes=(
-            f"{missing_note(results)}  Inside: {score(table)} comparable values, "
-            f"{score(table, comparable=False)} of the others. {paper.EXPLAINED}",
+            f"{missing_note(results)}  Inside: {grid.score(table)} comparable values, "
+            f"{grid.score(table, comparable=False)} of the others. {paper.EXPLAINED}",
         ),
     )  # fmt: skip
 
@@ -64,17 +57,17 @@ def _compared(row: Mapping[Any, Any], study: str) -> tuple[str, ...]:
         row["metric"].removesuffix("_time_s") + lane,
         f"{row['density']:g}", paper.marked(row), paper.two_digits(row["mean"]),
         paper.two_digits(row["sd"]), paper.range_words(row), paper.inside(row),
-        " ".join(dict.fromkeys(labels()[known.cause] for known in causes(study, row))),
+        " ".join(dict.fromkeys(grid.labels()[known.cause] for known in grid.causes(study, row))),
     )  # fmt: skip
 
 
 def ending(archive: Archive) -> str:
     """The known causes of differences, each listed once, with where it holds and what shows it."""
     holding: dict[tuple[int, str], list[str]] = {}
-    for known in discrepancies():
+    for known in grid.discrepancies():
         holding.setdefault((known.number, known.cause), []).append(_where(known))
     listed = [
-        f"- **{labels()[cause]}** {cause} ({'; '.join(where)}.) "
+        f"- **{grid.labels()[cause]}** {cause} ({'; '.join(where)}.) "
         + (f"*Shown by {SHOWN[number]}.*" if number in SHOWN else "*Not isolated by a run here.*")
         for (number, cause), where in holding.items()
     ]
@@ -97,7 +90,7 @@ def ending(archive: Archive) -> str:
     ])  # fmt: skip
 
 
-def _where(known: Discrepancy) -> str:
+def _where(known: grid.Discrepancy) -> str:
     words = (
         style.look(known.series).label if known.series else "every controller",
         f"{known.arms} arms" if known.arms else "",

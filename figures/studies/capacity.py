@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -52,13 +53,11 @@ def capacity_figure(results: Results) -> Figure:
     for edge in range(1, len(RIVALS)):
         axes.axhline(edge - 0.5, color=style.FAINT, linewidth=0.8)
     axes.set_xlim(0.0, highest)
-    plots.heading(figure, "Capacity: the largest demand served without a growing queue")
-    plots.looks_legend(figure, LOOKS.values(), 0.91, lines=False)
-    note = f"{_extent(results)}; profile fair.  Pale line: a bound is all that is known."
-    if len(known) < len(STUDY.points):
-        missing = len(STUDY.points) - len(known)
-        note += f"  Not drawn, since there is no run: {missing} of {len(STUDY.points)} cases."
-    plots.footnote(figure, note)
+    note = f"{_extent(results)}; profile fair.  Pale line: only a bound is known."
+    if missing := len(STUDY.points) - len(known):
+        note += f"  Not drawn, for lack of runs: {missing} of {len(STUDY.points)} cases."
+    title = "Capacity: the largest demand served without a growing queue"
+    plots.frame(figure, title, LOOKS.values(), note, lines=False)
     return figure
 
 
@@ -97,10 +96,8 @@ def _draw_capacity(axes: Axes, capacity: Capacity, highest: float) -> None:
     low, high = capacity.above, capacity.below
     if low is None and high is None:
         mean, half, _ = capacity.interval
-        axes.errorbar(
-            [mean], [place], xerr=[0.0 if math.isnan(half) else half], color=look.colour,
-            marker=look.marker, linestyle="none", markersize=6.5, capsize=2.6, elinewidth=1.2,
-        )  # fmt: skip
+        axes.errorbar(mean, place, xerr=np.nan_to_num(half), color=look.colour, capsize=2.6,
+                      marker=look.marker, markersize=6.5, elinewidth=1.2)  # fmt: skip
         return
     ends = (0.0 if low is None else low, highest if high is None else high)
     axes.plot(ends, [place, place], color=look.colour, alpha=0.35, linewidth=3.0)

@@ -22,26 +22,24 @@ def confidence_figure(results: Results) -> Figure:
     )  # fmt: skip
     for axes, outcome in zip(panels, outcomes.OUTCOMES, strict=True):
         for (kind, look), aside in zip(outcomes.KIND_LOOKS.items(), (-0.08, 0.08), strict=True):
-            cells = [
-                outcomes.select(rows, kind=kind, confidence=threshold) for threshold in THRESHOLDS
-            ]
+            cells = [outcomes.select(rows, kind=kind, confidence=level) for level in THRESHOLDS]
             places = [k + aside for k in range(len(THRESHOLDS))]
             outcomes.draw(axes, places, cells, outcome, look)
         ticks = ["any", *(f"{threshold:g}" for threshold in THRESHOLDS[1:])]
         outcomes.dress(axes, outcome, outcome, "lowest confidence that is believed", ticks)
-    plots.heading(figure, f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of "
-                          "intents persistently misread by all alike")  # fmt: skip
-    plots.looks_legend(figure, outcomes.KIND_LOOKS.values(), 0.93, 3)
-    plots.footnote(figure, f"{outcomes.NOTE}  {missing_note(results)}")
+    title = (
+        f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of intents persistently "
+        "misread by all alike"
+    )
+    note = f"{outcomes.NOTE}  {missing_note(results)}"
+    plots.frame(figure, title, outcomes.KIND_LOOKS.values(), note)
     return figure
 
 
 SECTION = Section(
     "Believing only confident readings",
     (
-        Item(
-            "confidence", "collisions, false grants and delay by the lowest confidence believed",
-            confidence_figure, ("confidence",),
-        ),
+        Item("confidence", "collisions, false grants and delay by the lowest confidence believed",
+             confidence_figure, ("confidence",)),
     ),
 )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import chain, product
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -29,13 +30,12 @@ def fair_figure(results: Results) -> Figure:
         plots.log_time(axes, 0.0, 4000.0, linear=0.1)
         plots.density_axis(axes, rows["density"])
     panels[0].set_ylabel(f"mean of all vehicles [s], {plots.scale_words(0.1)}", **style.LABEL)
-    plots.heading(figure, "Every controller on four arms, profile fair")
-    plots.looks_legend(figure, map(style.look, RIVALS), 0.93, 4)
-    plots.marks_legend(figure, 0.842)
-    plots.footnote(figure, (
+    note = (
         f"{missing_note(results)}  Waiting is standing on the road: it leaves out the queue "
         "before a full road, and V2I-C's vehicles crawl."
-    ))  # fmt: skip
+    )
+    title, looks = "Every controller on four arms, profile fair", map(style.look, RIVALS)
+    plots.frame(figure, title, looks, note, ncols=4, marks=0.842)
     return figure
 
 
@@ -66,14 +66,13 @@ def crossing_figure(results: Results) -> Figure:
         plots.density_axis(axes, results.good["density"])
     panels[0].set_yticks(range(len(OTHERS)), [style.look(name).label for name in OTHERS])
     panels[0].set_ylim(len(OTHERS) - 0.5, -0.5)
-    plots.heading(figure, "Demands at which DIM does worse than …")
-    plots.looks_legend(figure, map(style.look, GATES), 0.925)
+    title, looks = "Demands at which DIM does worse than …", map(style.look, GATES)
+    plots.frame(figure, title, looks, missing_note(results))
     words = (
         "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
         "its 95 % interval     hollow: at none or all of these demands in the mean"
     )
     style.write(figure, plots.LEFT, 0.845, words, 8.5)
-    plots.footnote(figure, missing_note(results))
     return figure
 
 
@@ -112,11 +111,10 @@ def answer(results: Results) -> str:
     low, high = tried(known.values())
     lines = []
     for rival in OTHERS:
-        losing = [
-            f"{measure} "
-            + " → ".join(str(known.get((measure, gate, rival), "not run")) for gate in GATES)
-            for measure in MEASURES
-        ]
+        losing = []
+        for measure in MEASURES:
+            found = (str(known.get((measure, gate, rival), "not run")) for gate in GATES)
+            losing.append(f"{measure} {' → '.join(found)}")
         lines.append(f"- {style.look(rival).label}: {'; '.join(losing)}")
     return "\n".join([
         "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
@@ -129,23 +127,17 @@ def answer(results: Results) -> str:
 
 def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
     look = style.look(gate)
-    low, high = crossing.tried
-
-    def shown(value: float) -> float:
-        return min(max(value, low), high)
-
-    start, end = shown(crossing.density), shown(crossing.until)
+    ends = crossing.density, crossing.until, crossing.low, crossing.high
+    start, end, least, most = np.clip(ends, *crossing.tried).tolist()
     if crossing.density < math.inf:
-        axes.barh([y], end - start, left=start, height=0.24, color=look.colour, alpha=0.35,
-                  zorder=2)  # fmt: skip
+        axes.barh(y, end - start, left=start, height=0.24, color=look.colour, alpha=0.35, zorder=2)
     elif not math.isfinite(crossing.low):
-        axes.text(high, y, "nowhere", ha="right", va="center", fontsize=8.5, color=look.colour)
+        axes.text(crossing.tried[1], y, "nowhere", ha="right", va="center", fontsize=8.5,
+                  color=look.colour)  # fmt: skip
     bounded = math.isfinite(crossing.low) or math.isfinite(crossing.high)
     if bounded:
-        axes.plot(
-            [shown(crossing.low), shown(crossing.high)], [y, y], color=look.colour, marker="|",
-            markersize=8.0, markeredgewidth=1.6, linewidth=1.6, zorder=3,
-        )  # fmt: skip
+        axes.plot([least, most], [y, y], color=look.colour, marker="|", markersize=8.0,
+                  markeredgewidth=1.6, linewidth=1.6, zorder=3)  # fmt: skip
     known = math.isfinite(crossing.density)
     if known or bounded:
         axes.plot([start], [y], marker=look.marker, color=look.colour, markersize=5.5, zorder=4,

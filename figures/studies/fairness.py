@@ -32,14 +32,12 @@ def fairness_figure(results: Results) -> Figure:
     ):
         plots.draw_means(axes, rows, metric, PRIORITIES)
         style.plot_axes(axes, title, plots.DENSITY_LABEL, label)
-        plots.paper_densities(axes)
+        plots.density_axis(axes)
     plots.log_time(worst, 0.0, 500.0, linear=0.1)
     for axes, top in ((spread, 1.0), (by_lane, by_lane.get_ylim()[1])):
         axes.set_ylim(-0.025 * top, top)  # markers at 0 are whole
-    plots.heading(figure, "Fixed, rotating and longest-waiting priority on four arms, profile fair")
-    plots.looks_legend(figure, map(style.look, PRIORITIES), 0.925)
-    plots.marks_legend(figure, 0.865)
-    plots.footnote(figure, missing_note(results))
+    title = "Fixed, rotating and longest-waiting priority on four arms, profile fair"
+    plots.frame(figure, title, map(style.look, PRIORITIES), missing_note(results), marks=0.865)
     return figure
 
 

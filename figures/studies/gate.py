@@ -21,12 +21,10 @@ def gate_figure(results: Results) -> Figure:
         plots.draw_means(axes, rows, MEASURES["waiting time"], GATES)
         style.plot_axes(axes, f"{arms} arms", plots.DENSITY_LABEL, "")
         plots.log_time(axes, 0.0, 500.0, linear=0.1)
-        plots.paper_densities(axes)
+        plots.density_axis(axes)
     panels[0].set_ylabel(f"mean waiting [s], {plots.scale_words(0.1)}", **style.LABEL)
-    plots.heading(figure, "Two gates: a clear junction, or harmony with all vehicles that cross")
-    plots.looks_legend(figure, map(style.look, GATES), 0.925)
-    plots.marks_legend(figure, 0.865)
-    plots.footnote(figure, missing_note(results))
+    title = "Two gates: a clear junction, or harmony with all vehicles that cross"
+    plots.frame(figure, title, map(style.look, GATES), missing_note(results), marks=0.865)
     return figure
 
 

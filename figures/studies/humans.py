@@ -27,7 +27,7 @@ def human_figure(results: Results) -> Figure:
     rows = results.good
     run = [density for density in DENSITIES if (rows["density"] == density).any()]
     figure, panels = plots.panels(
-        11.0, 4.9, len(run), left=0.062, right=0.985, top=0.735, bottom=0.145, wspace=0.06
+        11.0, 4.9, len(run), left=0.062, right=0.985, top=0.715, bottom=0.145, wspace=0.06
     )
     stop = style.look(STOP)._replace(label="all-way stop (mean)", marker="")
     for axes, density in zip(panels, run, strict=True):
@@ -46,13 +46,12 @@ def human_figure(results: Results) -> Figure:
         axes.set_xticks([100.0 * share for share in SHARES])
         plots.log_time(axes, 1.0, 1000.0)
     panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
-    plots.heading(figure, "Human drivers among vehicles of DIM on four arms, profile fair")
-    plots.looks_legend(figure, [*LOOKS.values(), stop], 0.935, 3, fontsize=9.0)
-    plots.marks_legend(figure, 0.842)
-    plots.footnote(figure, (
+    note = (
         f"{missing_note(results)}  Delay is time loss and departure delay, up to the end of the "
         "run for vehicles that had not left it."
-    ))  # fmt: skip
+    )
+    title = "Human drivers among vehicles of DIM on four arms, profile fair"
+    plots.frame(figure, title, [*LOOKS.values(), stop], note, ncols=3, marks=0.832)
     return figure
 
 

@@ -50,17 +50,14 @@ def perception_figure(results: Results, series: str) -> Figure:
             outcomes.draw(axes, places, cells, outcome, look)
         level = outcomes.estimated(silent, outcome)
         if kind == "missed" and level is not None:
-            axes.axhline(level.value, color=SILENT.colour, linestyle=SILENT.dashes,
-                         linewidth=1.4)  # fmt: skip
+            axes.axhline(level.value, color=SILENT.colour, linestyle=SILENT.dashes, linewidth=1.4)
         outcomes.dress(axes, outcome, f"{outcome}, {outcomes.KIND_LOOKS[kind].label}",
                      "probability of an error", [f"{rate:g}" for rate in RATES])  # fmt: skip
     label = style.look(series).label
-    plots.heading(
-        figure, f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
-    )
-    plots.looks_legend(figure, [*LOOKS.values(), SILENT], 0.93, 3)
-    note = missing_note(results, wanted=lambda point: point.series == series)
-    plots.footnote(figure, f"{outcomes.NOTE}  {note}")
+    title = f"What misread intents do: {label}, four arms, {DENSITY:g} veh/h/lane, profile fair"
+    missing = missing_note(results, wanted=lambda point: point.series == series)
+    note = f"{outcomes.NOTE}  {missing}"
+    plots.frame(figure, title, [*LOOKS.values(), SILENT], note, ncols=3)
     return figure
 
 
@@ -94,9 +91,8 @@ def _outcomes(cell: pd.DataFrame) -> tuple[str, ...]:
     collisions = rate_of(cell, "collisions")
     unfinished = 100.0 * float(cell["unfinished"].sum()) / float(cell["trips"].sum())
     return (
-        f"{collisions.crossings:,}" if collisions else "0",
-        _count(cell, "collisions"), _count(cell, "false_grants"),
-        f"{disagreement:.1f}", f"{deadlock:.1f}", f"{unfinished:.1f}",
+        f"{collisions.crossings:,}" if collisions else "0", _count(cell, "collisions"),
+        _count(cell, "false_grants"), f"{disagreement:.1f}", f"{deadlock:.1f}", f"{unfinished:.1f}",
         str(mean_interval(cell[TOTAL_DELAY].astype(float).tolist())),
     )  # fmt: skip
 
@@ -109,17 +105,11 @@ def _count(rows: pd.DataFrame, events: str) -> str:
 SECTION = Section(
     "Wrong perception",
     (
-        Item(
-            "perception", "collisions, false grants and delay over intent errors",
-            partial(perception_figure, series=MISREADERS[0]), ("perception",),
-        ),
-        Item(
-            "perception-monitored", "the same with a safety monitor in every vehicle",
-            partial(perception_figure, series=MISREADERS[1]), ("perception",),
-        ),
-        Item(
-            "perception-table", "outcomes of 15 % misread intents", perception_table,
-            ("perception",),
-        ),
+        Item("perception", "collisions, false grants and delay over intent errors",
+             partial(perception_figure, series=MISREADERS[0]), ("perception",)),
+        Item("perception-monitored", "the same with a safety monitor in every vehicle",
+             partial(perception_figure, series=MISREADERS[1]), ("perception",)),
+        Item("perception-table", "outcomes of 15 % misread intents", perception_table,
+             ("perception",)),
     ),
 )  # fmt: skip

@@ -83,17 +83,14 @@ def _grid_figure(
         rows = chosen(results.good)
         plots.draw_means(axes, rows, measure.column, series)
         plots.draw_published(axes, theirs, rows, series)
-        style.plot_axes(
-            axes, paper.HEADINGS[results.study.name].capitalize(), plots.DENSITY_LABEL, ""
-        )
+        name = paper.HEADINGS[results.study.name].capitalize()
+        style.plot_axes(axes, name, plots.DENSITY_LABEL, "")
         plots.log_time(axes, measure.low, measure.high, linear=measure.linear)
-        plots.paper_densities(axes)
+        plots.density_axis(axes)
     scale = plots.scale_words(measure.linear)
     panels[0].set_ylabel(f"mean {measure.name} time [s], {scale}", **style.LABEL)
-    plots.heading(figure, f"Mean {measure.name} time{what}")
-    plots.looks_legend(figure, map(style.look, series), 0.925)
-    plots.marks_legend(figure, 0.868, paper=True)
-    plots.footnote(figure, missing_note(*both, wanted=wanted))
+    title, note = f"Mean {measure.name} time{what}", missing_note(*both, wanted=wanted)
+    plots.frame(figure, title, map(style.look, series), note, marks=0.868, paper=True)
     return figure
 
 

@@ -20,12 +20,11 @@ place = njit_inline(locate)
 def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
-    It applies the separating-axis test, which is exact, to rectangles a little larger than the
-    bodies, so it never misses a touch that pymunk would find.
+    The separating-axis test is exact, and the rectangles are a little larger than the bodies, so
+    it misses no touch that pymunk would find.
     """
     ends, shape, headings = road.ends, road.shape, road.headings
-    count = 0
-    inside = False
+    count, inside = 0, False
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             s = vehicles[i]["s"]
@@ -66,15 +65,9 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
 
 @njit
 def rectangles_meet(
-    dx: float,
-    dy: float,
-    ux: float,
-    uy: float,
-    wx: float,
-    wy: float,
-    half_length: float,
-    half_width: float,
-) -> bool:
+    dx: float, dy: float, ux: float, uy: float, wx: float, wy: float,
+    half_length: float, half_width: float,
+) -> bool:  # fmt: skip
     """Separating-axis test of equal rectangles with headings u and w, centres (dx, dy) apart."""
     cos = abs(ux * wx + uy * wy)
     sin = abs(ux * wy - uy * wx)

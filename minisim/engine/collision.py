@@ -25,30 +25,20 @@ class Body(NamedTuple):
 
 
 class Collision(NamedTuple):
-    """Two vehicles touched.
+    """Two vehicles touched."""
 
-    Attributes:
-        time: [s].
-        vehicles: their ids (rows of the trip table), the smaller one first.
-        movements: of both, such as ("a2", "c3").
-        positions: front bumpers, from the road entry [m].
-        speeds: [m/s].
-    """
-
-    time: float
-    vehicles: tuple[int, int]
-    movements: tuple[str, str]
-    positions: tuple[float, float]
-    speeds: tuple[float, float]
+    time: float  #: [s]
+    vehicles: tuple[int, int]  #: their ids (rows of the trip table), the smaller one first
+    movements: tuple[str, str]  #: of both, such as ("a2", "c3")
+    positions: tuple[float, float]  #: front bumpers, from the road entry [m]
+    speeds: tuple[float, float]  #: [m/s]
 
     def __str__(self) -> str:
-        both = " and ".join(
-            f"vehicle {v} ({m}, at {s:.1f} m, {speed:.1f} m/s)"
-            for v, m, s, speed in zip(
-                self.vehicles, self.movements, self.positions, self.speeds, strict=True
-            )
+        one, other = (
+            f"vehicle {vehicle} ({movement}, at {s:.1f} m, {v:.1f} m/s)"
+            for vehicle, movement, s, v in zip(*self[1:], strict=True)
         )
-        return f"at {self.time:.1f} s {both} touched"
+        return f"at {self.time:.1f} s {one} and {other} touched"
 
 
 def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> list[Collision]:
@@ -56,19 +46,12 @@ def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> li
     rows, bodies = near_bodies(vehicles, site)
     pairs = [(rows[i], rows[j]) for i, j in touching(bodies)]
     pairs += _overlaps_in_lane(vehicles, road, site.vehicle.length)
-    movements = site.intersection.movements
+    names = site.intersection.movements.names
     collisions = []
     for pair in pairs:
-        first, second = sorted((vehicles[row] for row in pair), key=lambda it: int(it["id"]))
-        collisions.append(
-            Collision(
-                time=time,
-                vehicles=(int(first["id"]), int(second["id"])),
-                movements=(str(movements[first["path"]]), str(movements[second["path"]])),
-                positions=(float(first["s"]), float(second["s"])),
-                speeds=(float(first["v"]), float(second["v"])),
-            )
-        )
+        both = sorted(vehicles[["id", "path", "s", "v"]][list(pair)].tolist())
+        columns = ((id, names[path], s, v) for id, path, s, v in both)
+        collisions.append(Collision(time, *zip(*columns, strict=True)))
     return collisions
 
 

@@ -292,5 +292,6 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen["length"] = law.length
             seen["demand_time"] = me["demand_tick"] * law.dt
             seen["rank"] = me["rank"]
+            seen["speed_factor"] = me["factor"]
             count += 1
     return count

@@ -7,13 +7,13 @@ arguments keep a call into the compiled kernel cheap, since unboxing arrays is m
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
-from minisim.control import LATERAL_ACCELERATION, Plan, Site
+from minisim.control import LATERAL_ACCELERATION, Observed, Plan, Site
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path
 from minisim.streams import Draws
@@ -65,58 +65,32 @@ LANE = np.dtype(
 )
 
 #: One line of a trajectory recording.
-TRACE = np.dtype(
-    [
-        ("tick", np.int64),
-        ("row", np.int64),
-        ("s", np.float64),
-        ("v", np.float64),
-        ("a", np.float64),
-        ("released", np.int64),
-    ]
-)
+TRACE = np.dtype([
+    ("tick", np.int64), ("row", np.int64), ("s", np.float64), ("v", np.float64), ("a", np.float64),
+    ("released", np.int64),
+])  # fmt: skip
+
+_TYPES = {int: np.int64, float: np.float64}
 
 #: The fields of `minisim.control.Observed`.
-OBSERVED = np.dtype(
-    [
-        ("id", np.int64),
-        ("lane", np.int64),
-        ("manoeuvre", np.int64),
-        ("distance", np.float64),
-        ("speed", np.float64),
-        ("length", np.float64),
-        ("demand_time", np.float64),
-        ("rank", np.int64),
-    ]
-)
+OBSERVED = np.dtype([(name, _TYPES[kind]) for name, kind in get_type_hints(Observed).items()])
 
 
 class Road(NamedTuple):
-    """The paths as arrays; p counts movements, k sections of the speed profile.
+    """The paths as arrays; p counts movements, k sections of the speed profile."""
 
-    Attributes:
-        ends: (p, 3): `s` of the junction exit and of the road's end [m], index of the exit arm.
-        shape: (p, ARC_SEGMENTS + 1, 2): polyline from entry to exit [m].
-        headings: (p, 4): unit vectors in (x, y) and out (x, y).
-        section_start: (p, k) [m], infinite past the last section.
-        section_speed: (p, k) limit from there on [m/s].
-        branch: (p, p) [m], see `minisim.junction.partings.branch`.
-        marks: (j,) `s` of the wake-up marks, ascending, the last one infinite [m].
-    """
-
-    ends: Floats
-    shape: Floats
-    headings: Floats
-    section_start: Floats
-    section_speed: Floats
-    branch: Floats
-    marks: Floats
+    ends: Floats  #: (p, 3): `s` of the junction exit and of the road's end [m], index of exit arm
+    shape: Floats  #: (p, ARC_SEGMENTS + 1, 2): polyline from entry to exit [m]
+    headings: Floats  #: (p, 4): unit vectors in (x, y) and out (x, y)
+    section_start: Floats  #: (p, k) [m], infinite past the last section
+    section_speed: Floats  #: (p, k): limit from there on [m/s]
+    branch: Floats  #: (p, p) [m], see `minisim.junction.partings.branch`
+    marks: Floats  #: (j,): `s` of the wake-up marks, ascending, the last one infinite [m]
 
 
 def build_road(site: Site, plan: Plan) -> Road:
     """Lay out the paths with the speed profile of the site and the plan's markings."""
-    intersection = site.intersection
-    paths = intersection.paths
+    paths = site.intersection.paths
     profiles = [_speed_profile(path, site, plan) for path in paths]
     width = max(len(profile) for profile in profiles) + 1
     start = np.full((len(paths), width), np.inf)
@@ -124,14 +98,14 @@ def build_road(site: Site, plan: Plan) -> Road:
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
-    marks = sorted(intersection.approach_length - distance for distance in plan.marks)
+    marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
     return Road(
         ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
         section_speed=speed,
-        branch=np.array(branch(intersection, site.vehicle)),
+        branch=np.array(branch(site.intersection, site.vehicle)),
         marks=np.array([*marks, np.inf]),
     )
 
@@ -158,22 +132,21 @@ def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, floa
 
 def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     """All vehicles of an arrival table, sorted by (lane, demand time), none on the road yet."""
-    index_of = site.intersection.movements.index_of
     order = np.lexsort((arrivals.time, arrivals.lane))
     vehicles = np.zeros(len(order), VEHICLE)
     vehicles["id"] = order
     vehicles["lane"] = arrivals.lane[order]
     vehicles["rank"] = arrivals.rank[order]
     vehicles["manoeuvre"] = arrivals.manoeuvre[order]
+    index_of = site.intersection.movements.index_of
     vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
     factors = arrivals.speed_factor
     vehicles["factor"] = _speed_factors(site, vehicles) if factors is None else factors[order]
-    vehicles["ahead"] = -1
-    vehicles["advice"] = np.inf
-    vehicles["brake"] = np.inf
-    vehicles["depart_tick"] = -1
-    vehicles["arrival_tick"] = -1
+    for name in ("ahead", "depart_tick", "arrival_tick"):
+        vehicles[name] = -1
+    for name in ("advice", "brake"):
+        vehicles[name] = np.inf
     return vehicles
 
 

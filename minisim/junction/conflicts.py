@@ -40,8 +40,8 @@ AREA_STEP = 0.1
 class Areas(NamedTuple):
     """Conflict areas of each pair of movements, shape (m, m) each [m], NaN where there is none.
 
-    A body on path p overlaps the part of corridor q inside the junction while the `s` of its front
-    bumper is between enter[p, q] and leave[p, q].
+    A body on path p overlaps the part of corridor q inside the junction while its front bumper is
+    at an `s` between enter[p, q] and leave[p, q].
     """
 
     enter: Floats
@@ -76,7 +76,7 @@ def separation(intersection: Intersection, vehicle: VehicleType) -> Floats:
     """
     swept = corridors(intersection, vehicle)
     i, j = np.triu_indices(len(swept), 1)
-    result = np.zeros((len(swept), len(swept)))
+    result = np.zeros(intersection.movements.apart.shape)
     result[i, j] = result[j, i] = shapely.distance(swept[i], swept[j])
     return _fixed(np.where(intersection.movements.apart, result, 0.0))
 
@@ -131,8 +131,8 @@ def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floa
     """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
 
     `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
-    of movement p. Minus infinity where the two do not conflict. Infinite where this is only so once
-    the rear has left the junction, as when both use the same exit lane.
+    of movement p. Minus infinity if the two do not conflict; infinite if this is only so once the
+    rear has left the junction, as when both use the same exit lane.
     """
     ways = _prepared(shapely.buffer(corridors(intersection, vehicle), CLEARANCE))
     ends = [path.crossing + vehicle.length for path in intersection.paths]
@@ -169,13 +169,9 @@ def _rivals(intersection: Intersection, vehicle: VehicleType) -> Bools:
 
 
 def _reaching(
-    intersection: Intersection,
-    vehicle: VehicleType,
-    fronts: Sequence[Floats],
-    areas: Shapes,
-    pairs: Bools,
-    room: float = 0.0,
-) -> Iterator[tuple[int, int, npt.NDArray[np.intp]]]:
+    intersection: Intersection, vehicle: VehicleType, fronts: Sequence[Floats], areas: Shapes,
+    pairs: Bools, room: float = 0.0,
+) -> Iterator[tuple[int, int, npt.NDArray[np.intp]]]:  # fmt: skip
     """For each of `pairs` (p, q): indices of the fronts where a body on path p is near area q."""
     for p in np.flatnonzero(pairs.any(axis=1)).tolist():
         shapes = bodies(intersection.paths[p], fronts[p], vehicle)
@@ -192,8 +188,7 @@ def _until_exit(path: Path, swept: shapely.Geometry) -> shapely.Geometry:
     ahead = 1000.0 * path.heading_out
     across = np.array([-ahead[1], ahead[0]])
     beyond = shapely.Polygon(path.points[-1] + [across, across + ahead, ahead - across, -across])
-    inside: shapely.Geometry = shapely.difference(swept, beyond)
-    return inside
+    return shapely.difference(swept, beyond)
 
 
 def _prepared(shapes: Sequence[shapely.Geometry] | Shapes) -> Shapes:

@@ -1,9 +1,8 @@
 """Where two vehicles on their paths come too close: the coordination space of two movements.
 
-Two vehicles on given paths are one point in the plane of their positions. A region of that plane
-is forbidden (the coordination space of O'Donnell and Lozano-Pérez, ICRA 1989). An interval on each
-path would only give the box around that region. The region also shows which vehicle has passed
-the other.
+Two vehicles on given paths are a point in the plane of their positions, in which a region is
+forbidden (O'Donnell and Lozano-Pérez, ICRA 1989). Intervals on the paths would only give the box
+around that region. The region also shows which vehicle has passed the other.
 """
 
 from __future__ import annotations
@@ -24,20 +23,18 @@ from minisim.vehicle import VehicleType
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between two bodies, one of which stands or crawls [m]: the buffer of 0.25 m around one of
-#: them (see `CLEARANCE`).
+#: Room between two bodies of which one stands or crawls [m]: one buffer (see `CLEARANCE`).
 CLOSE = 0.25
 
-#: Least room where two vehicles would otherwise stand for ever, and the step at which it is
-#: measured [m].
+#: Least room if two vehicles would otherwise stand for ever, and the step of its measurement [m].
 TIGHT = 0.1
 
 
 class Region(NamedTuple):
     """The forbidden region of two movements, on a grid of `STEP` from the junction entry onwards.
 
-    Rows are positions of the first vehicle's front past the entry; columns, of the second's. A
-    position before the entry counts as the entry. A position beyond the grid is outside the region.
+    Rows are positions of the first vehicle's front past the entry; columns, of the second's. Before
+    the entry counts as at the entry; beyond the grid is outside the region.
     """
 
     close: Bools  #: whether bodies come closer than `CLOSE` within one step of the grid point
@@ -60,9 +57,7 @@ class Region(NamedTuple):
     def ends(self, second: float) -> float:
         """Where the first leaves the region for good if the second is here or further on [m]."""
         column = max(int(second / STEP), 0)
-        if column >= self.ever.shape[1]:
-            return 0.0
-        rows = np.flatnonzero(self.ever[:, column])
+        rows = np.flatnonzero(self.ever[:, column : column + 1])
         return float(rows[-1] + 1) * STEP if len(rows) else 0.0
 
 
@@ -80,10 +75,9 @@ def region(
 
 
 def passes(
-    intersection: Intersection, vehicle: VehicleType, first: int, x: float,
-    second: int, y: float,
-) -> bool:  # fmt: skip
-    """Whether a vehicle on one path can pass a vehicle that stands on another path.
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
+) -> bool:
+    """Whether a vehicle on a path can pass a vehicle that stands on another path.
 
     The moving one needs `CLOSE` of room all the way on the grid or, measured, more than `TIGHT`.
     Movements are indices; `x` and `y` are how far past the entry the fronts are [m].
@@ -119,15 +113,14 @@ def _grids(
     intersection: Intersection, vehicle: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
     """Whether, near each grid point, bodies come closer than `CLEARANCE`, and than `CLOSE`."""
-    one, other = (_until_clear(intersection.paths[k], vehicle) for k in (first, second))
+
+    def until_clear(path: Path) -> Shapes:
+        past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
+        return bodies(path, path.entry + past, vehicle)
+
+    one, other = (until_clear(intersection.paths[k]) for k in (first, second))
     distance = shapely.distance(one[:, None], other[None, :])
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
-
-
-def _until_clear(path: Path, vehicle: VehicleType) -> Shapes:
-    """The body with its front at each grid point, until its rear has left the junction."""
-    past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
-    return bodies(path, path.entry + past, vehicle)
 
 
 def _widened(near: Bools) -> Bools:

@@ -46,12 +46,10 @@ class Arm:
 
 
 def _bearings(name: str, value: Any) -> tuple[float, ...]:
-    """Check the bearings of the arms."""
     bearings = numbers(name.removesuffix(" [deg]"), value)
-    if not 3 <= len(bearings) <= len(ARM_NAMES):
-        raise InputError(
-            f"an intersection has 3 … {len(ARM_NAMES)} arms, got {len(bearings)} bearings"
-        )
+    n, most = len(bearings), len(ARM_NAMES)
+    if not 3 <= n <= most:
+        raise InputError(f"an intersection has 3 … {most} arms, got {n} bearings")
     for i, bearing in enumerate(bearings):
         number(f"bearing {i + 1} [deg]", bearing, low=0, below=360)
     if list(bearings) != sorted(bearings):
@@ -59,7 +57,7 @@ def _bearings(name: str, value: Any) -> tuple[float, ...]:
         raise InputError(f"bearings must ascend clockwise from north; did you mean {wanted}?")
     for i, gap in enumerate(_gaps(bearings)):
         if gap < MIN_ANGLE - 1e-9:
-            a, b = ARM_NAMES[i], ARM_NAMES[(i + 1) % len(bearings)]
+            a, b = ARM_NAMES[i], ARM_NAMES[(i + 1) % n]
             raise InputError(
                 f"arms {a} and {b} are {gap:g}° apart; at least {MIN_ANGLE:g}° are needed"
             )
@@ -97,15 +95,14 @@ class Intersection:
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
     ways: tuple[Way, ...] | None = part(
-        "another simulator's curves through the junction, a Way a movement, in their order; none "
+        "another simulator's curves through the junction, a Way per movement, in their order; none "
         "is the arcs",
         tuple, optional=True, default=None,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        smallest = (self.lane_width + KERB_RADIUS) / math.tan(
-            math.radians(min(_gaps(self.bearings))) / 2.0
-        )
+        sharpest = math.radians(min(_gaps(self.bearings)))
+        smallest = (self.lane_width + KERB_RADIUS) / math.tan(sharpest / 2.0)
         if self.junction_radius is None:
             object.__setattr__(self, "junction_radius", smallest)
         number("junction_radius [m]", self.junction_radius, above=0, below=self.arm_length - 10)
@@ -139,11 +136,11 @@ class Intersection:
         return self.arm_length - self.junction_radius
 
     def index(self, movement: Movement | str) -> int:
-        """Position of a movement in `movements`; raises `InputError` if it does not exist."""
+        """Position of a movement in `movements`; `InputError` if it does not exist."""
         return self.movements.number(movement)
 
     def parse(self, text: str) -> Movement:
-        """Read a movement such as `a1`; raises an `InputError` that says what is allowed."""
+        """Read a movement such as `a1`; `InputError` if it does not exist."""
         return self.movements[self.index(text)]
 
     def exit_arm(self, movement: Movement) -> int:
@@ -181,8 +178,9 @@ class Intersection:
         return tangent * min(abs(slope), 1e6)
 
     def _build_path(self, movement: Movement) -> Path:
+        exit_arm, entry = self.exit_arm(movement), self.approach_length
         heading_in = -np.array(self.arms[movement.origin].outward)
-        heading_out = np.array(self.arms[self.exit_arm(movement)].outward)
+        heading_out = np.array(self.arms[exit_arm].outward)
         left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
         offset = self.lane_width / 2.0 if self.side == "left" else -self.lane_width / 2.0
         start = -heading_in * self.junction_radius + left_in * offset
@@ -203,9 +201,8 @@ class Intersection:
             inward = math.copysign(1.0, turn) * (1.0 - np.cos(angle))
             points = start + radius * (np.sin(angle) * heading_in - inward * left_in)
             points[-1] = end
-        entry = self.approach_length
         return Path(
-            movement, self.exit_arm(movement), entry=entry, exit=entry + length,
+            movement, exit_arm, entry=entry, exit=entry + length,
             length=entry + length + entry, radius=radius, points=points,
             heading_in=heading_in, heading_out=heading_out,
         )  # fmt: skip
@@ -213,10 +210,9 @@ class Intersection:
     def _check_ways(self) -> None:
         if self.ways is None:
             return
-        if len(self.ways) != len(self.movements):
-            raise InputError(
-                f"ways must hold {len(self.movements)} curves, one a movement, got {len(self.ways)}"
-            )
+        m, given = len(self.movements), len(self.ways)
+        if given != m:
+            raise InputError(f"ways must hold {m} curves, one per movement, got {given}")
         for movement, way in zip(self.movements, self.ways, strict=True):
             if not isinstance(way, Way) or len(way.points) < 2:
                 raise InputError(f"ways, {movement}: a Way of two or more points is needed")

@@ -2,7 +2,7 @@
 
 SUMO's vehicles follow not only the vehicle ahead, but also those inside the junction that are about
 to join their way, have just left it, or cross it. This is the table of those places: for every two
-ways, how far before the end of its own way each of them is when it meets the other.
+ways, how far before its end each of them meets the other.
 Source: `MSRightOfWayJunction::postloadInit`, `MSInternalJunction::postloadInit`,
 `MSLink::setRequestInformation`, `MSLink::computeDistToDivergence` (SUMO 1.18; 1.28 is the same).
 """
@@ -24,7 +24,7 @@ from minisim.junction.turns import Turn, turns
 
 Bools = npt.NDArray[np.bool_]
 
-#: Lanes this far apart no longer touch each other [m] (`DIVERGENCE_MIN_WIDTH`).
+#: Lanes this far apart no longer touch [m] (`DIVERGENCE_MIN_WIDTH`).
 DIVERGED = 2.5
 
 #: Ways that cross at a smaller angle count as crossing at one of this sine.
@@ -61,7 +61,7 @@ def meetings(intersection: Intersection) -> Floats:
             kind = _kind(intersection, ways, rights, (p, i), (q, k), crossing is not None)
             behind, width = crossing or (0.0, 0.0)
             if kind == Meeting.PART:
-                behind, width = _until_parted(part, other), 0.0
+                behind, width = max(part.length - _parted(part, other) * part.scale, 0.0), 0.0
             elif kind == Meeting.JOIN:
                 behind, width = _from_joined(part, other), 0.0
             elif kind == Meeting.WAIT and crossing is None:
@@ -72,40 +72,24 @@ def meetings(intersection: Intersection) -> Floats:
 
 
 class RightOfWay(NamedTuple):
-    """Which ways meet, shape (m, m), and which must give way; False where none must.
+    """Which ways meet, and which must give way."""
 
-    Attributes:
-        foes: whether the ways cross or join.
-        yields: whether the first must give way to the second.
-        major: whether the way comes from a road with priority, shape (m,).
-    """
-
-    foes: Bools
-    yields: Bools
-    major: Bools
+    foes: Bools  #: whether two ways cross or join, shape (m, m)
+    yields: Bools  #: whether the first must give way to the second, shape (m, m)
+    major: Bools  #: whether the way comes from a road with priority, shape (m,)
 
 
 def right_of_way(intersection: Intersection) -> RightOfWay:
     """From the given ways; on arcs none must give way, and all that cross or join meet."""
-    names = [str(movement) for movement in intersection.movements]
-    if intersection.ways is not None:
-        ways = intersection.ways
-        foes = np.array([[name in way.foes for name in names] for way in ways])
-        yields = np.array([[name in way.yields for name in names] for way in ways])
+    movements, ways = intersection.movements, intersection.ways
+    if ways is not None:
+        foes = np.array([[name in way.foes for name in movements.names] for way in ways])
+        yields = np.array([[name in way.yields for name in movements.names] for way in ways])
         return RightOfWay(foes, yields, np.array([way.major for way in ways]))
-    paths = intersection.paths
-    lines = [shapely.LineString(path.points) for path in paths]
-    foes = np.array(
-        [
-            [
-                path.movement.origin != rival.movement.origin
-                and (path.exit_arm == rival.exit_arm or bool(line.intersects(other)))
-                for rival, other in zip(paths, lines, strict=True)
-            ]
-            for path, line in zip(paths, lines, strict=True)
-        ]
-    )
-    return RightOfWay(foes, np.zeros_like(foes), np.zeros(len(paths), bool))
+    lines = np.array([shapely.LineString(path.points) for path in intersection.paths])
+    joins = movements.exits[:, None] == movements.exits
+    foes = movements.apart & (joins | shapely.intersects(lines[:, None], lines))
+    return RightOfWay(foes, np.zeros_like(foes), np.zeros(len(movements), bool))
 
 
 def _kind(
@@ -151,23 +135,16 @@ class _Curve(NamedTuple):
 
     @property
     def distances(self) -> Floats:
-        """Of the points along the polyline [m]."""
         return distances_along(self.points)
 
     @property
     def line(self) -> shapely.LineString:
-        """The polyline for shapely."""
         return shapely.LineString(self.points)
 
     @property
     def scale(self) -> float:
-        """Driven length over the polyline's."""
+        """Metres driven per metre of the polyline."""
         return self.length / float(self.distances[-1])
-
-    @property
-    def backwards(self) -> _Curve:
-        """The same from its end."""
-        return self._replace(points=self.points[::-1])
 
     @property
     def parts(self) -> dict[int, _Curve]:
@@ -201,18 +178,15 @@ def _crossing(one: _Curve, two: _Curve, lane_width: float) -> tuple[float, float
     return one.length - max(at - width / 2.0, 0.0) * one.scale, width
 
 
-def _until_parted(one: _Curve, two: _Curve) -> float:
-    return max(one.length - _parted(one, two) * one.scale, 0.0)
-
-
 def _from_joined(one: _Curve, two: _Curve) -> float:
     if math.dist(one.points[-1], two.points[-1]) >= DIVERGED:
         return 0.0
-    return _parted(one.backwards, two.backwards) * one.scale
+    ends = (curve._replace(points=curve.points[::-1]) for curve in (one, two))
+    return _parted(*ends) * one.scale
 
 
 def _parted(one: _Curve, two: _Curve) -> float:
-    """Distance along two curves with one beginning to where both are `DIVERGED` [m]."""
+    """Distance along two curves that begin together to where both are `DIVERGED` [m]."""
     near = max(_until_apart(one, two), _until_apart(two, one))
     return min(near, float(one.distances[-1]), float(two.distances[-1]))
 

@@ -29,7 +29,7 @@ class Movement(NamedTuple):
 class Movements(tuple[Movement, ...]):
     """The m = n(n−1) movements of a junction of n arms: a1, a2, …, b1, b2, …
 
-    A movement's place in this order is its index: its row and column in every table, and its bit
+    A movement's index is its place in this order: its row and column in every table, and its bit
     in every integer that stands for a set of movements. `movements_of` makes them.
     """
 

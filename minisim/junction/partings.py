@@ -1,4 +1,4 @@
-"""Where movements of one lane part, and what a vehicle's place reveals about its manoeuvre."""
+"""Where movements of a lane part, and what a vehicle's place reveals about its manoeuvre."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ BRANCH_ROOM = 0.5
 
 @lru_cache(maxsize=256)
 def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
-    """Where movements from one arm part, shape (m, m) [m].
+    """Where movements of a lane part, shape (m, m) [m].
 
     `[p, q]` is the smallest `s` on path p at which a rear bumper no longer obstructs path q.
-    It is infinite for the same path, and 0 between different arms.
+    It is infinite for the same path, and 0 between lanes.
     """
 
     def last_near(path: Path, other: Path) -> float:
@@ -98,10 +98,8 @@ def parting(intersection: Intersection, room: float) -> Floats:
 
     def first_apart(path: Path, other: Path) -> float:
         s = np.arange(0.0, path.crossing + 10.0, 0.1)
-        gaps = np.linalg.norm(
-            path.position(path.entry + s) - other.position(other.entry + s), axis=-1
-        )
-        far = np.flatnonzero(gaps > room)
+        between = path.position(path.entry + s) - other.position(other.entry + s)
+        far = np.flatnonzero(np.linalg.norm(between, axis=-1) > room)
         return float(s[far[0]]) if len(far) else math.inf
 
     return _by_lane(intersection, -math.inf, first_apart)
@@ -110,7 +108,7 @@ def parting(intersection: Intersection, room: float) -> Floats:
 def _by_lane(
     intersection: Intersection, different: float, measure: Callable[[Path, Path], float]
 ) -> Floats:
-    """`measure` of each pair of movements of a lane; `different` for pairs from different lanes."""
+    """`measure` of each pair of movements of a lane; `different` between lanes."""
     paths, apart = intersection.paths, intersection.movements.apart
     result = np.full(apart.shape, different)
     for p, q in np.argwhere(~apart).tolist():

@@ -19,7 +19,7 @@ from minisim.vehicle import VehicleType
 
 Floats = npt.NDArray[np.float64]
 
-#: Segments of the polyline of an arc; the chord error at radius 5.6 m is 4 mm.
+#: Segments of an arc's polyline; the chord error at radius 5.6 m is 4 mm.
 ARC_SEGMENTS = 32
 
 
@@ -30,11 +30,11 @@ class Way(NamedTuple):
     length: float  #: how far a vehicle drives on it [m]; simulators round it
     #: Distance from the entry to the waiting position that SUMO gives some far turns [m], or 0.
     wait: float = 0.0
-    speed: float = 0.0  #: limit on it [m/s]; 0 where it follows from the radius, as on an arc
+    speed: float = 0.0  #: limit on it [m/s]; 0 if it follows from the radius, as on an arc
     major: bool = False  #: whether the road that it comes from has priority
     yields: tuple[str, ...] = ()  #: movements to which it must give way, such as "b2"
     foes: tuple[str, ...] = ()  #: movements that it crosses or joins, as SUMO has them
-    turns_back: bool = False  #: whether the road that it leaves by leads back at its far end
+    turns_back: bool = False  #: whether its road of exit leads back at the far end
 
     def resampled(self, count: int) -> Floats:
         """`count` equally spaced points along it, shape (count, 2)."""

@@ -38,8 +38,8 @@ def turns(intersection: Intersection, straight: float = STRAIGHT) -> tuple[Turn,
 def lane_turns(intersection: Intersection, lane: int) -> tuple[Turn, ...]:
     """The kinds of a lane's manoeuvres 1, 2, …, by their order.
 
-    The straightest manoeuvre counts as straight on, whatever its angle, so that every lane has one
-    that needs no indicator.
+    The straightest counts as straight on, whatever its angle, so every lane has one that needs no
+    indicator.
     """
     straight = straightest(intersection, lane)
     kinds = tuple(Turn)[:: 1 if intersection.side == "left" else -1]  # from left to right

@@ -3,8 +3,8 @@
 A metric has one value per trip or one number per run. Trip values are averaged over the whole run
 and over each group of trips, in two forms. SUMO's form, which the paper used, is the mean over the
 trips that ended before the horizon. The complete form is the mean over all demanded trips: an
-unfinished trip counts with its waiting, loss and travel up to the horizon, and a vehicle that
-never got onto the road counts with its departure delay.
+unfinished one counts with its waiting, loss and travel up to the horizon, and a vehicle that never
+got onto the road counts with its departure delay.
 
 Nothing before the end of the warm-up is measured: trips that were demanded, trajectories and
 counts. Only collisions always count, so that no run hides one.
@@ -23,6 +23,7 @@ import inspect
 import math
 import traceback
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -59,7 +60,7 @@ def _name(title: str, value: Any) -> Any:
     if not isinstance(value, str) or not value.isidentifier():
         raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
     if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
-        raise InputError(f"{title} must be none that columns of runs have, got {value!r}")
+        raise InputError(f"{title} must not be that of a column of runs, got {value!r}")
     return value
 
 
@@ -73,15 +74,15 @@ def _function(title: str, value: Any) -> Any:
 class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
-    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`; neither has the
-    warm-up in it (`Run.counted`). A number that needs only trips is also measured for each lane,
+    The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
+    warm-up (`Run.counted`). A number that needs only trips is also measured for each lane,
     movement and kind.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
     of: Callable[[Any], Any] = checked(
-        "measures it: returns an array with one value a trip (NaN where there is none), or one "
-        "number (None where there is none)",
+        "measures it: returns an array with one value per trip (NaN for none), or one number "
+        "(None for none)",
         _function, "function", label="function of a metric",
     )  # fmt: skip
     unit: str = text("such as s", empty=True, default="")
@@ -110,12 +111,12 @@ class Metric:
         return f"{self.title or self.name} [{self.unit}]".removesuffix(" []")
 
     def values(self, subject: Run | Trips, count: int) -> Floats:
-        """One value per trip, shape (count,), NaN where there is none; otherwise `InputError`."""
+        """One value per trip, shape (count,), NaN for none; otherwise `InputError`."""
         given = self._measured(subject)
         values = np.asarray(given)
         if values.shape != (count,) or values.dtype.kind not in "biuf" or np.isinf(values).any():
             raise InputError(
-                f"metric {self.name!r} must give one finite number a trip, an array of shape "
+                f"metric {self.name!r} must give one finite number per trip, an array of shape "
                 f"({count},), got {show(given)}"
             )
         return np.asarray(values, dtype=float)
@@ -123,17 +124,16 @@ class Metric:
     def number(self, subject: Run | Trips) -> float | int | None:
         """One number, or None if there is none; raises `InputError` for anything else."""
         given = self._measured(subject)
-        plain = given.item() if isinstance(given, np.generic) else given
-        if plain is None or type(plain) is int:
-            return plain
-        if not isinstance(plain, Real) or math.isinf(plain):
+        if given is None:
+            return None
+        if not isinstance(given, Real | np.bool_) or math.isinf(given):
             hint = '; per="trip" takes an array' if isinstance(given, np.ndarray) else ""
             raise InputError(
                 f"metric {self.name!r} must give one finite number or None, got {show(given)}{hint}"
             )
-        if isinstance(plain, Integral):
-            return int(plain)
-        return None if math.isnan(plain) else float(plain)
+        if isinstance(given, Integral | np.bool_):
+            return int(given)
+        return None if math.isnan(given) else float(given)
 
     def _measured(self, subject: Run | Trips) -> Any:
         try:
@@ -141,10 +141,10 @@ class Metric:
         except Exception as error:  # a caller's function may raise anything
             frames = traceback.extract_tb(error.__traceback__)[1:2]
             place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
-            kind = "" if isinstance(error, MinisimError) else f" raised {type(error).__name__}"
-            raise InputError(
-                f"metric {self.name!r}{kind}: {error}{place if kind else ''}"
-            ) from error
+            what = f" raised {type(error).__name__}: {error}{place}"
+            if isinstance(error, MinisimError):
+                what = f": {error}"
+            raise InputError(f"metric {self.name!r}{what}") from error
 
 
 def _growth(trips: Trips) -> float:
@@ -300,8 +300,6 @@ def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
 def heading(column: str) -> str:
     """Heading of a column of a sweep, such as "waiting, with unfinished [s]"."""
     metric = METRICS.get(column.removeprefix("complete_"))
-    if metric is None:
-        return column
-    if not column.startswith("complete_"):
-        return metric.heading
-    return metric.heading.replace(metric.title, f"{metric.title}, with unfinished", 1)
+    if metric is not None and column.startswith("complete_"):
+        metric = replace(metric, title=f"{metric.title}, with unfinished")
+    return column if metric is None else metric.heading

@@ -35,11 +35,11 @@ class ScenarioLike(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name, such as "four-way"."""
+        """Such as "four-way"."""
 
     @property
     def profile_name(self) -> str:
-        """The profile's name, such as "paper"."""
+        """Such as "paper"."""
 
     @property
     def density(self) -> float:
@@ -124,17 +124,13 @@ class Run:
         self, metrics: str | Iterable[Asked] = (), by: Iterable[str] = ()
     ) -> dict[str, Any]:
         """What was run, and the numbers; see `minisim.results.summary.summarise`."""
+        what = self.scenario
         return {
-            "controller": name_of(self.controller),
-            "scenario": self.scenario.name,
-            "profile": self.scenario.profile_name,
-            "density": self.scenario.density,
-            "seed": self.seed,
-            "horizon_s": self.scenario.horizon,
-            "warmup_s": self.scenario.warmup,
-            "host": self.host["host"],
+            "controller": name_of(self.controller), "scenario": what.name,
+            "profile": what.profile_name, "density": what.density, "seed": self.seed,
+            "horizon_s": what.horizon, "warmup_s": what.warmup, "host": self.host["host"],
             **summarise(self, metrics, by),
-        }
+        }  # fmt: skip
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -156,8 +152,8 @@ class Run:
     def load(cls, path: str | os.PathLike[str]) -> Run:
         """Read a run that `save` has written.
 
-        Raises `MissingExtraError` without pyarrow, and `FileError` if the file is missing, damaged,
-        not a saved run, or of another layout.
+        Raises `MissingExtraError` without pyarrow, and `FileError` if the file is missing or
+        damaged, not a saved run, or of another layout.
         """
         from minisim.results.saved import load
 
@@ -192,15 +188,10 @@ class Run:
             heading[here] = intersection.paths[p].pose(trace["s"][here], length)[1]
         lanes = pd.Index(list(ARM_NAMES[: intersection.n]))
         columns = (
-            np.round(trace["tick"] * self.site.dt, 6),
-            rows["id"],
+            np.round(trace["tick"] * self.site.dt, 6), rows["id"],
             pd.Categorical.from_codes(movements.origins[path_of], lanes),
-            movements.manoeuvres[path_of],
-            trace["s"],
-            *front.T,
-            np.degrees(np.arctan2(*heading.T)) % 360.0,
-            trace["v"],
-            trace["a"],
+            movements.manoeuvres[path_of], trace["s"], *front.T,
+            np.degrees(np.arctan2(*heading.T)) % 360.0, trace["v"], trace["a"],
             trace["released"] != 0,
-        )
+        )  # fmt: skip
         return pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))

@@ -59,12 +59,11 @@ class Rows(NamedTuple):
 
 
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
-    """The closest calls in a recording; None where nothing of the kind happened.
+    """The closest calls in a recording; None if nothing of the kind happened.
 
-    They are `min_ttc_s` (following and crossing), `min_pet_s`, `max_drac_mps2` (following),
-    `max_braking_mps2`, the number of encroachments `pets`, and the numbers of short ones
-    (`minisim.results.metrics.PETS`). Raises `InputError` for a missing column, or a movement that
-    the site does not have.
+    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` are the
+    encroachments, besides the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
+    a missing column, or a movement that the site does not have.
     """
     rows = _rows(frame, site)
     follow = following(rows, site)
@@ -106,12 +105,8 @@ def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         ttc = np.where(closing > 0.0, np.maximum(gap, 0.0) / closing, np.nan)
         drac = np.where((closing > 0.0) & (gap > 0.0), closing**2 / (2.0 * gap), np.nan)
     return pd.DataFrame({
-        "time_s": rows.time[follower],
-        "follower": rows.vehicle[follower],
-        "leader": rows.vehicle[leader],
-        "gap_m": gap,
-        "closing_mps": closing,
-        "ttc_s": ttc,
+        "time_s": rows.time[follower], "follower": rows.vehicle[follower],
+        "leader": rows.vehicle[leader], "gap_m": gap, "closing_mps": closing, "ttc_s": ttc,
         "drac_mps2": drac,
     })  # fmt: skip
 
@@ -119,8 +114,8 @@ def following(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
 def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
-    A vehicle still inside when its recording ends counts as leaving then. A vehicle whose entry
-    was not recorded does not count. Columns `time_s` (the second enters), `first, second, pet_s`,
+    A vehicle still inside when its recording ends counts as leaving then; one whose entry was not
+    recorded does not count. Columns `time_s` (when the second enters), `first, second, pet_s`,
     sorted by time.
     """
     rows = _rows(frame, site)
@@ -140,12 +135,10 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
     time, firsts, seconds, pets = np.concatenate(pairs).T
     order = np.argsort(time, kind="stable")
-    return pd.DataFrame({
-        "time_s": time[order],
-        "first": firsts[order].astype(np.int64),
-        "second": seconds[order].astype(np.int64),
-        "pet_s": pets[order],
-    })  # fmt: skip
+    first, second = (ids[order].astype(np.int64) for ids in (firsts, seconds))
+    return pd.DataFrame(
+        {"time_s": time[order], "first": first, "second": second, "pet_s": pets[order]}
+    )
 
 
 def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
@@ -174,9 +167,7 @@ def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         ahead += 1
     first, second = _join(firsts), _join(seconds)
     return pd.DataFrame({
-        "time_s": rows.time[first],
-        "first": rows.vehicle[first],
-        "second": rows.vehicle[second],
+        "time_s": rows.time[first], "first": rows.vehicle[first], "second": rows.vehicle[second],
         "ttc_s": _join(ttcs, np.float64),
     })  # fmt: skip
 
@@ -191,21 +182,14 @@ def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
     movement = movement_index(frame, site)
     entries = np.array([path.entry for path in site.intersection.paths])
     return Rows(
-        time=time,
-        step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
-        vehicle=frame[VEHICLE].to_numpy(dtype=np.int64),
-        movement=movement,
-        s=s,
-        v=speed,
+        time=time, step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
+        vehicle=frame[VEHICLE].to_numpy(dtype=np.int64), movement=movement, s=s, v=speed,
         goes=frame[RIGHT_OF_WAY].to_numpy(dtype=bool) | (s >= entries[movement]),
-    )
+    )  # fmt: skip
 
 
 def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
-    """Rows of followers and of their leaders in the same lane, and the gaps [m].
-
-    The leader is the nearest one ahead that is still in the follower's way.
-    """
+    """Rows of followers and of the next vehicles in their lane and way, and the gaps [m]."""
     parts = branch(site.intersection, site.vehicle)
     lane = site.intersection.movements.origins[rows.movement]
     order = np.lexsort((-rows.s, lane, rows.step))
@@ -227,8 +211,8 @@ def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
 def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers in and past the junction and of their leaders to the exit lane; gaps [m].
 
-    Leaders come from another arm; those from the same arm are leaders in the lane. There must be
-    a gap: when two bodies are side by side, neither follows the other yet.
+    Leaders come from another arm. There must be a gap: when two bodies are side by side, neither
+    follows the other yet.
     """
     paths, movements = site.intersection.paths, site.intersection.movements
     origin, exit_arm = movements.origins[rows.movement], movements.exits[rows.movement]
@@ -238,12 +222,9 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     order = inside[np.lexsort((-past[inside], exit_arm[inside], rows.step[inside]))]
     follower, leader = order[1:], order[:-1]
     gap = past[leader] - site.vehicle.length - past[follower]
-    pairs = (
-        (rows.step[follower] == rows.step[leader])
-        & (exit_arm[follower] == exit_arm[leader])
-        & (origin[follower] != origin[leader])
-        & (gap > 0.0)
-    )
+    pairs = (gap > 0.0) & (origin[follower] != origin[leader])
+    for same in (rows.step, exit_arm):
+        pairs &= same[follower] == same[leader]
     return follower[pairs], leader[pairs], gap[pairs]
 
 

@@ -4,8 +4,8 @@ The file holds `run.json`, `trips.parquet`, `trace.parquet` and `rows.parquet`. 
 or not at all. Zip's comment at its end is a digest of all before it, which reveals damage.
 
 Objects of our own classes (`PACKAGES`) are written as class and fields, and come back as they
-were. Other scenarios and controllers come back as stand-ins with their name and text. Reading a
-file imports only our own modules.
+were. Other scenarios and controllers come back as stand-ins with their name and text. Reading
+imports only our own modules.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class _StandIn:
 
 @dataclass(frozen=True, repr=False)
 class SavedController(_StandIn):
-    """Stands in for a controller that is not of our own classes."""
+    """Stands in for a controller of another class than ours."""
 
     what = "controller"
     start = _StandIn.refuse
@@ -72,7 +72,7 @@ class SavedController(_StandIn):
 
 @dataclass(frozen=True, repr=False)
 class SavedScenario(_StandIn):
-    """Stands in for a scenario that is not of our own classes."""
+    """Stands in for a scenario of another class than ours."""
 
     what = "scenario"
     profile_name: str
@@ -90,7 +90,7 @@ def save(run: Run, path: str | os.PathLike[str]) -> None:
     head = {
         "mark": MARK,
         "layout": LAYOUT,
-        "provenance": run.provenance,  # for human readers; not read back
+        "provenance": run.provenance,  # for people; not read back
         "scenario": _written_or(run.scenario, SavedScenario),
         "controller": _written_or(run.controller, SavedController),
         **{name: written(getattr(run, name)) for name in _VALUES},
@@ -114,18 +114,17 @@ def load(path: str | os.PathLike[str]) -> Run:
     _need_pyarrow()
     data = read_file("saved run", path, 2**32)
     place = os.fspath(path)
+    foreign = FileError(f"{place} is not a saved run of minisim")
     if not data.startswith(b"PK"):
-        raise FileError(f"{place} is not a saved run of minisim")
+        raise foreign
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
             head: Any = json.loads(file.read("run.json")) if "run.json" in file.namelist() else {}
             if head.get("mark") != MARK:
-                raise FileError(f"{place} is not a saved run of minisim")
-            if head["layout"] != LAYOUT:
-                raise FileError(
-                    f"{place} has layout {show(head['layout'])}, this version of minisim reads "
-                    f"layout {LAYOUT}"
-                )
+                raise foreign
+            if (layout := head["layout"]) != LAYOUT:
+                ours = f"this version of minisim reads layout {LAYOUT}"
+                raise FileError(f"{place} has layout {show(layout)}, {ours}")
             if data != _signed(data):
                 raise FileError(f"{place} is damaged: it is not what was saved")
             return _run(head, file)
@@ -138,14 +137,11 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 
 def _run(head: Mapping[str, Any], file: zipfile.ZipFile) -> Run:
-    trips, trace, rows = (
-        pd.read_parquet(io.BytesIO(file.read(f"{name}.parquet")))
-        for name in ("trips", "trace", "rows")
-    )
-    values = {name: made(head[name]) for name in ("scenario", "controller", *_VALUES)}
+    tables = (io.BytesIO(file.read(f"{name}.parquet")) for name in ("trips", "trace", "rows"))
+    trips, trace, rows = map(pd.read_parquet, tables)
     columns: dict[str, Any] = {name: trips[name].to_numpy() for name in TRIP_ARRAYS}
     return Run(
-        **values,
+        **{name: made(head[name]) for name in ("scenario", "controller", *_VALUES)},
         columns=Trips(end=float(head["end"]), **columns),
         trace=np.asarray(trace.to_records(index=False)),
         rows=np.asarray(rows.to_records(index=False)),
@@ -169,8 +165,7 @@ def written(value: object) -> Any:
         return {type(value).__name__: [written(item) for item in value]}  # type: ignore[attr-defined]  # a collection
     if isinstance(value, Mapping):
         return {"mapping": [[written(key), written(item)] for key, item in value.items()]}
-    kind = type(value)
-    if _is_ours(kind):
+    if _is_ours(kind := type(value)):
         return {
             "class": f"{kind.__module__}:{kind.__qualname__}",
             "fields": {name: written(getattr(value, name)) for name in _fields(kind)},
@@ -200,15 +195,14 @@ def made(data: Any) -> Any:
             if set(given) != set(_fields(kind)):
                 raise InputError(f"{name} has other fields")
             return kind(**{key: made(item) for key, item in given.items()})
-    raise InputError(f"{show(data)} is no value of a run")
+    raise InputError(f"{show(data)} is not a value of a run")
 
 
 def _fields(kind: Any) -> tuple[str, ...]:
     """What the constructor of a dataclass or named tuple takes."""
     if is_dataclass(kind):
         return tuple(field.name for field in fields(kind) if field.init)
-    names: tuple[str, ...] = kind._fields
-    return names
+    return tuple(kind._fields)
 
 
 def _is_ours(kind: type) -> bool:
@@ -225,7 +219,7 @@ def _class(name: str) -> Any:
     ours = module.partition(".")[0] in PACKAGES and qualname.isidentifier()
     kind = getattr(importlib.import_module(module), qualname, None) if ours else None
     if not isinstance(kind, type) or kind.__module__ != module or not _is_ours(kind):
-        raise InputError(f"{show(name)} is no class of minisim")
+        raise InputError(f"{show(name)} is not a class of minisim")
     return kind
 
 
@@ -254,5 +248,4 @@ def _signed(data: bytes) -> bytes:
 
 
 def _parquet(columns: Any) -> bytes:
-    data: bytes = pd.DataFrame(columns).to_parquet(index=False, engine="pyarrow")
-    return data
+    return bytes(pd.DataFrame(columns).to_parquet(index=False, engine="pyarrow"))

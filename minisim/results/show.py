@@ -44,10 +44,8 @@ def _html_row(name: str, means: Mapping[str, Any]) -> str:
 
 
 def _what(summary: Mapping[str, Any]) -> str:
-    scenario, controller, profile = (
-        _short(summary[name]) for name in ("scenario", "controller", "profile")
-    )
-    return f"{scenario}, {controller}: {conditions({**summary, 'profile': profile})}"
+    short = {name: _short(summary[name]) for name in ("scenario", "controller", "profile")}
+    return "{scenario}, {controller}: ".format_map(short) + conditions({**summary, **short})
 
 
 def conditions(summary: Mapping[str, Any]) -> str:
@@ -61,10 +59,7 @@ def conditions(summary: Mapping[str, Any]) -> str:
 
 
 def _trips(summary: Mapping[str, Any]) -> str:
-    return (
-        f"{summary['trips']} trips, {summary['unfinished']} unfinished, "
-        f"{summary['collisions']} collisions"
-    )
+    return "{trips} trips, {unfinished} unfinished, {collisions} collisions".format_map(summary)
 
 
 def _number(value: float | None) -> str:

@@ -19,8 +19,8 @@ from minisim.results.metrics import (
     Asked,
     Metric,
     asked_metrics,
-)
-from minisim.results.trips import Floats, Ints, Trips
+)  # fmt: skip
+from minisim.results.trips import Ints, Trips
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,17 +38,12 @@ def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
     """Trips as a DataFrame with `TRIP_COLUMNS`; missing values are NaN."""
     import pandas as pd
 
-    names = np.array(list(ARM_NAMES))
+    arms = np.array(list(ARM_NAMES))
     columns = {
-        "vehicle": trips.vehicle,
-        **({"kind": np.array(kinds)} if kinds else {}),
-        "demand_time_s": trips.demand_time,
-        "depart_s": trips.depart,
-        "arrival_s": trips.arrival,
-        "lane": names[trips.lane],
-        "manoeuvre": trips.manoeuvre,
-        "exit_lane": names[trips.exit_lane],
-    }
+        "vehicle": trips.vehicle, **({"kind": np.array(kinds)} if kinds else {}),
+        "demand_time_s": trips.demand_time, "depart_s": trips.depart, "arrival_s": trips.arrival,
+        "lane": arms[trips.lane], "manoeuvre": trips.manoeuvre, "exit_lane": arms[trips.exit_lane],
+    }  # fmt: skip
     for name in MEANS:
         metric = METRICS[name]
         over = trips.arrived if metric.phase == "drive" else trips.departed
@@ -72,26 +67,21 @@ def summarise(
             percentile and maximum (`SPREAD`, numpy's linear method).
         by: further groupings, such as "movement".
 
-    Raises `InputError` for an unknown metric or group, a metric that needs trajectories when none
-    were recorded, a metric whose function raises anything or returns the wrong type or shape, or a
-    count of the controller's that has the name of another number.
+    Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were
+    not recorded, a metric whose function raises or returns the wrong type or shape, or a count of
+    the controller's with the name of another number.
     """
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
     table = (*USUAL, *(metric for metric in asked if not metric.usual))
     measured = _Measured(run, table, asked)
-    top = measured.of(np.arange(len(run.columns.lane)))
-    complete = top.pop("complete")
-    summary = {
-        **top,
-        **{
-            key: {name: measured.of(rows) for name, rows in _groups(run, key).items()}
-            for key in ("lanes", *(["kinds"] if run.kinds else []), *keys)
-        },
-        "complete": complete,
-        **{m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"},
-    }
+    summary = measured.of(np.arange(len(run.columns.lane)))
+    complete = summary.pop("complete")
+    for key in ("lanes", *(["kinds"] if run.kinds else []), *keys):
+        summary[key] = {name: measured.of(rows) for name, rows in _groups(run, key).items()}
+    summary["complete"] = complete
+    summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":
             raise InputError(f"{name!r} is also what the controller calls a count of its own")
@@ -104,7 +94,11 @@ class _Measured:
     def __init__(self, run: Run, table: tuple[Metric, ...], asked: tuple[Metric, ...]) -> None:
         self._trips = run.columns
         self._spread = {metric.name for metric in asked}
-        self._values = [(m, _trip_values(run, m)) for m in table if m.per == "trip"]
+        self._values = [
+            (m, m.values(run.columns if m.needs == "trips" else run, len(run.columns.lane)))
+            for m in table
+            if m.per == "trip"
+        ]
         # The two numbers that every group has are computed in `of`.
         self._numbers = [m for m in table if m.per == "run" and m.needs == "trips" and not m.usual]
 
@@ -125,11 +119,6 @@ class _Measured:
                 if metric.name in self._spread:
                     form |= _spread(metric.name, there)
         return {**numbers, "complete": complete}
-
-
-def _trip_values(run: Run, metric: Metric) -> Floats:
-    """The metric's value for each trip."""
-    return metric.values(run.columns if metric.needs == "trips" else run, len(run.columns.lane))
 
 
 def _mean(values: list[float]) -> float | None:

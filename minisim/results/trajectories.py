@@ -19,7 +19,7 @@ from minisim.results.summary import TRIP_COLUMNS
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Columns of `run.trajectories`, one row per vehicle and step, sorted by time, then vehicle.
+#: Columns of `run.trajectories`: a row per vehicle and step, sorted by time, then vehicle.
 TIME: Final = "time_s"
 VEHICLE: Final = "vehicle"
 LANE: Final = "lane"
@@ -54,10 +54,7 @@ def write_trajectories(frame: pd.DataFrame, path: str | os.PathLike[str]) -> Non
 
 
 def write_trips(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write `run.trips` as CSV or Parquet, with empty cells for what an unfinished trip lacks.
-
-    Raises the same errors as `write_trajectories`.
-    """
+    """Write `run.trips` likewise, with empty cells for what an unfinished trip lacks."""
     check_columns(frame, TRIP_COLUMNS)
     write_table(frame, path)
 

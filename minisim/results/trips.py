@@ -57,39 +57,42 @@ TRIP_ARRAYS: Final = Trips._fields[:-2]
 def collect_trips(
     vehicles: Records, demand_time: Floats, movements: Movements, dt: float, end: float
 ) -> Trips:
-    """Build, from its vehicle array, the trips of a run that has reached `end` [s]."""
+    """The trips of a run that has reached `end` [s], from its vehicle array."""
     rows = vehicles[np.argsort(vehicles["id"], kind="stable")]
-    departed = rows["status"] != WAITING
-    arrived = rows["status"] == ARRIVED
-    depart = np.where(departed, rows["depart_tick"] * dt, np.nan)
-    arrival = np.where(arrived, rows["arrival_tick"] * dt, np.nan)
+    return trips_of(
+        demand_time, rows["lane"], rows["manoeuvre"], movements, end,
+        depart=np.where(rows["status"] != WAITING, rows["depart_tick"] * dt, np.nan),
+        arrival=np.where(rows["status"] == ARRIVED, rows["arrival_tick"] * dt, np.nan),
+        waiting_time=rows["waiting_ticks"] * dt, time_loss=rows["lost_ticks"] * dt,
+    )  # fmt: skip
+
+
+def trips_of(
+    demand_time: Floats, lane: Ints, manoeuvre: Ints, movements: Movements, end: float, *,
+    depart: Floats, arrival: Floats, waiting_time: Floats, time_loss: Floats,
+) -> Trips:  # fmt: skip
+    """Trips from what a host has measured up to `end` [s]; times not reached are NaN."""
+    departed, arrived = ~np.isnan(depart), ~np.isnan(arrival)
     travel = np.where(arrived, arrival, end) - depart
     return Trips(
-        end=end,
-        vehicle=rows["id"].astype(np.int64),
-        demand_time=demand_time,
-        depart=depart,
-        arrival=arrival,
-        lane=rows["lane"].copy(),
-        manoeuvre=rows["manoeuvre"].copy(),
-        exit_lane=movements.exits[rows["path"]],
-        waiting_time=rows["waiting_ticks"] * dt,
-        travel_time=np.where(departed, travel, 0.0),
-        time_loss=rows["lost_ticks"] * dt,
+        end=end, vehicle=np.arange(len(lane)), demand_time=demand_time, depart=depart,
+        arrival=arrival, lane=lane.copy(), manoeuvre=manoeuvre.copy(),
+        exit_lane=movements.exits[movements.index_of[lane, manoeuvre]],
+        waiting_time=waiting_time, travel_time=np.where(departed, travel, 0.0),
+        time_loss=time_loss,
         depart_delay=np.maximum(np.where(departed, depart, end) - demand_time, 0.0),
-        departed=departed,
-        arrived=arrived,
-    )
+        departed=departed, arrived=arrived,
+    )  # fmt: skip
 
 
 def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 0.0) -> float:
     """How many more vehicles were present in the last quarter of a run than in the second.
 
     A vehicle is present from demand to arrival, so queues before the road count too. The numbers
-    are means over a quarter, which evens out the swing of a signal's cycle. No trajectories are
-    needed. `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have
-    shape (k,); all times are in s; `leave` is infinite if not reached. `start` ends the warm-up;
-    the quarters divide the time after it.
+    are means over a quarter, which evens out the swing of a signal's cycle.
+    `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have shape (k,);
+    all times are in s; `leave` is infinite if not reached. The quarters divide the time from
+    `start`, the end of the warm-up.
     """
     length = (end - start) / 4.0
     if length <= 0.0:  # the run was stopped during its warm-up

@@ -1,7 +1,7 @@
 """SUMO's `CC`, the model of `minisim.vehicle.CruiseVehicle`: its vehicle type, and its steering.
 
-Such a vehicle obeys no speed limit or marking. It is told the advised speed. It gets a command for
-a hold line only while the line asks for more braking than the model does.
+Such a vehicle obeys no speed limit or marking, only the advised speed. It gets a command for a hold
+line only while the line asks for more braking than the model does.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from minisim.engine.cruise.law import Cruise, follow, realise
 from minisim.errors import InputError
 from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
-from minisim.sumo.steering import Car, Released, Speeds, near
+from minisim.sumo.steering import Car, Released, Steering, near
 from minisim.vehicle import CruiseVehicle
 
 #: Spacing and radar range, fixed in SUMO's code (`MSCFModel_CC`) [m].
@@ -37,6 +37,8 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
             f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
             f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
+    if vehicle.obeys:
+        raise InputError("hosted in SUMO, a CruiseVehicle cannot obey limits and lights by itself")
     return {
         "accel": vehicle.engine_acceleration, "decel": vehicle.max_deceleration,
         "ccAccel": vehicle.cruise_acceleration, "ccDecel": vehicle.cruise_deceleration,
@@ -45,14 +47,12 @@ def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
     }  # fmt: skip
 
 
-class Cruiser:
+class Cruiser(Steering):
     """Steers SUMO's `CC` as a cruise control with ACC, through its desired speed."""
 
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
-        law = job.law
-        self._law, self._cruise = law, cruise
-        self._vehicle = libsumo.vehicle
-        self._speeds = Speeds(libsumo)
+        super().__init__(job.law, libsumo)
+        self._cruise, law = cruise, job.law
         top = max(cruise.cruise_speed, job.road.section_speed.max())
         self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
 
@@ -86,14 +86,10 @@ class Cruiser:
                 if held and near(car.v, law.hold - car.s, law):
                     acc = min(acc, max(hold(car.v, car.s, law), -law.b_max))
                 if acc < math.inf and acc < self._own(car, ahead):
-                    self._speeds.command(car, car.v + acc * law.dt)
+                    self.command(car, car.v + acc * law.dt)
                 else:
                     self.release(car)
                 ahead = car
-
-    def release(self, car: Car) -> None:
-        """Leave the car to the model."""
-        self._speeds.hand_back(car)
 
     def _own(self, car: Car, ahead: Car | None) -> float:
         """The model's acceleration on the approach if no command replaces it [m/s²]."""
@@ -102,7 +98,7 @@ class Cruiser:
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
         if ahead is not None:
             gap = ahead.s - law.length - car.s
-            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, cruise))
+            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, law, cruise))
         return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
 
     def _desired(self, car: Car) -> float:

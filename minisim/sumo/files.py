@@ -13,13 +13,14 @@ from minisim.control import Site
 from minisim.engine.state import Records
 from minisim.errors import SumoError
 from minisim.junction.movements import ARM_NAMES
-from minisim.results.trips import Trips
+from minisim.results.trips import Trips, trips_of
 from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.vehicle import MODELS, CruiseVehicle
+from minisim.vehicle import CruiseVehicle
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
+_ATTRIBUTES = ("depart", "arrival", "waitingTime")
 TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
 
 
@@ -57,61 +58,45 @@ def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | Non
         yield tag("route", {"id": path.movement, "edges": edges})
     movements = site.intersection.movements
     for i in np.lexsort((vehicles["id"], vehicles["demand_tick"])).tolist():
-        yield tag(
-            "vehicle",
-            {
-                "id": vehicles["id"][i],
-                "type": "car",
-                "route": movements[vehicles["path"][i]],
-                "depart": f"{vehicles['demand_tick'][i] * site.dt:.3f}",
-                "departPos": site.vehicle.length + MODELS[site.vehicle.model].margin,
-                "departSpeed": "max" if depart_speed != 0.0 else 0,
-                "speedFactor": f"{vehicles['factor'][i]:.9f}",
-            },
-        )
+        row = vehicles[i]
+        yield tag("vehicle", {
+            "id": row["id"], "type": "car", "route": movements[row["path"]],
+            "depart": f"{row['demand_tick'] * site.dt:.3f}",
+            "departPos": site.vehicle.length + site.vehicle.margin,
+            "departSpeed": "max" if depart_speed != 0.0 else 0,
+            "speedFactor": f"{row['factor']:.9f}",
+        })  # fmt: skip
 
 
 def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
     options = {
-        "net-file": NETWORK,
-        "route-files": ROUTES,
-        "tripinfo-output": TRIPS,
-        "tripinfo-output.write-unfinished": "true",
-        "tripinfo-output.write-undeparted": "true",
-        "precision": 6,
-        "log": LOG,
-        "begin": 0,
+        "net-file": NETWORK, "route-files": ROUTES, "tripinfo-output": TRIPS,
+        "tripinfo-output.write-unfinished": "true", "tripinfo-output.write-undeparted": "true",
+        "precision": 6, "log": LOG, "begin": 0,
         "route-steps": 0,  # all vehicles are known before the first step
-        "step-length": job.law.dt,
-        "step-method.ballistic": str(not job.law.semi_implicit).lower(),
-        "seed": seed % 2**31,
-        "no-step-log": "true",
-        "duration-log.disable": "true",
-    }
+        "step-length": job.law.dt, "step-method.ballistic": str(not job.law.semi_implicit).lower(),
+        "seed": seed % 2**31, "no-step-log": "true", "duration-log.disable": "true",
+    }  # fmt: skip
     if not job.teleport:
         # No vehicle is taken off the road, whether for waiting or for a collision. With the action
         # "none", SUMO would not even look for collisions.
         options |= {
-            "time-to-teleport": -1,
-            "collision.action": "warn",
-            "collision.check-junctions": "true",
-            "collision.mingap-factor": 0,
-        }
+            "time-to-teleport": -1, "collision.action": "warn",
+            "collision.check-junctions": "true", "collision.mingap-factor": 0,
+        }  # fmt: skip
     if fcd:
         options |= {"fcd-output": FCD}
     return (tag(name, {"value": value}) for name, value in options.items())
 
 
-def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: float) -> Trips:
-    """SUMO's trips from a run that has reached `end` [s], in demand order.
+def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trips:
+    """SUMO's trips in demand order; raises `SumoError` if they are not those of the arrivals.
 
     Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own time loss
     leaves out what a vehicle loses while it accelerates to a higher limit, and SUMO does not know
     about markings.
-
-    Raises:
-        SumoError: there are no trips, or they are not those of the arrivals.
     """
+    end = (job.horizon if ended.done else ended.tick) * job.law.dt
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
     # SUMO does not report vehicles that want to enter when the run is over.
     values[arrivals.time > end - 1.5 * job.law.dt] = -1.0, -1.0, 0.0
@@ -128,23 +113,9 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended, end: fl
     # SUMO still inserts vehicles at the very end. One that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
     arrived = departed & (arrival >= 0.0)
-    travel = np.where(departed, np.where(arrived, arrival, end) - depart, 0.0)
-    return Trips(
-        end=end,
-        vehicle=np.arange(len(arrivals)),
-        demand_time=arrivals.time,
-        depart=np.where(departed, depart, np.nan),
-        arrival=np.where(arrived, arrival, np.nan),
-        lane=arrivals.lane.copy(),
-        manoeuvre=arrivals.manoeuvre.copy(),
-        exit_lane=job.movements.exits[job.movements.index_of[arrivals.lane, arrivals.manoeuvre]],
-        waiting_time=np.where(departed, waiting, 0.0),
-        travel_time=travel,
-        time_loss=np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float),
-        depart_delay=np.maximum(np.where(departed, depart, end) - arrivals.time, 0.0),
-        departed=departed,
-        arrived=arrived,
-    )
-
-
-_ATTRIBUTES = ("depart", "arrival", "waitingTime")
+    loss = np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float)
+    return trips_of(
+        arrivals.time, arrivals.lane, arrivals.manoeuvre, job.movements, end,
+        depart=np.where(departed, depart, np.nan), arrival=np.where(arrived, arrival, np.nan),
+        waiting_time=np.where(departed, waiting, 0.0), time_loss=loss,
+    )  # fmt: skip

@@ -31,7 +31,7 @@ from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.network import build_network, sumo_environment
 from minisim.ticks import first_tick, time_of
 from minisim.vehicle import MODELS as CAR_FOLLOWING
-from minisim.vehicle import VehicleType
+from minisim.vehicle import CruiseVehicle, VehicleType
 
 #: SUMO's car-following models that a run may use.
 MODELS = tuple(model.sumo for model in CAR_FOLLOWING.values() if model.sumo)
@@ -64,8 +64,8 @@ def simulate(
 ) -> Run:
     """Run a scenario under a controller in SUMO, as `minisim.simulate` does in minisim.
 
-    Arrivals, vehicles, geometry, limits and commands are the same. In a process of its
-    own, SUMO does the car following, integrates, inserts, measures trips and finds collisions.
+    Arrivals, vehicles, geometry, limits and commands are the same. SUMO does the car following,
+    integrates, inserts, measures trips and finds collisions, in a process of its own.
 
     Args:
         scenario: what to simulate.
@@ -80,11 +80,11 @@ def simulate(
             "teleport" is SUMO's default, as in the published runs: a vehicle that runs into the one
             ahead or waits for 300 s is moved to the next road, or counts as arrived if there is
             none. Touching inside the junction does not count.
-        keep_files: new or empty folder for the network, the routes, the configuration, SUMO's log
-            and its trips; by default they are temporary. They are also kept if the run fails,
-            and the exception has a note that names the folder.
-        fcd: file for the floating-car data that SUMO itself writes for every step; created once the
-            run has succeeded.
+        keep_files: new or empty folder for SUMO's files, which are temporary by default: network,
+            routes, configuration, log and trips. If the run fails, they stay, and the exception
+            has a note that names the folder.
+        fcd: file for SUMO's own floating-car data of every step; created once the run has
+            succeeded.
         gui: show the run in sumo-gui.
         progress: called at every wake-up with the number of steps done and the total up to the
             horizon.
@@ -96,13 +96,11 @@ def simulate(
         CollisionError: two bodies touched, unless collisions are only recorded.
         ControllerError: the controller broke its contract.
     """
-    return _run(
-        _Request(
-            scenario=scenario, controller=controller, seed=seed, model=model, record=record,
-            record_window=record_window, on_collision=on_collision, keep_files=keep_files,
-            fcd=fcd, gui=gui, progress=progress,
-        )
-    )  # fmt: skip
+    return _run(_Request(
+        scenario=scenario, controller=controller, seed=seed, model=model, record=record,
+        record_window=record_window, on_collision=on_collision, keep_files=keep_files,
+        fcd=fcd, gui=gui, progress=progress,
+    ))  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,12 +122,11 @@ class _Request:
 
     def replay(self, time: float, seconds: float = 10.0) -> Run:
         """Run again until shortly after `time`; record the last `seconds` before it."""
-        again = replace(
+        return _run(replace(
             self, record="all", record_window=(max(0.0, time - seconds), math.inf),
             on_collision="record", keep_files=None, fcd=None, gui=False, progress=None,
             until=time + AFTERMATH,
-        )  # fmt: skip
-        return _run(again)
+        ))  # fmt: skip
 
 
 def _run(request: _Request) -> Run:
@@ -148,8 +145,7 @@ def _run(request: _Request) -> Run:
         if ended.collisions and job.stop_on_collision:
             replay = partial(request.replay, ended.collisions[0].time)
             raise hosted.collided(ended.collisions, replay)
-        end = (job.horizon if ended.done else ended.tick) * job.law.dt
-        columns = read_trips(folder, hosted.arrivals, job, ended, end)
+        columns = read_trips(folder, hosted.arrivals, job, ended)
         if request.fcd is not None:
             with replacing(request.fcd) as target:
                 shutil.copyfile(folder / FCD, target)
@@ -173,9 +169,8 @@ def sumo_home() -> Path:
 
 
 def _check_display() -> None:
-    if sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not shown:
         raise SumoError("sumo-gui needs a display, and there is none here; run without the GUI")
 
 
@@ -209,15 +204,13 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
     site, plan = hosted.site, hosted.plan
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
+    if site.vehicle.sumo is not None and not isinstance(site.vehicle, CruiseVehicle):
+        raise InputError(
+            f"vehicles with sumo={site.vehicle.sumo!r} look out for those that cross inside the "
+            "junction; hosted in SUMO they leave that to the controller, so give none"
+        )
     model = _model(request.model, site.vehicle)
     depart_speed = request.scenario.depart_speed
-    law = build_law(
-        site,
-        plan,
-        depart_speed=depart_speed,
-        record=request.record,
-        record_window=hosted.record_window,
-    )
     vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
     network = build_network(site.intersection, site.speed_limit, folder, home)
@@ -228,49 +221,46 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
         model=model,
         plan=plan,
         road=build_road(site, plan),
-        law=law,
+        law=build_law(
+            site, plan, depart_speed=depart_speed, record=request.record,
+            record_window=hosted.record_window,
+        ),
         cruise=build_cruise(site, len(vehicles)),
         top_speed=site.vehicle.top_speed(site.speed_limit),
         network=network,
         vehicles=vehicles,
-        lanes=site.intersection.n,
         movements=site.intersection.movements,
         horizon=first_tick(min(request.scenario.horizon, request.until), site.dt),
         stop_on_collision=request.on_collision == "stop",
         teleport=request.on_collision == "teleport",
-    )
+    )  # fmt: skip
     write_configuration(folder, job, hosted.seed, request.fcd is not None)
     return job
 
 
 def _model(asked: str | None, vehicle: VehicleType) -> str:
     """The SUMO model that drives the vehicles; raises `InputError` if none can."""
-    own, stand_ins = CAR_FOLLOWING[vehicle.model].sumo, CAR_FOLLOWING[vehicle.model].stand_ins
-    fitting = [model for model in MODELS if model == own or model in stand_ins]
-    model = own if asked is None else asked
+    drives = {name: (it.sumo, *it.stand_ins) for name, it in CAR_FOLLOWING.items()}
+    fitting = [model for model in MODELS if model in drives[vehicle.model]]
+    model = drives[vehicle.model][0] if asked is None else asked
     if model in fitting:
         return model
     choose = f"choose {' or '.join(fitting)}"
     if asked is None:
         raise InputError(f"SUMO has no model of the law {vehicle.model!r}; {choose}")
+    driven = " or ".join(repr(name) for name, models in drives.items() if asked in models)
+    other = f"a vehicle of the model {driven}"
+    if asked == "CC":
+        other = "a CruiseVehicle: use --profile as_run"
     raise InputError(
-        f"SUMO's model {model} does not drive vehicles of the model {vehicle.model!r}; "
-        f"{choose}, or {_vehicle_for(model)}"
+        f"SUMO's model {asked} does not drive vehicles of the model {vehicle.model!r}; {choose}, "
+        f"or {other}"
     )
 
 
-def _vehicle_for(asked: str) -> str:
-    """Which vehicle SUMO's model `asked` can drive, as words for a message."""
-    if asked == "CC":
-        return "a CruiseVehicle: use --profile as_run"
-    models = [name for name, it in CAR_FOLLOWING.items() if asked in (it.sumo, *it.stand_ins)]
-    return f"a vehicle of the model {' or '.join(map(repr, models))}"
-
-
 def _command(gui: bool) -> tuple[str, ...]:
-    if gui:
-        return ("sumo-gui", "-c", CONFIGURATION, "--start", "true", "--quit-on-end", "true")
-    return ("sumo", "-c", CONFIGURATION)
+    options = ("--start", "true", "--quit-on-end", "true") if gui else ()
+    return ("sumo-gui" if gui else "sumo", "-c", CONFIGURATION, *options)
 
 
 def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], list[Command]]:
@@ -287,14 +277,13 @@ def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], l
 def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tuple[str, Ended]:
     """Run the job in a process of its own; returns SUMO's version and the result.
 
-    Raises:
-        SumoError: the process refused or died. The caller is unaffected.
+    Raises `SumoError` if the process refused or died; the caller is unaffected.
     """
     environment = sumo_environment(home) | {
         "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
         "MINISIM_JIT": "0",  # compiled functions are slow to call one vehicle at a time
     }
-    version, time = "", 0.0
+    version, time, failed = "", 0.0, "SUMO failed"
     with (Path(job.folder) / STDERR).open("w+b") as complaints:
         child = subprocess.Popen(
             [sys.executable, "-P", "-c", CHILD], env=environment,
@@ -313,33 +302,26 @@ def _host(job: Job, home: Path, answer: Callable[[Asked], list[Command]]) -> tup
                         time = tick * job.law.dt
                         channel.send(answer(asked))
                     case Failed(reason):
-                        said = _last_words(complaints)
-                        raise SumoError(f"SUMO failed{_when(version, time)}: {reason}{said}")
+                        what = f": {reason}"
+                        break
                     case Ended() as ended:
                         child.wait()
                         return version, ended
         except (EOFError, BrokenPipeError, pickle.UnpicklingError):
-            code = child.wait()
-            said = _last_words(complaints)
-            raise SumoError(
-                f"SUMO's process died{_when(version, time)} ({_cause(code)}){said}"
-            ) from None
+            what = f" ({_cause(child.wait())})"
+            failed = "SUMO's process died"
         finally:
             child.kill()
             child.communicate()
-
-
-def _when(version: str, time: float) -> str:
-    return f" after {time:.1f} s of simulated time" if version else " before the first step"
+        when = f"after {time:.1f} s of simulated time" if version else "before the first step"
+        raise SumoError(f"{failed} {when}{what}{_last_words(complaints)}")
 
 
 def _cause(code: int) -> str:
-    if code < 0:
-        try:
-            return signal.Signals(-code).name
-        except ValueError:
-            return f"signal {-code}"
-    return f"exit code {code}"
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"exit code {code}"
 
 
 def _last_words(complaints: IO[bytes]) -> str:

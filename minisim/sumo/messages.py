@@ -15,39 +15,23 @@ from minisim.sumo.network import Network
 
 
 class Job(NamedTuple):
-    """All that the process needs.
+    """All that the process needs."""
 
-    Attributes:
-        command, folder: the command that starts SUMO, and the folder to run it in.
-        temporary: whether the process removes the folder if its caller is gone.
-        model: car-following model, one of `minisim.sumo.MODELS`.
-        plan: the session's plan.
-        road, law: the run's road and law, with its limits, marks and lines.
-        cruise: as returned by `minisim.engine.cruise.law.build_cruise`.
-        top_speed: speed that no vehicle exceeds [m/s].
-        network: the lanes' lengths in SUMO.
-        vehicles: as returned by `minisim.engine.state.build_vehicles`.
-        horizon: tick at which to stop.
-        stop_on_collision: whether the first collision ends the run.
-        teleport: whether SUMO takes vehicles off the road, as it does by default.
-    """
-
-    command: tuple[str, ...]
-    folder: str
-    temporary: bool
-    model: str
-    plan: Plan
+    command: tuple[str, ...]  #: starts SUMO
+    folder: str  #: where to run it
+    temporary: bool  #: whether the process removes the folder if its caller is gone
+    model: str  #: car-following model, one of `minisim.sumo.MODELS`
+    plan: Plan  #: the session's
     road: Road
     law: Law
-    cruise: Cruise | None
-    top_speed: float
+    cruise: Cruise | None  #: see `minisim.engine.cruise.law.build_cruise`
+    top_speed: float  #: which no vehicle exceeds [m/s]
     network: Network
-    vehicles: Records
-    lanes: int
+    vehicles: Records  #: see `minisim.engine.state.build_vehicles`
     movements: Movements
-    horizon: int
-    stop_on_collision: bool
-    teleport: bool
+    horizon: int  #: tick at which to stop
+    stop_on_collision: bool  #: whether the first collision ends the run
+    teleport: bool  #: whether SUMO takes vehicles off the road, as it does by default
 
 
 class Channel:
@@ -57,11 +41,11 @@ class Channel:
         self._source, self._target = source, target
 
     def receive(self) -> Any:
-        """The next object; raises `EOFError` if the other process is gone."""
+        """The next object; `EOFError` if the other process is gone."""
         return pickle.load(self._source)
 
     def send(self, message: object) -> None:
-        """Send one object."""
+        """Send an object."""
         pickle.dump(message, self._target)
         self._target.flush()
 
@@ -80,21 +64,13 @@ class Asked(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """The run is over.
+    """The run is over."""
 
-    Attributes:
-        tick: last tick reached.
-        done: whether all vehicles have arrived.
-        collisions: each pair of vehicles once.
-        time_loss: time loss of every vehicle [s], by id.
-        trace: what was recorded.
-    """
-
-    tick: int
-    done: bool
-    collisions: tuple[Collision, ...]
-    time_loss: dict[int, float]
-    trace: Records
+    tick: int  #: the last one reached
+    done: bool  #: whether all vehicles have arrived
+    collisions: tuple[Collision, ...]  #: each pair of vehicles once
+    time_loss: dict[int, float]  #: of every vehicle by id [s]
+    trace: Records  #: what was recorded
 
 
 class Failed(NamedTuple):

@@ -4,10 +4,10 @@ Left to itself, netconvert cuts the roads and bends the turns by its own rules. 
 of the junction and of every turn, so entries, exits and arcs lie where minisim has them. Lengths
 that still differ are read back (`Network`), so positions in SUMO are exact in `s`.
 
-If the ways are netconvert's own (`Intersection.ways`, as in the published runs), netconvert
-draws the junction, with its waiting positions and its right of way. The lengths must match the
-ways. Between equal roads, rounding decides which has priority and which vehicles wait inside. So
-the coordinates then start at the lower left corner, which is netconvert's default.
+If the ways are netconvert's own (`Intersection.ways`, as in the published runs), it draws the
+junction, with its waiting positions and its right of way, and the lengths must match the ways.
+Between equal roads, rounding decides which has priority and which vehicles wait inside. So the
+coordinates then start at the lower left corner, netconvert's default.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ import numpy as np
 
 from minisim.errors import FileError, SumoError
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES
 from minisim.results.trajectories import lane_names
 
 NODES, EDGES, CONNECTIONS = "minisim.nod.xml", "minisim.edg.xml", "minisim.con.xml"
@@ -38,15 +37,10 @@ ROUNDED = 0.0151
 
 @dataclass(frozen=True)
 class Network:
-    """The lengths of SUMO's lanes, in the order of `Intersection.movements` [m].
+    """The lengths of SUMO's lanes, in the order of `Intersection.movements` [m]."""
 
-    Attributes:
-        approach: length of each movement's approach lane.
-        inside: length of its way through the junction.
-    """
-
-    approach: tuple[float, ...]
-    inside: tuple[float, ...]
+    approach: tuple[float, ...]  #: of the approach lane
+    inside: tuple[float, ...]  #: of the way through the junction
 
 
 def build_network(
@@ -61,47 +55,43 @@ def build_network(
     Raises:
         SumoError: netconvert refuses (the message is its own) or draws ways other than those given.
     """
-    ours = intersection.ways is None
     write_xml(folder / NODES, "nodes", _nodes(intersection))
     write_xml(folder / EDGES, "edges", _edges(intersection, speed_limit))
-    command = [str(home / "bin" / "netconvert")]
-    command += ["--node-files", NODES, "--edge-files", EDGES]
-    command += ["--output-file", NETWORK, "--no-turnarounds", "true"]
-    command += ["--lefthand", str(intersection.side == "left").lower()]
-    if ours:
-        command += ["--offset.disable-normalization", "true"]
-        write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
-        command += ["--connection-files", CONNECTIONS, "--precision", str(DIGITS)]
-        command += ["--junctions.limit-turn-speed", "-1"]
+    command = [
+        str(home / "bin" / "netconvert"), "--node-files", NODES, "--edge-files", EDGES,
+        "--output-file", NETWORK, "--no-turnarounds", "true",
+        "--lefthand", str(intersection.side == "left").lower(),
+    ]  # fmt: skip
+    if intersection.ways is not None:
+        run_tool(command, folder, home)
+        return _as_given(intersection, read_network(intersection, folder / NETWORK))
+    write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
+    command += ["--connection-files", CONNECTIONS, "--precision", str(DIGITS)]
+    command += ["--offset.disable-normalization", "true", "--junctions.limit-turn-speed", "-1"]
     run_tool(command, folder, home)
-    network = read_network(intersection, folder / NETWORK)
-    return network if ours else _as_given(intersection, network)
+    return read_network(intersection, folder / NETWORK)
 
 
 def _as_given(intersection: Intersection, network: Network) -> Network:
-    """The intersection's lengths; netconvert's may differ only by rounding.
+    """The intersection's lengths; raises `SumoError` if netconvert's differ by more than rounding.
 
     One approach lane of the 3-arm junction is 1 cm longer than its siblings, for instance.
     Positions follow from the distance driven since insertion, so errors do not add up.
-
-    Raises:
-        SumoError: netconvert's lengths differ by more than rounding.
     """
     paths = intersection.paths
-    for path, approach, inside in zip(paths, network.approach, network.inside, strict=True):
-        for name, drawn, wanted in (
-            ("approach", approach, path.entry),
-            ("way", inside, path.exit - path.entry),
-        ):
-            if abs(drawn - wanted) > ROUNDED:
+    given = Network(tuple(path.entry for path in paths), tuple(path.crossing for path in paths))
+    for name, drawn, wanted in (
+        ("approach", network.approach, given.approach),
+        ("way", network.inside, given.inside),
+    ):
+        for path, its, ours in zip(paths, drawn, wanted, strict=True):
+            if abs(its - ours) > ROUNDED:
                 raise SumoError(
-                    f"netconvert draws the {name} of {path.movement} {drawn:.2f} m long, the "
-                    f"intersection has {wanted:.2f} m: only ways that are netconvert's own can be "
+                    f"netconvert draws the {name} of {path.movement} {its:.2f} m long, the "
+                    f"intersection has {ours:.2f} m: only ways that are netconvert's own can be "
                     "driven in SUMO"
                 )
-    return Network(
-        tuple(path.entry for path in paths), tuple(path.exit - path.entry for path in paths)
-    )
+    return given
 
 
 def run_tool(command: list[str], folder: Path, home: Path) -> None:
@@ -169,27 +159,21 @@ def _nodes(intersection: Intersection) -> Iterable[str]:
 def _edges(intersection: Intersection, speed_limit: float) -> Iterable[str]:
     for arm in intersection.arms:
         for name, origin, target in (("in", arm.name, "C"), ("out", "C", arm.name)):
-            yield tag(
-                "edge",
-                {
-                    "id": f"{arm.name}_{name}", "from": origin, "to": target, "numLanes": 1,
-                    "speed": repr(speed_limit), "width": repr(intersection.lane_width),
-                },
-            )  # fmt: skip
+            yield tag("edge", {
+                "id": f"{arm.name}_{name}", "from": origin, "to": target, "numLanes": 1,
+                "speed": repr(speed_limit), "width": repr(intersection.lane_width),
+            })  # fmt: skip
 
 
 def _connections(intersection: Intersection) -> Iterable[str]:
     for path in intersection.paths:
-        yield tag(
-            "connection",
-            {
-                "from": f"{ARM_NAMES[path.movement.origin]}_in",
-                "to": f"{ARM_NAMES[path.exit_arm]}_out",
-                "fromLane": 0, "toLane": 0, "pass": "true", "keepClear": "false",
-                "contPos": 0,  # no internal junction
-                "shape": _points(path.points),
-            },
-        )  # fmt: skip
+        first, _, last = lane_names(path.movement, path.exit_arm)
+        yield tag("connection", {
+            "from": first[:-2], "to": last[:-2],
+            "fromLane": 0, "toLane": 0, "pass": "true", "keepClear": "false",
+            "contPos": 0,  # no internal junction
+            "shape": _points(path.points),
+        })  # fmt: skip
 
 
 def _outline(intersection: Intersection) -> str:

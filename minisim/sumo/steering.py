@@ -1,34 +1,33 @@
-"""How vehicles in SUMO are told what the road ahead and the controller ask of them.
+"""Steering: it tells vehicles in SUMO what the road ahead and the controller ask of them.
 
-`Follower` steers SUMO's IDM and Krauss. The laws of minisim (`minisim.laws`) compute what a
-hold line, a marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`)
-where a lower limit applies, or a commanded speed (`setSpeed`) while a vehicle has to brake for
-what is ahead. A command heeds the leaders, too.
-
-`minisim.sumo.cruising` steers SUMO's `CC`.
+`Follower` steers SUMO's IDM and Krauss. minisim's laws (`minisim.laws`) compute what a hold line, a
+marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`) where a lower
+limit applies, or a commanded speed (`setSpeed`) while a vehicle has to brake for what is ahead.
+A command heeds the leaders, too. `minisim.sumo.cruising` steers SUMO's `CC`.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Protocol
+from itertools import takewhile
+from typing import Any
 
 import numpy as np
 
 from minisim import laws
 from minisim.engine.state import Records
-from minisim.junction.movements import Movements
 from minisim.laws import STOP_MARGIN, Law
 from minisim.sumo.messages import Job
 
-#: SUMO keeps the maximum acceleration (2). It heeds no right of way (no 8). A commanded speed may
-#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1), its
-#: vehicles would stop at once where their brakes cannot. (SUMO, TraCI/Change Vehicle State, speed
-#: mode.) Inside the junction, a vehicle follows those from its own lane and those that leave by its
-#: exit. It also yields to crossing vehicles, although the controller alone decides which vehicle
-#: goes. So it ignores all vehicles in the junction (32) while one of them shares neither lane nor
-#: exit with it. Meanwhile it follows the vehicle ahead into its exit by minisim's law.
+#: SUMO keeps the maximum acceleration (2) and heeds no right of way (no 8). A commanded speed may
+#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1),
+#: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
+#: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
+#: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
+#: of them shares neither lane nor exit with it. Meanwhile it follows the vehicle ahead into its
+#: exit by minisim's law.
 FOLLOWING, IGNORING = 2, 2 + 32
 
 #: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
@@ -36,15 +35,7 @@ LEAST_SPEED = 0.01
 
 
 class Car:
-    """A vehicle; `minisim.engine.state.VEHICLE` explains the values.
-
-    Attributes:
-        brake: the least that it must brake [m/s²]; 0 without such a command.
-        present: whether it is on the road.
-        seen: tick of the last look at it.
-        lost_ticks: as in `VEHICLE`. Between two looks more than a step apart, it grows by the
-            time beyond what the distance takes at the limit.
-    """
+    """A vehicle; `minisim.engine.state.VEHICLE` explains most of the values."""
 
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
@@ -61,85 +52,74 @@ class Car:
         self.path = int(record["path"])
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
-        self.s = self.v = self.a = self.lost_ticks = self.brake = 0.0
-        self.section = self.mark = self.seen = 0
-        self.go = self.cleared = self.present = False
+        self.s = self.v = self.a = 0.0
+        # Between looks more than a step apart, it grows by the time beyond that at the limit.
+        self.lost_ticks = 0.0
+        self.brake = 0.0  # the least that it must brake [m/s²]; 0 without such a command
+        self.section = self.mark = 0
+        self.seen = 0  # tick of the last look at it
+        self.present = False  # on the road
+        self.go = self.cleared = self.commanded = self.ignoring = False
         self.advice = math.inf
         self.desired = math.inf  # the last value given to SUMO
-        self.commanded = self.ignoring = False
 
 
 #: Whether a vehicle has the right of way, on its own or through its lane.
 Released = Callable[[Car], bool]
 
 
-class Steering(Protocol):
-    """What the worker needs in order to steer one of SUMO's car-following models.
+class Steering(ABC):
+    """What the worker needs in order to steer one of SUMO's car-following models."""
 
-    Attributes:
-        near: `s` from which vehicles have to be steered in every step [m].
-    """
+    near = -math.inf  #: `s` from which vehicles have to be steered in every step [m]
 
-    near: float
+    def __init__(self, law: Law, libsumo: Any) -> None:
+        self._law, self._vehicle = law, libsumo.vehicle
 
-    def load(self, cars: Iterable[Car]) -> None:
+    def load(self, cars: Iterable[Car]) -> None:  # noqa: B027  (does nothing by default)
         """Called when SUMO knows the vehicles, before any is on the road."""
 
+    def advise(self, car: Car) -> None:  # noqa: B027  (likewise)
+        """Called when the advice for a vehicle on the road has changed."""
+
+    @abstractmethod
     def depart(self, car: Car) -> None:
         """Called when a vehicle has been inserted."""
 
-    def advise(self, car: Car) -> None:
-        """Called when the advice for a vehicle on the road has changed."""
-
+    @abstractmethod
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Called before a step with each lane's vehicles, front to back, up to the exit."""
-
-    def release(self, car: Car) -> None:
-        """Called when the vehicle has left the junction: now SUMO alone drives it."""
-
-
-class Speeds:
-    """The speeds that SUMO is commanded to drive vehicles at."""
-
-    def __init__(self, libsumo: Any) -> None:
-        self._vehicle = libsumo.vehicle
 
     def command(self, car: Car, speed: float) -> None:
         """Drive the car at this speed [m/s], whatever the model says."""
         self._vehicle.setSpeed(car.name, max(speed, 0.0))
         car.commanded = True
 
-    def hand_back(self, car: Car) -> None:
-        """Leave the car to the model again."""
+    def release(self, car: Car) -> None:
+        """Leave the car to the model, as when it has left the junction."""
         if car.commanded:
             self._vehicle.setSpeed(car.name, -1.0)
             car.commanded = False
 
 
-class Follower:
+class Follower(Steering):
     """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
-        self.near = -math.inf
         # SUMO's Krauss may drive vehicles whose own law is another.
-        self._law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
-        self._vehicle = libsumo.vehicle
-        self._speeds = Speeds(libsumo)
+        law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
+        super().__init__(law, libsumo)
         self._limits = limits(job)
-        self._crossing = [_crossing(path, job.movements) for path in range(len(job.movements))]
+        apart, exits = job.movements.apart, job.movements.exits
+        crossed = apart & (exits[:, None] != exits)  # sharing neither lane nor exit
+        self._crossing = [frozenset(np.flatnonzero(row).tolist()) for row in crossed]
         self._exit = [(float(end[0]), int(end[2])) for end in job.road.ends]
         self._branch = job.road.branch
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
-    def load(self, cars: Iterable[Car]) -> None:
-        """Do nothing: the vehicle type has all it needs."""
-
     def depart(self, car: Car) -> None:
         """Leave all giving way to the controller."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
-
-    def advise(self, car: Car) -> None:
-        """Do nothing: `steer` reads the advice."""
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
@@ -160,37 +140,34 @@ class Follower:
                 self._steer(car, lane[:k], held, self._merging(car) if merges else 0.0)
                 ignoring = held or crossed
                 if ignoring != car.ignoring:
-                    mode = IGNORING if ignoring else FOLLOWING
-                    self._vehicle.setSpeedMode(car.name, mode)
+                    self._vehicle.setSpeedMode(car.name, IGNORING if ignoring else FOLLOWING)
                     car.ignoring = ignoring
 
     def release(self, car: Car) -> None:
         """Leave the car to SUMO, at the exit's speed limit."""
         limit = self._limits[car.path][1][car.section]
         self._desire(car, min(limit * car.factor, car.advice))
-        self._speeds.hand_back(car)
+        super().release(car)
 
     def _merging(self, car: Car) -> float:
         """Closeness to the vehicle from another lane that takes the same exit before this car."""
-        mine, law = self._exit[car.path][0], self._law
-        ahead = None
-        for other in self._inside:
-            if other is car:
-                break
-            if other.lane != car.lane and self._exit[other.path][1] == self._exit[car.path][1]:
-                ahead = other
-        if ahead is None:
+        mine, exit_arm = self._exit[car.path]
+        before = takewhile(lambda other: other is not car, self._inside)
+        merging = [
+            it for it in before if it.lane != car.lane and self._exit[it.path][1] == exit_arm
+        ]
+        if not merging:
             return 0.0
-        gap = (ahead.s - self._exit[ahead.path][0]) - law.length - (car.s - mine)
-        return float(laws.closeness(car.v, gap, ahead.v, law))
+        ahead = merging[-1]
+        gap = (ahead.s - self._exit[ahead.path][0]) - self._law.length - (car.s - mine)
+        return float(laws.closeness(car.v, gap, ahead.v, self._law))
 
     def _leading(self, car: Car, lane: Sequence[Car]) -> float:
         """Closeness to the vehicle of its own lane that this car follows; `lane` is ahead of it."""
-        law = self._law
         for ahead in reversed(lane):
-            rear = ahead.s - law.length
+            rear = ahead.s - self._law.length
             if rear < self._branch[ahead.path, car.path]:
-                return float(laws.closeness(car.v, rear - car.s, ahead.v, law))
+                return float(laws.closeness(car.v, rear - car.s, ahead.v, self._law))
         return 0.0
 
     def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
@@ -203,9 +180,9 @@ class Follower:
         held = held and near(v, law.hold - s, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
-        braked = car.brake > 0.0
-        if not (slower or held or braked or v > v0 or v0 < LEAST_SPEED or z > 0.0):
-            self._speeds.hand_back(car)
+        must_slow = v > v0 or v0 < LEAST_SPEED
+        if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
+            super().release(car)
             return
         free = laws.follow(v, v0, 0.0, law)
         acc = laws.follow(v, v0, z, law)
@@ -214,13 +191,13 @@ class Follower:
             k += 1
         if held:
             acc = min(acc, laws.hold(v, s, law))
-        if braked:
+        if car.brake > 0.0:
             acc = min(acc, -car.brake)
-        if acc < free or v > v0 or v0 < LEAST_SPEED:
+        if acc < free or must_slow:
             acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), law))
-            self._speeds.command(car, v + max(acc, -law.b_max) * law.dt)
+            self.command(car, v + max(acc, -law.b_max) * law.dt)
         else:
-            self._speeds.hand_back(car)
+            super().release(car)
 
     def _desire(self, car: Car, speed: float) -> None:
         speed = max(speed, LEAST_SPEED)
@@ -231,19 +208,10 @@ class Follower:
 
 def limits(job: Job) -> list[tuple[list[float], list[float]]]:
     """Each path's sections as lists: their starts [m] and limits [m/s]."""
-    road = job.road
-    return [
-        (start.tolist(), speed.tolist())
-        for start, speed in zip(road.section_start, road.section_speed, strict=True)
-    ]
+    starts, speeds = job.road.section_start.tolist(), job.road.section_speed.tolist()
+    return list(zip(starts, speeds, strict=True))
 
 
 def near(v: float, distance: float, law: Law) -> bool:
     """Whether a hold line `distance` ahead may matter in this step, with a metre to spare."""
     return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
-
-
-def _crossing(path: int, movements: Movements) -> frozenset[int]:
-    """The paths that share neither lane nor exit with this one."""
-    crossed = movements.apart[path] & (movements.exits != movements.exits[path])
-    return frozenset(np.flatnonzero(crossed).tolist())

@@ -1,10 +1,9 @@
 """The process that runs libsumo. It moves the vehicles; the caller's process decides.
 
-libsumo holds one simulation per process, and a crash would take its caller down. So it runs in a
+libsumo holds one simulation per process, and a crash would take its caller down. So it has a
 process of its own, which knows no controllers. That process advances until a wake-up, sends a view
 and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
-
-SUMO does car following, integrates and finds collisions. `minisim.sumo.steering` tells it what else
+SUMO does car following, integrates and finds collisions; `minisim.sumo.steering` tells it what else
 vehicles have to obey.
 """
 
@@ -20,17 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from minisim.control import (
-    Advise,
-    Brake,
-    Close,
-    Command,
-    Go,
-    Hold,
-    Observed,
-    Open,
-    Wake,
-)
+from minisim.control import Advise, Brake, Close, Command, Go, Hold, Observed, Open, Wake
 from minisim.engine.collision import Collision
 from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
@@ -49,10 +38,9 @@ GLANCE = 1.0
 class Worker:
     """One run in SUMO: `minisim.simulation.Simulation` without the session.
 
-    The state at a tick is the one that SUMO writes at that time. SUMO first moves all vehicles and
-    then inserts those that are due, so a vehicle's first state is the one at its insertion.
-    Vehicles that a controller or a recording may need are watched in every step; the others are
-    read now and then.
+    SUMO first moves all vehicles and then inserts those that are due, so a vehicle's first state is
+    the one at its insertion. Vehicles that a controller or a recording may need are watched in
+    every step; the others are read now and then.
     """
 
     def __init__(self, job: Job, libsumo: Any, caller: Channel) -> None:
@@ -70,19 +58,18 @@ class Worker:
         ]
         cars = (Car(row, record, law) for row, record in enumerate(job.vehicles))
         self._cars = {car.name: car for car in cars}
-        # One metre earlier, so that the acceleration is already known when it is first needed.
-        self._near = -1.0 + min(
-            self._steering.near, law.entry - law.sight, self._marks[0], _record_start(job)
-        )
+        recorded_from = law.record_start if law.record_from != NEVER else math.inf
+        needed_from = self._steering.near, law.entry - law.sight, self._marks[0], recorded_from
+        # A metre earlier, so that the acceleration is already known when it is first needed.
+        self._near = min(needed_from) - 1.0
         self._glances: dict[int, list[Car]] = defaultdict(list)
-        self._lanes: list[list[Car]] = [[] for _ in range(job.lanes)]
-        self._open = [job.plan.lanes_open] * job.lanes
+        self._lanes: list[list[Car]] = [[] for _ in range(job.movements.n)]
+        self._open = [job.plan.lanes_open] * job.movements.n
         self._collisions: dict[tuple[int, int], Collision] = {}
         self._lines: list[tuple[int, int, float, float, float, bool]] = []
         self._traces: list[Records] = []
-        self._arrived = 0
         self._alarm = Alarm(job.plan.period, law.dt)
-        self._tick = 0
+        self._tick = self._arrived = 0
 
     def run(self) -> Ended:
         """Advance to the horizon, the last arrival, or a collision that ends the run."""
@@ -91,7 +78,9 @@ class Worker:
         self._decide()
         self._libsumo.simulationStep()
         passed = self._observe()
-        while self._tick < job.horizon and not self._done and not self._stopped:
+        while self._tick < job.horizon and not self._done:
+            if job.stop_on_collision and self._collisions:
+                break
             if passed or self._tick >= self._alarm.tick:
                 self._decide()
             self._steering.steer(self._lanes, self._released)
@@ -113,12 +102,8 @@ class Worker:
     def _done(self) -> bool:
         return self._arrived == len(self._cars)
 
-    @property
-    def _stopped(self) -> bool:
-        return self._job.stop_on_collision and bool(self._collisions)
-
     def _decide(self) -> None:
-        """Ask for the session's commands; all are collected before any is carried out."""
+        """Ask for the session's commands, and carry them out."""
         self._alarm.reset(self._tick)
         self._caller.send(Asked(self._tick, tuple(self._view())))
         for command in self._caller.receive():
@@ -134,7 +119,7 @@ class Worker:
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
                     car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
-                    car.rank,
+                    car.rank, car.factor,
                 )  # fmt: skip
 
     def _apply(self, command: Command) -> None:
@@ -159,7 +144,6 @@ class Worker:
     def _observe(self) -> bool:
         """Read the new state; returns whether a front passed a mark or a rear left the junction."""
         sumo = self._libsumo
-        distance, speed = sumo.VAR_DISTANCE, sumo.VAR_SPEED
         if self._tick < self._job.horizon:
             for name in sumo.simulation.getDepartedIDList():
                 self._depart(self._cars[name])
@@ -171,15 +155,14 @@ class Worker:
                 self._glance(car)
                 self._turn_to(car)
         for name, values in sumo.vehicle.getAllSubscriptionResults().items():
-            travelled = values[distance]
+            travelled = values[sumo.VAR_DISTANCE]
             if travelled >= 0.0:  # not while SUMO teleports it
-                passed |= self._move(self._cars[name], travelled, values[speed])
+                passed |= self._move(self._cars[name], travelled, values[sumo.VAR_SPEED])
         return passed
 
     def _depart(self, car: Car) -> None:
         law = self._job.law
-        car.present = True
-        car.seen = self._tick
+        car.present, car.seen = True, self._tick
         car.s = law.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         if car.v > law.depart_speed:  # SUMO was told "max", since it never lowers a given speed
@@ -190,7 +173,7 @@ class Worker:
         self._turn_to(car)
 
     def _arrive(self, car: Car) -> bool:
-        """It has; returns whether SUMO took it off the road before it had left the junction."""
+        """Note it; returns whether SUMO took it off the road before it had left the junction."""
         self._arrived += 1
         self._travel(car, self._end[car.path])
         car.present = False
@@ -229,8 +212,7 @@ class Worker:
     def _move(self, car: Car, travelled: float, v: float) -> bool:
         law, p = self._job.law, car.path
         s = self._position(p, travelled)
-        car.a = (v - car.v) / law.dt
-        car.s, car.v = s, v
+        car.a, car.s, car.v = (v - car.v) / law.dt, s, v
         self._record(car)
         passed = False
         while s >= self._marks[car.mark]:
@@ -240,8 +222,7 @@ class Worker:
         while s >= starts[car.section + 1]:
             car.section += 1
         if self._tick > car.seen:
-            allowed = speeds[car.section] * car.factor
-            car.lost_ticks += max(1.0 - v / allowed, 0.0)
+            car.lost_ticks += max(1.0 - v / (speeds[car.section] * car.factor), 0.0)
             car.seen = self._tick
         if not car.cleared and s >= max(self._exit[p] + law.length, law.leave):
             self._clear(car)
@@ -275,11 +256,8 @@ class Worker:
     def _record(self, car: Car) -> None:
         law = self._job.law
         past = car.s - law.length - self._exit[car.path]
-        if (
-            law.record_from <= self._tick < law.record_to
-            and car.s >= law.record_start
-            and past <= law.record_past
-        ):
+        here = car.s >= law.record_start and past <= law.record_past
+        if here and law.record_from <= self._tick < law.record_to:
             released = self._released(car)
             self._lines.append((self._tick, car.row, car.s, car.v, car.a, released))
             if len(self._lines) == TRACE_LINES:  # an array takes a quarter of the memory
@@ -289,19 +267,19 @@ class Worker:
     def _collide(self) -> None:
         """Note each pair that SUMO finds touching, once."""
         for collision in self._libsumo.simulation.getCollisions():
-            pair = int(collision.collider), int(collision.victim)
-            if (key := (min(pair), max(pair))) not in self._collisions:
-                self._collisions[key] = self._describe(collision)
+            first, second = sorted((int(collision.collider), int(collision.victim)))
+            if (first, second) not in self._collisions:
+                self._collisions[first, second] = self._describe(collision)
 
     def _describe(self, collision: Any) -> Collision:
-        movements = self._job.movements
-        both = [
-            (car.id, str(movements[car.path]), self._touched(car, collision), float(speed))
-            for car, speed in (
-                (self._cars[collision.collider], collision.colliderSpeed),
-                (self._cars[collision.victim], collision.victimSpeed),
-            )
-        ]
+        names = self._job.movements.names
+        both = []
+        for name, speed in (
+            (collision.collider, collision.colliderSpeed),
+            (collision.victim, collision.victimSpeed),
+        ):
+            car = self._cars[name]
+            both.append((car.id, names[car.path], self._touched(car, collision), float(speed)))
         time = time_of(self._tick, self._job.law.dt)
         return Collision(time, *zip(*sorted(both), strict=True))
 
@@ -309,11 +287,6 @@ class Worker:
         """`s` of a vehicle in a collision [m]; one that has been removed was near the end."""
         s = self._locate(car) if car.present else None
         return self._exit[car.path] + float(collision.pos) if s is None else s
-
-
-def _record_start(job: Job) -> float:
-    """`s` from which vehicles are recorded [m]; infinite without a recording."""
-    return job.law.record_start if job.law.record_from != NEVER else math.inf
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """The `minisim` command. It may import every other package.
 
-Each module of this package adds to the app the command it is named after. A command imports what it
-needs when it runs, so that `minisim --help` is quick.
+Each module of this package adds the command of its name to the app. A command imports what it needs
+when it runs, so that `minisim --help` is quick.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
-    Bad input gives one line on stderr and code 2. A collision that stops a run, or a stdout that
-    cannot be written, gives 1. Ctrl-C gives 130, SIGTERM 143. Expected failures show no traceback,
-    unless the environment variable MINISIM_TRACEBACK is set.
+    Bad input gives one line on stderr and code 2; a collision that stops a run, or a stdout that
+    cannot be written, 1; Ctrl-C 130; SIGTERM 143. The environment variable MINISIM_TRACEBACK adds
+    the traceback of an expected failure.
     """
     prepare_streams()
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
@@ -63,15 +63,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(told, 1 if isinstance(error, CollisionError) else 2)
     except _USAGE_ERROR as error:
         message = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
-        help_of = [name for name in given[:1] if name in COMMANDS]
-        see = shlex.join(["minisim", *help_of, "--help"])
+        command = [name for name in given[:1] if name in COMMANDS]
+        see = shlex.join(["minisim", *command, "--help"])
         return _fail(f"{message} (typed: {shlex.join(given)}; see {see})")
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Terminated as end:
         return _fail("terminated", int(end.code or 0))
-    except BrokenPipeError:
-        # The reader of our output has stopped early, as `head` does.
+    except BrokenPipeError:  # the reader of our output has stopped early, as `head` does
         drop_output()
         return 1
     except OSError as error:
@@ -80,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         drop_output()
         return _fail(f"cannot write to stdout: {error.strerror or error}", 1)
     if code == 130:
-        typer.echo("minisim: interrupted", err=True)
+        return _fail("interrupted", code)
     return code if isinstance(code, int) else 0
 
 

@@ -15,8 +15,7 @@ from scenarios.cli.shared.terminal import bar
 
 
 @app.command(
-    epilog="[bold]Examples[/bold]\n\n"
-    "minisim animate four-way -c dim -d 350 -o dim.gif\n\n"
+    epilog="[bold]Example[/bold]\n\n"
     "minisim animate five-way -c fixed-time -d 300 --from 600 --seconds 120 -o signal.html"
 )
 def animate(
@@ -46,7 +45,7 @@ def animate(
     arrivals: options.Arrivals = None,
     start: options.Start = None,
 ) -> None:  # fmt: skip
-    """Write an animation of a run: which vehicles wait, have the right of way, and cross."""
+    """Write an animation of a run: which vehicles wait, have right of way, and cross."""
     from figures.film.animate import frame_times, write_animation
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
@@ -64,9 +63,8 @@ def animate(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
-    recipe = Recipe(
-        junction, controller_named(controller, profile), seed, humans, on_collision="record"
-    )
+    who = controller_named(controller, profile)
+    recipe = Recipe(junction, who, seed, humans, on_collision="record")
     end = begin + seconds
     result = recipe.run(simulate, until=end, record="all", record_window=(begin, end))
     with bar("drawing") as progress:

@@ -41,13 +41,14 @@ def controllers(
     call = read_spec(name)
     make = maker_of(call.name)
     made = controller_named(name) if call.places or call.named else None
-    meaning, parameters, covers = _meaning(make), list(_parameters(make, made)), str(cover_of(make))
+    meaning, parameters, covers = _meaning(make), list(_parameters(make, made)), cover_of(make)
     if as_json:
-        show_json({"name": name, "meaning": meaning, "covers": covers, "parameters": parameters})
+        facts = {"meaning": meaning, "covers": str(covers), "parameters": parameters}
+        show_json({"name": name, **facts})
         return
     typer.echo(wrapped(f"{name}: {meaning}", 0))
-    if cover_of(make) != ORDINARY:
-        typer.echo(wrapped(f"None collides, and each is served: {covers}.", 0))
+    if covers != ORDINARY:
+        typer.echo(wrapped(f"No vehicle collides, and each is served: {covers}.", 0))
     _show_parameters(parameters)
     for parameter in parameters:
         for word, kind in parameter["kinds"].items():
@@ -57,7 +58,7 @@ def controllers(
 
 
 def _meanings() -> dict[str, str]:
-    """One line for every controller, and for each that a package registers in vain."""
+    """One line for every controller, and for each unusable name that a package registers."""
     from scenarios.controllers import CONTROLLERS, maker_of, package_of, plugins, unused_plugins
 
     meanings = {known: _meaning(entry.make) for known, entry in CONTROLLERS.items()}
@@ -74,19 +75,15 @@ def _meaning(make: Callable[..., Any]) -> str:
 
 
 def _parameters(make: Callable[..., Any], made: object) -> Iterator[dict[str, Any]]:
-    """What is declared about each parameter, or else what its signature says.
-
-    The values are those of `made`; where it is None, the defaults.
-    """
+    """What is declared of each parameter, or else its signature; values are those of `made`."""
     from minisim.parameters import parameters
 
     declared = {it.name: it.parameter for it in parameters(make)}
     for name, given in inspect.signature(make).parameters.items():
         it = declared.get(name)
         kinds: Mapping[str, Callable[..., Any]] = it.kinds if it else {}
-        hint = ""
-        if given.annotation is not given.empty:
-            hint = inspect.formatannotation(given.annotation).strip("'")
+        typed = given.annotation is not given.empty
+        hint = inspect.formatannotation(given.annotation).strip("'") if typed else ""
         value = getattr(made, name, given.default)
         yield {
             "name": name,
@@ -106,7 +103,7 @@ def _parameters(make: Callable[..., Any], made: object) -> Iterator[dict[str, An
 
 
 def _spelled(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str | None:
-    """A value as one types it; its repr where it has no such text, None where it is missing."""
+    """A value as one types it, or its repr if that is impossible; None if there is none."""
     from minisim.names import spelled_value
 
     if value is inspect.Parameter.empty:
@@ -122,4 +119,4 @@ def _show_parameters(parameters: list[dict[str, Any]]) -> None:
         allowed = f"  ({it['allowed']})" if it["allowed"] else ""
         typer.echo("\n" + wrapped(f"  {it['name']}{value}{unit}{allowed}", 6))
         if it["meaning"]:
-            typer.echo(wrapped(f"      {it['meaning']}", 6))
+            typer.echo(wrapped(f"{'':6}{it['meaning']}", 6))

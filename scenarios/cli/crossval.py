@@ -26,14 +26,16 @@ TOLD = 10
 
 
 @app.command(
-    epilog="Writes crossval.md (the report), crossval.csv (one row a cell, lane and metric) and "
+    epilog="Writes crossval.md (the report), crossval.csv (one row per cell, lane and metric) and "
     "the figures. A cell whose controller cannot serve its scenario is refused before anything "
     "runs; a run that fails is a row with its error. SUMO's runs are kept in the folder sumo "
-    "beside them and used again by the same version; remove it to run them anew.\n\n"
+    "beside them, and the same version uses them again; remove it to repeat them.\n\n"
+    "[bold]Defaults[/bold]\n\n"
+    "four-way; dim and fixed-time; 150, 250 and 350 veh/h/lane; balanced; fair. With --replay all "
+    "published runs of dim with their own vehicles; there are also fixed-time, adaptive and v2ic."
+    "\n\n"
     "[bold]Examples[/bold]\n\n"
-    "minisim crossval --quick\n\n"
     "minisim crossval four-way five-way -c dim -c dim:gate=harmonious -d 250 --seeds 5\n\n"
-    "minisim crossval --replay four-way -d 150 -d 350 --split balanced\n\n"
     "minisim crossval --replay -c fixed-time -c v2ic --split 4:1:4:1\n\n"
     "[bold]Exit codes[/bold]\n\n"
     "0 done, whether the hosts agree or not; 1 a run failed; 2 bad input, or SUMO is missing."
@@ -42,32 +44,27 @@ def crossval(
     context: typer.Context,
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENARIO]...", help="Junctions: three-way, four-way, five-way or "
-                       "N-way; four-way by default, with --replay all that were published."),
+        typer.Argument(metavar="[SCENARIO]...", help="three-way, four-way, five-way or N-way."),
     ] = None,
     controller: Annotated[
         list[str] | None,
-        option("Who decides, as for minisim run; repeat it for more. dim and fixed-time by "
-               "default. With --replay whose published runs: dim (the default), fixed-time, "
-               "adaptive or v2ic.", "NAME", "--controller", "-c"),
+        option("What decides; repeat it for more.", "NAME", "--controller", "-c"),
     ] = None,
     density: Annotated[
         list[float] | None,
-        option("Mean inflow a lane; repeat it for more. 150, 250 and 350 by default, with "
-               "--replay all that were published.", "VEH/H", "--density", "-d"),
+        option("Mean inflow per lane; repeat it for more.", "VEH/H", "--density", "-d"),
     ] = None,
     split: Annotated[
         list[str] | None,
-        option("Shares of the lanes, or balanced; repeat it for more. balanced by default, with "
-               "--replay all that were published.", "4:3:2:1"),
+        option("Shares of the lanes, or balanced; repeat it for more.", "4:3:2:1"),
     ] = None,
     profile: Annotated[
         str | None,
-        option("Vehicle and speeds: fair (the default), paper, as_run or as_run_signals; with "
-               "--replay those of the published runs by default.", "NAME", "--profile", "-p"),
+        option("Vehicle and speeds: fair, paper, as_run or as_run_signals.", "NAME",
+               "--profile", "-p"),
     ] = None,
     seeds: Annotated[
-        int | None, option("Runs a cell, 1 … 1000; 3 by default, 2 with --quick.")
+        int | None, option("Runs per cell, 1 … 1000; 3 by default, 2 with --quick.")
     ] = None,
     horizon: Annotated[
         float | None, option("Simulated time; 3600 by default, 300 with --quick.", "S")
@@ -94,26 +91,20 @@ def crossval(
     })  # fmt: skip
     if horizon is None:
         horizon = 300.0 if quick else 3600.0
+    who = controller or (["dim"] if replay else CONTROLLERS)
+    densities = density or (QUICK_DENSITIES if quick else [] if replay else DENSITIES)
+    splits = split or (["balanced"] if quick or not replay else [])
     if replay:
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
-        densities, splits = (QUICK_DENSITIES, ["balanced"]) if quick else ([], [])
-        cases = replayed_cases(
-            scenarios or [], controller or ["dim"], density or densities, split or splits,
-            profile, horizon,
-        )  # fmt: skip
+        cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon)
     else:
-        make = partial(
-            scenario_named, profile="fair" if profile is None else profile, horizon=horizon
-        )
-        cells = product(
-            scenarios or ["four-way"], split or ["balanced"], controller or CONTROLLERS,
-            density or (QUICK_DENSITIES if quick else DENSITIES),
-        )  # fmt: skip
-        cases = [Case(make(name, density=q, split=shares), who) for name, shares, who, q in cells]
-    if seeds is None:
-        seeds = 2 if quick else 3
-    numbers = range(1, 1 + integer("--seeds", seeds, low=1, high=1000))
+        profile = "fair" if profile is None else profile
+        make = partial(scenario_named, profile=profile, horizon=horizon)
+        cells = product(scenarios or ["four-way"], splits, who, densities)
+        cases = [Case(make(name, density=q, split=shares), it) for name, shares, it, q in cells]
+    count = (2 if quick else 3) if seeds is None else integer("--seeds", seeds, low=1, high=1000)
+    numbers = range(1, 1 + count)
     workers = options.processes(jobs)
     sumo_home()
     with bar("checking"):

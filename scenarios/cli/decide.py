@@ -12,9 +12,7 @@ from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, na
 
 
 @app.command(
-    epilog="[bold]Examples[/bold]\n\n"
-    "minisim decide four-way a1 b2 c2 d2\n\n"
-    "minisim decide five-way a1 b3 c4 d2 e1 --plot decision.png"
+    epilog="[bold]Example[/bold]\n\nminisim decide five-way a1 b3 c4 d2 e1 --plot decision.png"
 )
 def decide(
     scenario: options.ScenarioName,
@@ -23,7 +21,7 @@ def decide(
         typer.Argument(
             metavar="MOVEMENTS...",
             help="What the front vehicle of each lane wants, such as a1 b2 c2 d2: lane a to the "
-            "1st exit clockwise, and so on; at most one a lane.",
+            "1st exit clockwise, and so on; at most one per lane.",
         ),
     ],
     order: options.Order = "size",
@@ -48,9 +46,7 @@ def decide(
         "scenario": what.name,
         "order": order,
         "participants": names(explanation.participants),
-        "edges": list(map(names, explanation.edges)),
-        "cliques": list(map(names, explanation.cliques)),
-        "tied": list(map(names, explanation.tied)),
+        **{k: list(map(names, getattr(explanation, k))) for k in ("edges", "cliques", "tied")},
         "right_of_way": names(explanation.right_of_way),
         "reason": explanation.reason,
     }

@@ -22,7 +22,7 @@ from scenarios.cli.shared.terminal import bar, show
 def demo(
     out: options.Folder = Path("out"),
     seeds: Annotated[
-        int | None, options.option("Runs a point, 2 … 1000; 5 by default, 2 with --quick.")
+        int | None, options.option("Runs per point, 2 … 1000; 5 by default, 2 with --quick.")
     ] = None,
     jobs: options.Jobs = None,
     quick: options.Quick = False,
@@ -45,11 +45,9 @@ def demo(
 
     write_tables(points, tour, folder)
     save(performance_figure(points, demo_title(tour)), folder / "demo.png")
+    when = {"start": tour.film_start, "seconds": tour.film_seconds}
     with bar("drawing") as progress:
-        write_animation(
-            film, folder / "demo.gif", start=tour.film_start, seconds=tour.film_seconds,
-            progress=progress,
-        )  # fmt: skip
+        write_animation(film, folder / "demo.gif", **when, progress=progress)
     typer.echo(demo_title(tour))
     show(demo_table(points))
     for name in ("demo.csv", "demo.md", "demo.png", "demo.gif"):

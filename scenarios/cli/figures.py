@@ -27,7 +27,7 @@ def figures(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAME...]", help="Which ones; every one that there are runs for by default."
+            metavar="[NAME...]", help="Which ones; by default all that there are runs for."
         ),
     ] = None,
     out: options.Folder = Path("out/figures"),
@@ -36,11 +36,9 @@ def figures(
     ] = None,
     seeds: Annotated[
         int | None,
-        option("Runs a case to look for: the seeds 1 to this one; 10 by default, 2 with --quick."),
+        option("Runs per case to look for: seeds 1 to this one; 10 by default, 2 with --quick."),
     ] = None,
-    quick: Annotated[
-        bool, option("Look for the runs of minisim reproduce --quick.", None, "--quick")
-    ] = False,
+    quick: Annotated[bool, option("Of minisim reproduce --quick.", None, "--quick")] = False,
     as_list: Annotated[bool, option("List the names and stop.", None, "--list")] = False,
 ) -> None:
     """Draw the paper's figures and tables, and further ones (PDF, SVG, PNG; MD, CSV, TeX)."""
@@ -56,13 +54,10 @@ def figures(
         return
     items = [item_named(name) for name in dict.fromkeys(names or GALLERY)]
     effort = Effort.of(quick=quick, seeds=seeds)
-    missing = []
-    left = [item.name for item in items if item.needs] if store is None else []
+    missing, left = [], [item.name for item in items if item.needs and store is None]
     if names and left:
-        raise InputError(
-            f"{', '.join(left)}: drawn from results; give them with --store "
-            "(minisim reproduce makes them)"
-        )
+        need = "drawn from results; give them with --store (minisim reproduce makes them)"
+        raise InputError(f"{', '.join(left)}: {need}")
     items = [item for item in items if item.name not in left]
     with nullcontext() if store is None else Store(store, create=False) as source:
         folder = make_folder(out)
@@ -80,8 +75,6 @@ def figures(
                 progress(done, len(items))
     typer.echo(f"wrote {len(items) - len(missing)} figures and tables to {folder}")
     if left:
-        typer.echo(
-            f"  not {len(left)} others, which need runs: name a store with --store", err=True
-        )
+        missing.append(f"{len(left)} others, which need runs: name a store with --store")
     for why in missing:
         typer.echo(f"  not {why}", err=True)

@@ -24,7 +24,7 @@ def harmony(
     side: options.Side = "left",
     profile: options.ProfileName = "paper",
     clearance: Annotated[
-        float, typer.Option(metavar="M", help="Room between the ways of two bodies in metres.")
+        float, typer.Option(metavar="M", help="Room between the paths of two bodies in metres.")
     ] = CLEARANCE,
     csv: Annotated[bool, typer.Option("--csv", help="Print the matrix as CSV.")] = False,
     as_json: options.AsJson = False,

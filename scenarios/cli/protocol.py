@@ -38,16 +38,14 @@ def protocol(
         str,
         typer.Option(
             metavar="stoppable|paper",
-            help="When a vehicle is committed: once it cannot stop any more, or past half of the "
-            "green zone.",
+            help="A vehicle is committed once it cannot stop, or halfway through the green zone.",
         ),
     ] = "stoppable",
     gate: Annotated[
         str,
         typer.Option(
             metavar="clear|harmonious",
-            help="Which vehicles may enter while others cross: none, or those in harmony with "
-            "them.",
+            help="Which vehicles may enter while others cross: none, or those in harmony.",
         ),
     ] = "clear",
     order: options.Order = "size",
@@ -69,10 +67,7 @@ def protocol(
     profile: options.ProfileName = "paper",
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
-    """Visit every state of arrivals, decisions, commitments and clearings (3 and 4 arms).
-
-    Is it safe? Can it get stuck? Which lanes can wait for ever?
-    """
+    """Visit every state: is DIM safe, can it get stuck, which lanes starve? (3 and 4 arms)"""
     from dim.proofs.modelcheck import explore, starvation
     from dim.proofs.protocol import Protocol
 
@@ -80,10 +75,8 @@ def protocol(
         check_file(counterexample, ".csv")
     what, matrix = junction(scenario, bearings, side, profile)
     if matrix.n > MAX_ARMS:
-        raise InputError(
-            f"the protocol is searched for 3 and 4 arms; {what.name} has {matrix.n}, and too many "
-            "states"
-        )
+        only = "the protocol is searched for 3 and 4 arms"
+        raise InputError(f"{only}; {what.name} has {matrix.n}, and too many states")
     rules = Protocol(matrix, order, gate, commit, priorities)
     with bar("visiting all states") as progress:
         search = explore(rules, progress=lambda states: progress(states, states))
@@ -92,9 +85,7 @@ def protocol(
         _write_counterexample(what, search, counterexample)
     facts = {
         "scenario": what.name, "order": order, "gate": gate, "commit": commit,
-        "priorities": priorities,
-        "states": search.states,
-        "transitions": search.transitions,
+        "priorities": priorities, "states": search.states, "transitions": search.transitions,
         "all_states": search.complete,
         "unsafe": list(map(names, search.unsafe)),
         "stuck": None if search.stuck is None else names(search.stuck),

@@ -17,15 +17,15 @@ from scenarios.studies import NAMES, study_named
 @app.command(
     epilog="Simulates the paper's grid twice: as its text prescribes it, and as the published runs "
     "were made. Then comes what the paper leaves open: every controller on equal terms, gates, "
-    "rules of priority and capacities. Writes DIR/report.md, DIR/figures and the store. A run that "
-    "is in the store is not made again, so an interrupted command continues where it stopped.\n\n"
+    "rules of priority and capacities. Writes DIR/report.md, DIR/figures and the store. A run in "
+    "the store is not repeated, so an interrupted command continues where it stopped.\n\n"
     "[bold]How long[/bold]\n\n"
-    "Processor time with 10 seeds, on a machine that simulates an hour under DIM in 0.1 s: text, "
-    "the paper's grid of 700 hours and the first to be run, 2.5 minutes; fair 6; gate and fairness "
+    "Minutes of processor time with 10 seeds, on a machine that simulates an hour under DIM in "
+    "0.1 s: text, the paper's grid of 700 hours, which comes first, 2.5; fair 6; gate and fairness "
     "1; perception 26 and confidence 3, with 5 seeds at most; capacity 10; as-run, with its step "
-    "of 0.01 s, some 25. Two processes halve it. To have the paper's grid alone: "
+    "of 0.01 s, some 25. Two processes halve it. The paper's grid alone: "
     "[bold]minisim reproduce --only text[/bold].\n\n"
-    "The report says what each study took, and CPU seconds a simulated hour by controller."
+    "The report says what each study took, and CPU seconds per simulated hour by controller."
 )
 def reproduce(
     out: options.Folder = Path("out"),
@@ -33,20 +33,16 @@ def reproduce(
         Path | None, option("Where the runs are kept; DIR/runs.sqlite by default.", "STORE")
     ] = None,
     seeds: Annotated[
-        int | None, option("Runs a case, at least 2; 10 by default, 2 with --quick.")
+        int | None, option("Runs per case, at least 2; 10 by default, 2 with --quick.")
     ] = None,
     jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
         option(
-            "Only this one, and only what is drawn from it; may be repeated. One of "
-            f"{', '.join(NAMES)}.",
-            "STUDY",
+            f"Only this study and its figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"
         ),
     ] = None,
-    quick: Annotated[
-        bool, option("Two demands, 150 s each: a smoke test.", None, "--quick")
-    ] = False,
+    quick: Annotated[bool, option("A smoke test: two demands, 150 s.", None, "--quick")] = False,
 ) -> None:
     """Run the paper's experiments and ours, draw every figure, and write a report."""
     from figures.reproduction_report import write_report
@@ -61,14 +57,14 @@ def reproduce(
     names = [study_named(name).name for name in only or NAMES]
     workers = options.processes(jobs)
     if store is not None and store.exists():
-        Store(store, create=False).close()  # refuse a wrong one before making a folder
+        Store(store, create=False).close()  # refuses a wrong one before a folder is made
     folder = make_folder(out)
     with Store(folder / "runs.sqlite" if store is None else store) as rows:
         made = []
         for name in names:
             with bar(f"simulating {name}") as progress:
-                made.append(make(name, effort, rows, workers, progress))
-            done = made[-1]
+                done = make(name, effort, rows, workers, progress)
+            made.append(done)
             took = f"{done.computed} of {done.runs} runs computed in {done.wall_s:.0f} s"
             failed = f", {len(done.failed)} failed" if done.failed else ""
             typer.echo(f"{name}: {took}{failed}", err=True)
@@ -80,6 +76,5 @@ def reproduce(
             )
     typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
-    broken = sum(len(part.failed) for part in made)
-    if broken:
+    if broken := sum(len(part.failed) for part in made):
         typer.echo(f"{broken} runs failed; the report names them", err=True)

@@ -41,9 +41,7 @@ def run(
     warmup: Annotated[float, option("Measure nothing before it.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
-    metrics: Annotated[
-        str | None, option("Of minisim metrics, or mymodule:name.", "A,B")
-    ] = None,
+    metrics: Annotated[str | None, option("Of minisim metrics, or mymodule:name.", "A,B")] = None,
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
@@ -57,7 +55,7 @@ def run(
     keep_files: Annotated[Path | None, _sumo("Keep SUMO's files in a new folder.", "DIR")] = None,
     sumo_fcd: Annotated[Path | None, _sumo("SUMO's own floating-car data (XML).", "FILE")] = None,
 ) -> None:  # fmt: skip
-    """Simulate one run: waiting, travel and delay by lane, and how safe it was."""
+    """Simulate one run: waiting, travel and delay by lane, and how safe it is."""
     from minisim.files import check_apart, check_file, check_table
     from minisim.results.metrics import GROUPS, SAFETY, asked_metrics
     from minisim.results.trajectories import write_fcd, write_trajectories, write_trips
@@ -70,24 +68,22 @@ def run(
         "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
         "--sumo-fcd": sumo_fcd,
     })  # fmt: skip
-    for table in (trips, trajectories):
-        if table is not None:
-            check_table(table)
-    for xml in (fcd, sumo_fcd):
-        if xml is not None:
-            check_file(xml, ".xml")
+    for table in filter(None, (trips, trajectories)):
+        check_table(table)
+    for xml in filter(None, (fcd, sumo_fcd)):
+        check_file(xml, ".xml")
     asked = asked_metrics(() if metrics is None else metrics_named(metrics))
     if no_safety and (unsafe := [it.name for it in asked if it.name in SAFETY]):
         raise InputError(f"--metrics asks for {', '.join(unsafe)}, which --no-safety leaves out")
     choice("--by", by, GROUPS)
-    if choice("host", host, ("minisim", "sumo")) == "minisim":
-        only_sumo = {
-            "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
-            "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",
-        }  # fmt: skip
-        if refused := [name for name, value in only_sumo.items() if value]:
-            need = "needs" if len(refused) == 1 else "need"
-            raise InputError(f"{' and '.join(refused)} {need} --host sumo")
+    only_sumo = {
+        "--sumo-model": sumo_model, "--gui": gui, "--keep-files": keep_files,
+        "--sumo-fcd": sumo_fcd, "--on-collision teleport": on_collision == "teleport",
+    }  # fmt: skip
+    refused = [name for name, value in only_sumo.items() if value]
+    if choice("host", host, ("minisim", "sumo")) == "minisim" and refused:
+        need = "needs" if len(refused) == 1 else "need"
+        raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
@@ -99,14 +95,14 @@ def run(
     recording: dict[str, Any] = {"record": None if fcd is None and trajectories is None else "all"}
     if host == "sumo":
         recording |= {"model": sumo_model, "gui": gui, "keep_files": keep_files, "fcd": sumo_fcd}
-    files = [path for path in (trips, trajectories, fcd, sumo_fcd) if path is not None]
+    files = [*filter(None, (trips, trajectories, fcd, sumo_fcd))]
     try:
         result = recipe.run(simulate_in_sumo if host == "sumo" else simulate, **recording)
     except CollisionError as error:
         if as_json:
             touched = [collision._asdict() for collision in error.collisions]
-            facts = identity_of(recipe) | {"collisions": len(touched), "touched": touched}
-            show_json({**facts, "error": str(error)})
+            facts = {"collisions": len(touched), "touched": touched, "error": str(error)}
+            show_json(identity_of(recipe) | facts)
         unwritten = f"{', '.join(map(str, files))} not written; " if files else ""
         error.add_note(f"{unwritten}--on-collision record notes collisions and goes on")
         raise

@@ -26,14 +26,16 @@ if TYPE_CHECKING:
     from scenarios.recipe import Recipe
     from scenarios.sweep.store import Store
 
-#: What a file may leave out, and how the help text escapes brackets.
+#: The keys of a file, and the defaults of those that it may leave out.
 KEYS = {**AXES, **SINGLE}
 LEFT_OUT = ", ".join(
     f"{key} {value if isinstance(value, str) else f'{value:g}'}"
     for key, value in KEYS.items()
     if value not in (None, ())
 )
-PLAIN = str.maketrans({"[": r"\["})
+
+#: A junction in the help text, in which brackets are escaped.
+JUNCTION = CUSTOM.replace("[", r"\[")
 
 #: Studies that are lists of experiments.
 STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
@@ -46,51 +48,45 @@ STUDIES = tuple(name for name in NAMES if name not in SEARCHES)
     "  density = \\[150, 250, 350]\n\n"
     f"and also any other of {', '.join(KEYS)} (minisim metrics lists metrics; mymodule:name is "
     f"yours). What it leaves out is {LEFT_OUT}. Your own junction is written\n\n"
-    f"  scenario = {CUSTOM.translate(PLAIN)}\n\n"
+    f"  scenario = {JUNCTION}\n\n"
     "\\[\\[experiment]] begins a block of its own. A run that failed is tried again the next time; "
-    "one that is stored is not made again, whether a file, a study or [bold]minisim "
-    "reproduce[/bold] asked for it.\n\n"
+    "a stored one is not repeated, whether a file, a study or [bold]minisim reproduce[/bold] asked "
+    "for it.\n\n"
     "[bold]Examples[/bold]\n\n"
-    "minisim sweep paper --seeds 10 --out paper.db\n\n"
     "minisim sweep fair --seeds 3 --out fair.db --export fair.csv\n\n"
     "minisim sweep mine.toml --jobs 2 --out mine.db --export mine.csv\n\n"
     "minisim sweep mine.toml --scheduler tcp://10.0.0.1:8786 --out mine.db\n\n"
     "[bold]Exit codes[/bold]\n\n"
-    "0 done; 1 some runs failed (their rows say why); 2 bad input, or a store that cannot be "
-    "written, as on a full disk; 130 interrupted; 143 terminated. What was done is in the store."
+    "0 done; 1 some runs failed (their rows say why); 2 bad input or a store that cannot be "
+    "written; 130 interrupted; 143 terminated. Finished runs are in the store."
 )
 def sweep(
     what: Annotated[
         str,
         typer.Argument(
             metavar="FILE.toml|paper|STUDY",
-            help="The experiments; or the paper's grid: its four controllers, five densities and "
-            "three splits on 4 arms, DIM alone on 3 and 5, by the rules of its text; or another "
-            f"study of minisim reproduce: {', '.join(STUDIES)}.",
+            help="A file of experiments; or paper, the grid of its text: four controllers, five "
+            "densities and three splits on 4 arms, DIM alone on 3 and 5; or another study of "
+            f"minisim reproduce: {', '.join(STUDIES)}.",
         ),
     ],
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", metavar="STORE", help="Where results are kept; made if new."),
+        typer.Option("--out", "-o", metavar="STORE", help="Keeps the results; made if new."),
     ] = Path("sweep.db"),
     seeds: Annotated[
-        int | None, option("Runs a cell, seeds 1 … N; as the file says, or 10.", "N")
+        int | None, option("Runs per cell, seeds 1 … N; as the file says, or 10.", "N")
     ] = None,
     jobs: options.Jobs = None,
     scheduler: Annotated[
-        str | None,
-        option(
-            "Run on the Dask cluster of this scheduler (pip install 'minisim\\[dask]').", "ADDRESS"
-        ),
+        str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
     ] = None,
-    export: Annotated[
-        Path | None, option("Write one row a run (.csv or .parquet).", "FILE")
-    ] = None,
+    export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
     horizon: Annotated[
         float | None, option("Simulated time; as the file says, or 3600.", "S")
     ] = None,
 ) -> None:
-    """Run many experiments over seeds; results are kept, and stored runs are not repeated."""
+    """Run many experiments over seeds, and keep the results; stored runs are not repeated."""
     from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
     from scenarios.cli.shared.report import sweep_notes, sweep_table
@@ -109,10 +105,8 @@ def sweep(
     if export is not None:
         check_table(export)
     experiments = _experiments(what, seeds, horizon)
-    with (
-        nullcontext() if scheduler is None else cluster(scheduler) as executor,
-        Store(out) as store,
-    ):
+    remote = nullcontext() if scheduler is None else cluster(scheduler)
+    with remote as executor, Store(out) as store:
         rows = _run(experiments, executor, workers, store, out)
         outdated = store.outdated
     averaged = cells(rows)
@@ -128,7 +122,7 @@ def sweep(
 
 
 def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Recipe]:
-    """The runs of a study or file; a word without a suffix that is not a file names a study."""
+    """The runs of a study or file; a word without a suffix names a study unless it is a file."""
     from scenarios.sweep.file import check_can_run, read_experiments
 
     studies = ("paper", *STUDIES)
@@ -138,8 +132,7 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
         )
     if what in studies or not (Path(what).suffix or os.path.exists(what)):
         study = study_named("text" if what == "paper" else choice("study", what, studies))
-        runs = study.runs(10 if seeds is None else seeds, 3600.0 if horizon is None else horizon)
-        recipes = [recipe for _, recipe in runs]
+        recipes = [recipe for _, recipe in study.runs(seeds or 10, horizon or 3600.0)]
     else:
         recipes = read_experiments(what, seeds=seeds, horizon=horizon)
     with bar("checking"):
@@ -157,20 +150,17 @@ def _run(
     from scenarios.sweep.runner import finished
 
     rows: dict[int, dict[str, object]] = {}
-    lost = 0
+    lost, total = 0, len(experiments)
     try:
         with bar("starting") as progress:
             for k, row in finished(experiments, executor, jobs=jobs, store=store):
                 rows[k] = row
                 lost += row["error"] is not None
-                progress.label(f"{len(rows)} of {len(experiments)} runs, {lost} failed")
-                progress(len(rows), len(experiments))
+                progress.label(f"{len(rows)} of {total} runs, {lost} failed")
+                progress(len(rows), total)
     except (KeyboardInterrupt, Terminated):
         kept = len(store.valid(map(key_of, experiments)))
-        typer.echo(
-            f"minisim: {kept} of {len(experiments)} runs are in {out}; the same command goes on "
-            "from there",
-            err=True,
-        )
+        note = f"{kept} of {total} runs are in {out}; the same command goes on from there"
+        typer.echo(f"minisim: {note}", err=True)
         raise
-    return pd.DataFrame([rows[k] for k in range(len(experiments))])
+    return pd.DataFrame([rows[k] for k in range(total)])

@@ -12,9 +12,7 @@ from scenarios.cli.shared.terminal import bar
 
 @app.command(
     epilog="Exit code 1 if a claim is false. 6 arms take about 20 s.\n\n"
-    "[bold]Examples[/bold]\n\n"
-    "minisim verify four-way\n\n"
-    "minisim verify five-way --order lanes --plot verification.png"
+    "[bold]Example[/bold]\n\nminisim verify five-way --order lanes --plot verification.png"
 )
 def verify(
     scenario: options.ScenarioName,
@@ -43,13 +41,10 @@ def verify(
         "cases": analysis.cases,
         "claims": [
             {
-                "name": claim.name,
-                "statement": claim.statement,
-                "holds": claim.holds,
-                "failures": claim.failures,
-                "smallest_counterexample": None if claim.holds else names(claim.example or ()),
+                **{key: getattr(it, key) for key in ("name", "statement", "holds", "failures")},
+                "smallest_counterexample": None if it.holds else names(it.example or ()),
             }
-            for claim in analysis.claims
+            for it in analysis.claims
         ],
         "cases_by_vehicles_that_go": analysis.sizes,
         "cases_by_cliques_tied": analysis.ties,

@@ -9,20 +9,11 @@ from typing import Final
 from minisim.arrivals import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
+from scenarios import paper
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
 from scenarios.library import MAKERS
-from scenarios.paper import (
-    BASELINE_GRID,
-    DENSITIES,
-    GRID,
-    SERIES,
-    SPLITS,
-    Cell,
-    controller_of,
-    reference_rows,
-    replay,
-)
+from scenarios.paper import DENSITIES, SERIES, SPLITS, Cell
 from scenarios.profiles import AS_RUN, Profile
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -52,7 +43,7 @@ class Case:
     scenario: Scenario = part("junction, demand and profile", Scenario)
     controller: str = text("its command-line name")
     published: Cell | None = part(
-        "the published run that is replayed; None where arrivals are drawn", Cell,
+        "the published run that is replayed; None if arrivals are drawn", Cell,
         optional=True, default=None,
     )  # fmt: skip
 
@@ -65,7 +56,7 @@ class Case:
         Vehicles do touch in the published runs; in other runs that is an error.
         """
         if self.published is not None and self.same_law:
-            controller = controller_of(*self.published)
+            controller = paper.controller_of(*self.published)
         else:
             controller = controller_named(self.controller, self.scenario.profile)
         reaction = "record" if self.same_law else "stop"
@@ -97,11 +88,11 @@ class Case:
         """The paper's mean [s]; None if the paper has none that this cell should reproduce."""
         if not self.same_law or self.scenario.horizon != 3600.0:  # the published runs' horizon
             return None
-        who = PUBLISHED.get(self.controller)
-        if who is None or not float(self.density).is_integer():
+        name = PUBLISHED.get(self.controller)
+        if name is None or not float(self.density).is_integer():
             return None
-        cell = Cell(self.split, int(self.density), self.scenario.intersection.n, who)
-        chosen = reference_rows(cell, metric, lane)
+        cell = Cell(self.split, int(self.density), self.scenario.intersection.n, name)
+        chosen = paper.reference_rows(cell, metric, lane)
         if self.published is None:
             chosen = chosen[chosen["comparable"] == "yes"]
         return None if chosen.empty else float(chosen["value"].iloc[0])
@@ -113,21 +104,16 @@ class Case:
         """
         if self.published is None:
             return None
-        who, busiest = self.published.controller, self.published.density == max(DENSITIES)
-        travel = TRAVEL_350 if who == "dim" and busiest else TRAVEL[who]
-        return {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}.get(
-            metric
-        )
+        name, busiest = self.published.controller, self.published.density == max(DENSITIES)
+        travel = TRAVEL_350 if name == "dim" and busiest else TRAVEL[name]
+        known = {"waiting_time_s": Tolerance(0.10), "travel_time_s": Tolerance(0.0, travel)}
+        return known.get(metric)
 
 
 def replayed_cases(
-    names: Sequence[str],
-    controllers: Sequence[str],
-    densities: Sequence[float],
-    splits: Sequence[str],
-    profile: str | Profile | None,
-    horizon: float,
-) -> list[Case]:
+    names: Sequence[str], controllers: Sequence[str], densities: Sequence[float],
+    splits: Sequence[str], profile: str | Profile | None, horizon: float,
+) -> list[Case]:  # fmt: skip
     """The published runs with these junctions, controllers, densities and splits; empty means all.
 
     Densities [veh/h] and splits are as in the runs' labels. With profile None, each run keeps its
@@ -138,18 +124,15 @@ def replayed_cases(
     for split in splits:
         choice("split of a published run", split, SPLITS)
     arms = [JUNCTIONS[choice("junction of a published run", name, JUNCTIONS)] for name in names]
-    ran = {PUBLISHED[choice("published controller", who, PUBLISHED)]: who for who in controllers}
+    ran = {PUBLISHED[choice("published controller", name, PUBLISHED)]: name for name in controllers}
     cases = [
-        Case(
-            replace(replay(*cell, profile=profile, sumo=HOST_VERSION), horizon=horizon),
-            ran[cell.controller],
-            cell,
-        )
-        for cell in (*GRID, *BASELINE_GRID)
+        Case(replace(scenario, horizon=horizon), ran[cell.controller], cell)
+        for cell in (*paper.GRID, *paper.BASELINE_GRID)
         if cell.controller in ran
         and cell.arms in (arms or MAKERS)
         and cell.density in (densities or DENSITIES)
         and cell.split in (splits or SPLITS)
+        for scenario in [paper.replay(*cell, profile=profile, sumo=HOST_VERSION)]
     ]
     if not cases:
         wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]

@@ -48,8 +48,8 @@ class Tolerance:
         return abs(difference) <= max(self.relative * abs(value), self.absolute)
 
     def __str__(self) -> str:
-        parts = [f"{100 * self.relative:g} %"] if self.relative else []
-        return " or ".join([*parts, *([f"{self.absolute:g} s"] if self.absolute else [])])
+        parts = {f"{100 * self.relative:g} %": self.relative, f"{self.absolute:g} s": self.absolute}
+        return " or ".join(words for words, size in parts.items() if size)
 
 
 class Pair(NamedTuple):
@@ -116,14 +116,12 @@ def first_divergence(pair: Pair) -> Divergence | None:
     k = int(apart[0])
     ours, theirs = pair.minisim, pair.sumo
     return Divergence(
-        seed=pair.seed,
-        vehicle=k,
-        movement=str(Movement(int(ours.lane[k]), int(ours.manoeuvre[k]))),
+        pair.seed, k, str(Movement(int(ours.lane[k]), int(ours.manoeuvre[k]))),
         depart=float(ours.depart[k] if ours.departed[k] else ours.demand_time[k]),
         end=max(float(t.arrival[k]) if t.arrived[k] else t.end for t in (ours, theirs)),
         waiting=(float(ours.waiting_time[k]), float(theirs.waiting_time[k])),
         travel=(float(ours.travel_time[k]), float(theirs.travel_time[k])),
-    )
+    )  # fmt: skip
 
 
 def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
@@ -139,14 +137,11 @@ def first_parting(minisim: pd.DataFrame, sumo: pd.DataFrame) -> Parting | None:
         return None
     row = moved.sort_values([TIME, "apart"], ascending=[True, False]).iloc[0]
     return Parting(
-        time=float(row[TIME]),
-        vehicle=int(row[VEHICLE]),
-        movement=f"{row[LANE]}{row[MANOEUVRE]}",
+        float(row[TIME]), int(row[VEHICLE]), f"{row[LANE]}{row[MANOEUVRE]}",
         positions=(float(row[S]), float(row[f"{S}_sumo"])),
         speeds=(float(row[SPEED]), float(row[f"{SPEED}_sumo"])),
-        minisim=minisim,
-        sumo=sumo,
-    )
+        minisim=minisim, sumo=sumo,
+    )  # fmt: skip
 
 
 def times(trips: Trips, metric: str, lane: int | None = None) -> Floats:
@@ -161,15 +156,12 @@ def _row(pairs: Sequence[Pair], lane: int | None, metric: str) -> Row:
     means = [(a.mean(), b.mean()) for a, b in zip(ours, theirs, strict=True) if len(a) and len(b)]
     pooled = np.concatenate(ours), np.concatenate(theirs)
     return Row(
-        lane="all" if lane is None else ARM_NAMES[lane],
-        metric=metric,
-        trips=(len(pooled[0]), len(pooled[1])),
-        minisim=_interval([a for a, _ in means]),
-        sumo=_interval([b for _, b in means]),
+        "all" if lane is None else ARM_NAMES[lane], metric, (len(pooled[0]), len(pooled[1])),
+        minisim=_interval([a for a, _ in means]), sumo=_interval([b for _, b in means]),
         difference=_interval([b - a for a, b in means]),
         ks=ks_distance(*pooled) if all(map(len, pooled)) else math.nan,
         within=_share([_close(pair, metric)[_ended(pair, lane)] for pair in pairs]),
-    )
+    )  # fmt: skip
 
 
 def _interval(values: Sequence[float]) -> Interval:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -48,13 +49,13 @@ def table(results: Sequence[Result]) -> pd.DataFrame:
 
 
 def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]) -> str:
-    """The report: tolerances, tables, where the hosts part ways, failed runs, figures."""
+    """The whole report as Markdown."""
     versions = sorted({result.sumo for result in results if result.sumo})
     replays = [result for result in results if result.meets_paper("minisim") is not None]
     failures = [
-        (result.case.name, failure.host, str(failure.seed), failure.error)
+        (result.case.name, host, str(seed), error)
         for result in results
-        for failure in result.failures
+        for host, seed, error in result.failures
     ]
     parts = {
         "Verdict": _verdicts(results),
@@ -77,7 +78,7 @@ def markdown(results: Sequence[Result], command: str, figures: Mapping[str, str]
 
 def summary(results: Sequence[Result]) -> str:
     """How many cells agree, in one line."""
-    verdicts = [result.hosts_agree for result in results if result.hosts_agree is not None]
+    verdicts = [agree for result in results if (agree := result.hosts_agree) is not None]
     text = "no cell could be compared"
     if verdicts:
         text = f"{sum(verdicts)} of {len(verdicts)} cells: both hosts agree within the tolerances"
@@ -95,18 +96,13 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def _rows(result: Result) -> Iterator[dict[str, Any]]:
-    case = result.case
-    scenario = case.scenario
+    case, scenario = result.case, result.case.scenario
     cell = {
-        "controller": case.controller,
-        "scenario": scenario.name,
-        "arms": scenario.intersection.n,
-        "split": case.split,
-        "density": case.density,
-        "profile": scenario.profile.name,
+        "controller": case.controller, "scenario": scenario.name, "arms": scenario.intersection.n,
+        "split": case.split, "density": case.density, "profile": scenario.profile.name,
         "arrivals": "drawn" if case.published is None else "published",
         "horizon_s": scenario.horizon,
-    }
+    }  # fmt: skip
     for row in result.rows:
         means = {}
         for what in ("minisim", "sumo", "difference"):
@@ -123,20 +119,19 @@ def _rows(result: Result) -> Iterator[dict[str, Any]]:
 
 
 def _tolerances() -> tuple[str, ...]:
-    hosts = ", ".join(
-        f"mean {JUDGED[name].lower()} {tolerance}" for name, tolerance in HOST_TOLERANCES.items()
-    )
+    most = [f"mean {JUDGED[name].lower()} {limit}" for name, limit in HOST_TOLERANCES.items()]
     return (
         "Means are over the trips that ended before the horizon, as SUMO and the paper count them; "
         "± is half a 95 % interval over seeds; a difference is SUMO − minisim, paired by seed (the "
         "arrivals are the same); KS is the largest distance between the two distributions of a "
         "trip's time (0 the same, 1 apart).",
-        f"The hosts agree when, each with its own car following, they differ by at most: {hosts}; "
+        "The hosts agree when, each with its own car following, they differ by at most: "
+        f"{', '.join(most)}; "
         f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
         "the paper when mean waiting is within 10 % of the published number, and mean travel "
         "within 0.5 s (DIM; at 350 veh/h within 3 s), 1 s (V2I-C) or 2 s (signals).",
-        f"{NOTHING} is no verdict: no run of the cell ended well in both hosts, or no trip did. "
+        f"{NOTHING} means no verdict: no run of the cell ended well in both hosts, or no trip did. "
         f"Verdicts over fewer than {FEW} trips are marked: one trip may decide them.",
     )
 
@@ -147,26 +142,20 @@ def _verdicts(results: Sequence[Result]) -> str:
          "minisim meets the paper", "SUMO meets the paper"),
         (
             (
-                result.case.name,
-                str(len(result.pairs)),
-                " / ".join(map(str, result.trips)) if result.rows else NOTHING,
-                _share(result.agreement),
-                " / ".join(map(str, result.collisions)),
-                _yes(result.hosts_agree) + (", few trips" if result.few else ""),
-                _yes(result.meets_paper("minisim")),
-                _yes(result.meets_paper("sumo")),
+                it.case.name, str(len(it.pairs)), _counts(it.trips) if it.rows else NOTHING,
+                _share(it.agreement), _counts(it.collisions),
+                _yes(it.hosts_agree) + (", few trips" if it.few else ""),
+                _yes(it.meets_paper("minisim")), _yes(it.meets_paper("sumo")),
             )
-            for result in results
+            for it in results
         ),
         words=(0, 5, 6, 7),
     )  # fmt: skip
 
 
 def _means(results: Sequence[Result], metric: str) -> str:
-    return markdown_table(
-        ("cell", "minisim", "SUMO", "difference", "KS", "published"),
-        ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows),
-    )
+    rows = ((it.case.name, *_cells(it.case, it.row(metric))) for it in results if it.rows)
+    return markdown_table(("cell", "minisim", "SUMO", "difference", "KS", "published"), rows)
 
 
 def _replays(results: Sequence[Result]) -> str:
@@ -175,45 +164,32 @@ def _replays(results: Sequence[Result]) -> str:
         ("controller", "arms", "split", "veh/h/lane",
          "waiting, minisim", "SUMO", "published", "travel, minisim", "SUMO", "published",
          "same", "met"),
-        (
-            (
-                case.controller,
-                str(case.scenario.intersection.n),
-                case.split,
-                f"{case.density:g}",
-                *(
-                    _number(value)
-                    for metric in JUDGED
-                    for row in [result.row(metric)]
-                    for value in (row.minisim.mean, row.sumo.mean, case.reference(metric, "all"))
-                ),
-                _share(result.agreement),
-                _yes(result.meets_paper("minisim")),
-            )
-            for result in results
-            for case in [result.case]
-        ),
-        words=(0, 2, 11),
+        map(_replay, results), words=(0, 2, 11),
+    )  # fmt: skip
+
+
+def _replay(result: Result) -> tuple[str, ...]:
+    case, rows = result.case, [result.row(metric) for metric in JUDGED]
+    means = [(it.minisim.mean, it.sumo.mean, case.reference(it.metric, "all")) for it in rows]
+    return (
+        case.controller, str(case.scenario.intersection.n), case.split, f"{case.density:g}",
+        *map(_number, chain.from_iterable(means)),
+        _share(result.agreement), _yes(result.meets_paper("minisim")),
     )  # fmt: skip
 
 
 def _lanes(results: Sequence[Result]) -> str:
+    rows = [(result.case, row) for result in results for row in result.rows]
     return markdown_table(
         ("cell", "lane", "metric", "trips", "minisim", "SUMO", "difference", "KS", "published"),
         (
-            (
-                result.case.name,
-                row.lane,
-                JUDGED[row.metric].lower(),
-                " / ".join(map(str, row.trips)),
-                *_cells(result.case, row),
-            )
-            for result in results
-            for row in result.rows
+            (case.name, row.lane, JUDGED[row.metric].lower(), _counts(row.trips),
+             *_cells(case, row))
+            for case, row in rows
             if row.lane != "all" and row.metric in JUDGED
         ),
         words=(0, 1, 2),
-    )
+    )  # fmt: skip
 
 
 def _cells(case: Case, row: Row) -> tuple[str, ...]:
@@ -238,8 +214,7 @@ def _partings(results: Sequence[Result]) -> str:
                 ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",
                  "travel minisim / SUMO", "first apart", "where minisim / SUMO [m]",
                  "speed minisim / SUMO [m/s]"),
-                apart,
-                words=(0, 2, 5),
+                apart, words=(0, 2, 5),
             ),
         ]  # fmt: skip
     return "\n\n".join(parts)
@@ -255,6 +230,10 @@ def _moment(parting: Parting | None) -> tuple[str, ...]:
         return NOTHING, NOTHING, NOTHING
     which = f"vehicle {parting.vehicle} ({parting.movement}) at {parting.time:.2f} s"
     return which, _both(parting.positions), _both(parting.speeds)
+
+
+def _counts(values: tuple[int, int]) -> str:
+    return f"{values[0]} / {values[1]}"
 
 
 def _both(values: tuple[float, float]) -> str:

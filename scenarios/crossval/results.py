@@ -6,17 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
 
+from scenarios.crossval import comparison
 from scenarios.crossval.cases import Case
-from scenarios.crossval.comparison import (
-    Divergence,
-    Pair,
-    Parting,
-    Row,
-    Tolerance,
-    agreement,
-    compare,
-    first_divergence,
-)
+from scenarios.crossval.comparison import Divergence, Pair, Parting, Row, Tolerance
 
 #: How far the means of the two hosts may differ if each has its own car-following model.
 HOST_TOLERANCES: Final = {"travel_time_s": Tolerance(0.03), "waiting_time_s": Tolerance(0.10, 0.3)}
@@ -50,17 +42,17 @@ class Result:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """The statistics; empty if there are no pairs."""
-        return compare(self.pairs, self.case.scenario.intersection.n)
+        return comparison.compare(self.pairs, self.case.scenario.intersection.n)
 
     @cached_property
     def agreement(self) -> float:
         """Share of the trips that are the same; NaN if there are no pairs."""
-        return agreement(self.pairs)
+        return comparison.agreement(self.pairs)
 
     @cached_property
     def divergence(self) -> Divergence | None:
         """The first trip of the first pair to differ between the hosts; None if none does."""
-        return first_divergence(self.pairs[0]) if self.pairs else None
+        return comparison.first_divergence(self.pairs[0]) if self.pairs else None
 
     def row(self, metric: str, lane: str = "all") -> Row:
         """The statistics for a metric and lane."""

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
@@ -48,12 +49,9 @@ class _Outcome(NamedTuple):
 
 
 def crossvalidate(
-    cases: Sequence[Case],
-    seeds: Sequence[int],
-    jobs: int = 1,
-    progress: Progress | None = None,
+    cases: Sequence[Case], seeds: Sequence[int], jobs: int = 1, progress: Progress | None = None,
     folder: Path | None = None,
-) -> list[Result]:
+) -> list[Result]:  # fmt: skip
     """Run every case with every seed in both hosts, and compare.
 
     A run that fails becomes a `Failure` of its case; one whose process dies is tried once more.
@@ -62,30 +60,26 @@ def crossvalidate(
     time, are stored in `folder`/sumo and reused from there.
     """
     runs = [
-        (
-            case,
-            [(host, seed) for seed in (seeds if case.published is None else [0]) for host in HOSTS],
-        )
+        [(case, host, seed, folder) for seed in (seeds if case.published is None else [0])
+         for host in HOSTS]
         for case in cases
+    ]  # fmt: skip
+    outcomes = iter(_gather(_run, [*chain.from_iterable(runs)], jobs, progress))
+    return [
+        _result(case, {(host, seed): next(outcomes) for _, host, seed, _ in tasks})
+        for case, tasks in zip(cases, runs, strict=True)
     ]
-    tasks = [(case, host, seed, folder) for case, todo in runs for host, seed in todo]
-    outcomes = iter(_gather(_run, tasks, jobs, progress))
-    return [_result(case, {run: next(outcomes) for run in todo}) for case, todo in runs]
 
 
 def film(
     results: Sequence[Result], jobs: int = 1, progress: Progress | None = None
 ) -> list[Result]:
     """Add where the hosts part ways, from a shorter second run around the first differing trip."""
-    tasks = [
-        (result.case, host, result.divergence)
-        for result in results
-        if result.divergence is not None
-        for host in HOSTS
-    ]
+    apart = [(result.case, result.divergence) for result in results if result.divergence]
+    tasks = [(case, host, divergence) for case, divergence in apart for host in HOSTS]
     frames = iter(_gather(_record, tasks, jobs, progress))
     return [
-        result if result.divergence is None else _parted(result, next(frames), next(frames))
+        _parted(result, next(frames), next(frames)) if result.divergence else result
         for result in results
     ]
 
@@ -108,17 +102,16 @@ def _run(task: tuple[Case, str, int, Path | None]) -> _Outcome:
         version = importlib.metadata.version("libsumo")
         key = digest_of("\n".join([description_of(recipe), results_version(), version]))
         file = folder / "sumo" / f"{key[:24]}.npz"
-        if kept := _read(file):
-            return kept
+        if stored := _read(file):
+            return stored
     run = recipe.run(_host(host))
     trips = run.counted.columns
     outcome = _Outcome(trips, len(run.collisions), run.host.get("sumo", ""))
     if file is not None:
         make_folder(file.parent)
+        kept = {"collisions": outcome.collisions, "sumo": outcome.sumo, **trips._asdict()}
         with replacing(file) as part:
-            np.savez_compressed(
-                part, collisions=outcome.collisions, sumo=outcome.sumo, **trips._asdict()
-            )
+            np.savez_compressed(part, **kept)
     return outcome
 
 
@@ -169,18 +162,13 @@ def _result(case: Case, outcomes: Mapping[tuple[str, int], _Outcome | BaseExcept
     ours, theirs = (
         {seed: made for (host, seed), made in good.items() if host == which} for which in HOSTS
     )
+    both = [seed for seed in ours if seed in theirs]
+    collisions = [sum(made.collisions for made in host.values()) for host in (ours, theirs)]
     return Result(
-        case=case,
-        pairs=tuple(
-            Pair(seed, ours[seed].trips, theirs[seed].trips) for seed in ours if seed in theirs
-        ),
-        collisions=(
-            sum(made.collisions for made in ours.values()),
-            sum(made.collisions for made in theirs.values()),
-        ),
-        failures=_failures(outcomes),
+        case, tuple(Pair(seed, ours[seed].trips, theirs[seed].trips) for seed in both),
+        (collisions[0], collisions[1]), _failures(outcomes),
         sumo=next((made.sumo for made in theirs.values()), ""),
-    )
+    )  # fmt: skip
 
 
 def _parted(

@@ -1,8 +1,7 @@
 """Questions and their answers. Each study is one module: its runs, and what it computes from them.
 
 A module exports its `STUDY`; the module of the same name in `figures.studies` draws it. What
-several studies need is in `shared`. Add a new study to `NAMES`; lists, help
-texts and the report then include it.
+several need is in `shared`. Lists, help texts and the report have the studies of `NAMES`.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from scenarios.studies.shared.study import Study
 
 
 class PublishedPoint(NamedTuple):
-    """A published run, even where it is not what its label says; fields as in `ControllerPoint`."""
+    """A published run, even if it is not what its label says; fields as in `ControllerPoint`."""
 
     series: str
     arms: int
@@ -40,7 +40,6 @@ STUDY = Study(
         PublishedPoint(SERIES[cell.controller], cell.arms, cell.split, float(cell.density))
         for cell in (*GRID, *BASELINE_GRID)
     ),
-    # The published V2I-C decides every 0.01 s. A simulated hour costs some 20 s of CPU, a hundred
-    # times that of a signal, and its runs differ little.
+    # It decides every 0.01 s, so that an hour costs some 20 s of CPU, and its runs differ little.
     {"v2ic": 3},
 )

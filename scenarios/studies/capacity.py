@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import InputError
@@ -36,11 +37,8 @@ class CapacityStudy(Study):
     def collect(self, effort: Effort, find: Find) -> Results:
         """Call `find` once per round. A point with a missing or failed run is given up."""
         search = effort.search
-        brackets = {
-            (point, seed): (0, search.steps)
-            for point in self.points
-            for seed in range(1, search.seeds + 1)
-        }
+        seeds = range(1, search.seeds + 1)
+        brackets = dict.fromkeys(product(self.points, seeds), (0, search.steps))
         asked: list[tuple[Point, Mapping[str, Any] | None]] = []
         for _ in range(search.rounds):
             probes = {
@@ -77,12 +75,14 @@ STUDY = CapacityStudy(
 
 
 class Capacity(NamedTuple):
-    """The capacity of a point."""
+    """The capacity of a point.
+
+    For each seed, its bracket is the highest demand that was served and the lowest that was not
+    [veh/h/lane]: 0 if none was served, infinite if all were.
+    """
 
     series: str  # the controller
     arms: int  # of the junction
-    #: For each seed, the highest demand that was served and the lowest that was not [veh/h/lane];
-    #: 0 if none was served, infinite if all were.
     brackets: tuple[tuple[float, float], ...]
 
     @property
@@ -123,8 +123,7 @@ class Capacity(NamedTuple):
 def grows(row: Mapping[Any, Any]) -> bool:
     """Whether the queue grew in a run, given its row of a sweep.
 
-    `queue_growth` compares two windows that begin half the horizon apart. Half of the demanded
-    trips arrive in that time.
+    `queue_growth` compares windows half a horizon apart, in which half of the trips arrive.
     """
     return float(row["queue_growth"]) > TOLERANCE * float(row["trips"]) / 2.0
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
-from minisim.errors import InputError, items, numbers
+from minisim.errors import InputError, numbers
 from scenarios.controllers import RIVALS
 from scenarios.statistics import mean_interval
 from scenarios.studies.shared.points import fair_grid
@@ -40,16 +40,15 @@ STUDY = Study(
 
 
 class Crossing(NamedTuple):
-    """The demand above which one controller does worse than another."""
+    """The demand [veh/h/lane] above which one controller does worse than another.
 
-    #: The lowest at which the mean difference turns positive [veh/h/lane]; −inf if it is positive
-    #: at the lowest demand tried, +inf if it never is.
-    density: float
+    Above the capacities of both controllers, neither wins.
+    """
+
+    density: float  # the lowest with a mean difference > 0: −inf below those tried, +inf if none
     low: float  # low … high: its interval; ±inf if the demands tried do not bound it
     high: float
-    #: Where the mean difference falls back to 0 or less; +inf if it does not. Above the capacities
-    #: of both controllers, neither wins.
-    until: float
+    until: float  # where the mean difference falls back to 0 or less; +inf if it does not
     tried: tuple[float, float]  # lowest and highest demand tried with both
 
     def __str__(self) -> str:
@@ -79,21 +78,15 @@ def crossing(differences: Mapping[float, Sequence[float]]) -> Crossing:
 
     The mean difference is taken as linear between the demands tried, and so are the bounds of its
     pointwise 95 % Student-t intervals. The interval of the crossing holds the demands at which
-    those intervals hold 0: it runs from the crossing of the upper bound to that of the lower one (a
-    confidence set by inversion of the test, Fieller 1954).
-
-    Args:
-        differences: two or more demands [veh/h/lane] -> one difference per seed, at least two.
+    those intervals hold 0 (a confidence set by inversion of the test, Fieller 1954). `differences`
+    maps two or more demands [veh/h/lane] to one difference per seed, at least two.
     """
     densities = sorted(numbers("demands", list(differences)))
-    if len(densities) < 2:
-        raise InputError("a crossing needs differences at two demands or more")
-    bands = []
-    for density in densities:
-        values = items(f"differences at {density:g}", differences[density], "numbers")
-        if len(values) < 2:
-            raise InputError(f"a crossing needs two differences or more at {density:g} veh/h/lane")
-        bands.append(mean_interval(values))
+    bands = [mean_interval(differences[density]) for density in densities]
+    few = [density for density, band in zip(densities, bands, strict=True) if band.size < 2]
+    if few or len(densities) < 2:
+        where = f"{few[0]:g} veh/h/lane" if few else "two demands or more"
+        raise InputError(f"a crossing needs two differences or more at {where}")
     start, until = _first_rise(densities, [band.mean for band in bands])
     low, _ = _first_rise(densities, [band.mean + band.half_width for band in bands])
     high, _ = _first_rise(densities, [band.mean - band.half_width for band in bands])
@@ -109,8 +102,7 @@ def tried(crossings: Iterable[Crossing]) -> tuple[float, float]:
 def paired_differences(
     rows: pd.DataFrame, ours: str, theirs: str, metric: str
 ) -> dict[float, list[float]]:
-    """Differences of a column between two series, ours minus theirs: density -> one per
-    common seed.
+    """Ours minus theirs in a column, for two series: density -> one difference per common seed.
 
     `InputError` if two runs with the same seed had different arrivals.
     """
@@ -138,13 +130,12 @@ def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     if True not in above:
         return math.inf, math.inf
     rise = above.index(True)
-    fall = above.index(False, rise) if False in above[rise:] else None
-    return (
-        -math.inf if rise == 0 else _zero(x, y, rise),
-        math.inf if fall is None else _zero(x, y, fall),
-    )
+    start = _zero(x, y, rise) if rise else -math.inf
+    end = _zero(x, y, above.index(False, rise)) if False in above[rise:] else math.inf
+    return start, end
 
 
 def _zero(x: Sequence[float], y: Sequence[float], k: int) -> float:
+    """Where the side of the polygon that ends at point k crosses 0."""
     share = y[k - 1] / (y[k - 1] - y[k])
     return x[k - 1] + share * (x[k] - x[k - 1])

@@ -28,33 +28,29 @@ CELL: Final = (
 SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are not metrics.
-OTHERS: Final = ("recipe", "seed", "growing", "arrivals", "cpu_s", "version", "error")
+OTHERS: Final = ("recipe", "host", "seed", "growing", "arrivals", "cpu_s", "version", "error")
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per cell, in the order of `rows`.
 
     Returns:
-        `CELL`; `runs`, the number that succeeded, and `failed`, the number that did not; `trips`,
-        `unfinished` and `collisions` (sums); each of the columns `averaged`, with the half widths
-        of its 95 % confidence interval (`…_ci95`) and of the 95 % prediction interval for one more
-        run (`…_pi95`), NaN where unknown; `growing`, whether the queues of all runs together kept
-        growing; `too_short`, whether the runs are too short to tell; `cpu_s`, mean processor time
-        of a run.
+        `CELL`; the numbers of `runs` that succeeded and that `failed`; the sums `trips`,
+        `unfinished` and `collisions`; the means of the columns `averaged`, with the half widths of
+        the 95 % confidence interval (`…_ci95`) and of the 95 % prediction interval for one more run
+        (`…_pi95`), NaN if unknown; `growing` (`saturated`), `too_short` and the mean `cpu_s`.
 
     Raises:
-        InputError: rows of one cell that differ in more than their seed, or have the same one.
+        InputError: rows of one cell that differ in more than their seed, or have the same seed.
     """
     import pandas as pd
 
     made = []
     for names, group in _checked(rows).groupby(list(CELL), sort=False):
         good = group[group["error"].isna()]
-        cell: dict[str, object] = dict(zip(CELL, names, strict=True))
-        cell |= {"runs": len(good), "failed": len(group) - len(good)}
-        if len(good):
-            cell |= _averaged(good)
-        made.append(cell)
+        counts = {"runs": len(good), "failed": len(group) - len(good)}
+        means = _averaged(good) if len(good) else {}
+        made.append({**dict(zip(CELL, names, strict=True)), **counts, **means})
     return pd.DataFrame(made)
 
 
@@ -69,10 +65,8 @@ def _checked(rows: pd.DataFrame) -> pd.DataFrame:
         first = group.iloc[0]
         what = f"{first['controller']} on {first['scenario']} at {first['density']:g} veh/h/lane"
         if "recipe" in group and group["recipe"].nunique() > 1:
-            raise InputError(
-                f"different controllers or scenarios are called {what}; give each its own label or "
-                "name"
-            )
+            advice = "give each its own label or name"
+            raise InputError(f"different controllers or scenarios are called {what}; {advice}")
         if not group["seed"].is_unique:
             twice = group["seed"][group["seed"].duplicated()].iloc[0]
             raise InputError(f"{what} has several runs of seed {twice}; keep one of them")
@@ -81,28 +75,22 @@ def _checked(rows: pd.DataFrame) -> pd.DataFrame:
 
 def averaged(rows: pd.DataFrame) -> list[str]:
     """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
-    known = {*CELL, *SUMS, *OTHERS, "host"}
+    known = {*CELL, *SUMS, *OTHERS}
+    left = [
+        c for c in rows.columns if c not in known and not c.startswith(BEGINNINGS[1:])
+    ]  # of groups
+    present = {column: rows[column].dropna() for column in left}
     return [
-        column
-        for column in rows.columns
-        if column not in known
-        and not column.startswith(BEGINNINGS[1:])  # of groups of trips
-        and _is_numeric(rows[column])
+        c for c, them in present.items() if len(them) and all(isinstance(v, Real) for v in them)
     ]
-
-
-def _is_numeric(column: pd.Series[Any]) -> bool:
-    """Whether there is at least one value and all of them are numbers."""
-    values = column.dropna()
-    return len(values) > 0 and all(isinstance(value, Real) for value in values)
 
 
 def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
     """Mean run-by-run difference between two controllers in `metric`, a column or a `Metric`.
 
     Returns:
-        One row per cell that both ran: `CELL` without the controller, `pairs`, `difference` (the
-        first controller's value less the second's) and `difference_ci95`.
+        One row per cell that both ran: `CELL` without the controller, the number of `pairs`,
+        `difference` (the first controller's value less the second's) and `difference_ci95`.
 
     Raises:
         InputError: an unknown metric or controller, two runs of one seed whose arrivals differ, or
@@ -119,13 +107,8 @@ def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: st
     gaps = []
     for names, values in pairs(rows, metric, "controller", (first, second), by).items():
         interval = mean_interval(values)
-        gaps.append({
-            **dict(zip(by, names, strict=True)),
-            "pairs": interval.size,
-            "difference": interval.mean,
-            "difference_ci95": interval.half_width,
-        })  # fmt: skip
-    return pd.DataFrame(gaps)
+        gaps.append([*names, interval.size, interval.mean, interval.half_width])
+    return pd.DataFrame(gaps, columns=[*by, "pairs", "difference", "difference_ci95"])
 
 
 def pairs(
@@ -133,18 +116,10 @@ def pairs(
 ) -> dict[tuple[Any, ...], list[float]]:
     """Differences in `metric` between two controllers: values of `by` -> one value per seed.
 
-    Runs are paired by seed. Both controllers met the same arrivals, so the variation that they
-    share cancels.
-
-    Args:
-        rows: the rows of a sweep; failed runs and missing values are left out.
-        metric: a column; a difference is the first controller's value less the second's.
-        column: the one that holds `names`, such as "controller".
-        names: the names of both controllers.
-        by: columns that name a cell.
-
-    Raises:
-        InputError: two runs of one seed whose arrivals differ, or two of one controller and seed.
+    Runs are paired by seed, so that the variation of the arrivals cancels. A difference is the
+    first controller's value less the second's; failed runs and missing values are left out.
+    `column`, such as "controller", has the names, and the columns `by` name a cell. Raises
+    `InputError` if arrivals of one seed differ, or a controller has two runs of one seed.
     """
     good = rows[rows["error"].isna() & rows[metric].notna()] if metric in rows else rows[:0]
     one, other = (good[good[column] == name] for name in names)
@@ -168,9 +143,8 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
             cell[metric] = interval.mean
             cell[f"{metric}_ci95"] = interval.half_width
             cell[f"{metric}_pi95"] = prediction_interval(values).half_width
-    cell |= {"growing": saturated(good), "too_short": too_short(good)}
-    cell["cpu_s"] = float(good["cpu_s"].mean())
-    return cell
+    cpu = float(good["cpu_s"].mean())
+    return {**cell, "growing": saturated(good), "too_short": too_short(good), "cpu_s": cpu}
 
 
 def saturated(good: pd.DataFrame) -> bool:
@@ -182,8 +156,8 @@ def saturated(good: pd.DataFrame) -> bool:
 def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
-    The travel time on a free road is travel time less time loss, taken over the trips that ended
-    or, if none did, over what was driven.
+    The travel time on a free road is travel time less time loss, of the trips that ended or, if
+    none did, of what was driven.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

@@ -13,7 +13,7 @@ from typing import Any
 from minisim.errors import InputError, MissingExtraError, instance
 from scenarios.sweep.keys import results_version
 
-#: Of a scheduler; the protocols are Dask's.
+#: The address of a scheduler; the protocols are Dask's.
 ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,9})", re.ASCII)
 
 #: How long to wait for a scheduler, and then for its first worker [s].
@@ -25,19 +25,19 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
     """An executor on the cluster of the scheduler at `address`, such as tcp://10.0.0.1:8786.
 
     Dask repeats the tasks of a lost worker on others, and gives up a run that has cost three
-    workers. All workers need the same version of minisim.
-
-    Raises:
-        MissingExtraError: without the extra `dask`.
-        InputError: no scheduler there, no workers, or workers with another version.
+    workers. Raises `MissingExtraError` without the extra `dask`, and `InputError` if there is no
+    scheduler, or if it has no workers or one with another version of minisim.
     """
-    _check_address(address)
+    instance("scheduler", address, str)
+    form = ADDRESS.fullmatch(address)
+    if form is None or not 1 <= int(form["port"]) <= 65535:  # Dask would hang while it cleans up
+        need = "an address has the form tcp://host:port, with a port 1 … 65535"
+        raise InputError(f"no Dask scheduler at {address!r}: {need}")
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        raise MissingExtraError(
-            "--scheduler needs the package distributed: pip install 'minisim[dask]'"
-        ) from None
+        need = "--scheduler needs the package distributed: pip install 'minisim[dask]'"
+        raise MissingExtraError(need) from None
     # The sweep itself reports a lost connection in one line. Each logger has its own level.
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":
@@ -52,19 +52,6 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         yield client.get_executor()
 
 
-def _check_address(address: str) -> None:
-    """Raise `InputError` for what is no address, since Dask would hang while it cleans up."""
-    instance("scheduler", address, str)
-    form = ADDRESS.fullmatch(address)
-    if form is None:
-        why = "an address has the form tcp://host:port"
-    elif not 1 <= int(form["port"]) <= 65535:
-        why = f"a port is 1 … 65535, got {form['port']}"
-    else:
-        return
-    raise InputError(f"no Dask scheduler at {address!r}: {why}")
-
-
 def _check_workers(client: Any, address: str, patience: float) -> None:
     try:
         client.wait_for_workers(1, timeout=patience)
@@ -75,8 +62,6 @@ def _check_workers(client: Any, address: str, patience: float) -> None:
     except ImportError as error:
         raise InputError(f"the workers of {address} lack minisim: {error}") from error
     ours = results_version()
-    for worker, version in versions.items():
-        if version != ours:
-            raise InputError(
-                f"worker {worker} has version {version} of the results, here it is {ours}"
-            )
+    for worker, it in versions.items():
+        if it != ours:
+            raise InputError(f"worker {worker} has version {it} of the results, here it is {ours}")

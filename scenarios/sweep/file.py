@@ -6,10 +6,10 @@
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
     # humans = [0, 0.2]                 # with controllers of DIM only
-    # arrivals = "count.csv"            # a table to replay, instead of density, split and turns,
-    # start = "07:00"                   # which begins at a time of day
+    # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
+    # start = "07:00"                   # from this time of day on
 
-    [[experiment]]                      # the lines above hold here too
+    [[experiment]]                      # the lines above apply here too
     scenario = "four-way"
 
     [[experiment]]
@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import product
@@ -32,6 +32,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from minisim import hosting
 from minisim.arrivals import MAX_TIME
 from minisim.errors import (
     FileError,
@@ -44,8 +45,6 @@ from minisim.errors import (
     show,
 )
 from minisim.files import read_file
-from minisim.hosting import ON_COLLISION
-from minisim.hosting import start as started
 from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
@@ -56,10 +55,10 @@ from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import identity_of
 
-#: More are surely a typing error.
+#: More runs are surely a typing error.
 MAX_RUNS = 1_000_000
 
-#: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of either form.
+#: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of both forms.
 SHARES = ("split", "turns")
 
 #: Keys of a scenario's table.
@@ -72,11 +71,15 @@ def read_experiments(
     """The recipes of a file, each once; `seeds` and `horizon` replace those of the file.
 
     Raises:
-        FileError: unreadable, or no TOML.
+        FileError: unreadable, or not TOML.
         InputError: an unknown key (with the nearest one), a value that is not allowed, or a
             combination that cannot be run; the message names file, block and key.
     """
-    table, place = _load(path), os.fspath(path)
+    place = os.fspath(path)
+    try:
+        table = tomllib.loads(read_file("experiments", path).decode())
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"{place} is not valid TOML: {error}") from error
     blocks = table.pop("experiment", [{}])
     given = {"seeds": seeds, "horizon": horizon}
     overrides = {key: value for key, value in given.items() if value is not None}
@@ -91,13 +94,13 @@ def read_experiments(
     for count, block in enumerate(blocks, start=1):
         with _at(f"{place}: [[experiment]] {count}" if len(blocks) > 1 else place):
             _check_keys("key", block, [*AXES, *SINGLE])
-            if not {**table, **block}:
+            said = {**table, **block}
+            if not said:
                 raise InputError(
                     "the file does not say what to run; name a scenario, a controller and a "
                     "density, or any other of " + ", ".join((*AXES, *SINGLE))
                 )
-            said = {**table, **block}
-            _seeds(said.get("seeds", 1))  # what the command line replaces is checked all the same
+            _seeds(said.get("seeds", 1))  # checked even if the command line replaces it
             number("horizon [s]", said.get("horizon", 1.0), above=0, high=MAX_TIME)
             for recipe in _recipes({**said, **overrides}, Path(path).parent):
                 recipes.setdefault(key_of(recipe), recipe)
@@ -107,16 +110,12 @@ def read_experiments(
 
 
 def check_can_run(recipes: Iterable[Recipe]) -> None:
-    """Start every controller at every site once; most that cannot serve it raise then.
-
-    Raises:
-        InputError: a controller that cannot serve a scenario.
-    """
-    first = {tuple(({**identity_of(it), "seed": 0}).values()): it for it in recipes}
+    """Start every controller at every site once; raises `InputError` if it cannot serve it."""
+    first = {tuple({**identity_of(it), "seed": 0}.values()): it for it in recipes}
     for recipe in first.values():
         scenario = recipe.scenario
         try:
-            started(recipe.driven, scenario.site(recipe.seed))
+            hosting.start(recipe.driven, scenario.site(recipe.seed))
         except MinisimError as error:
             raise InputError(
                 f"{recipe.name} cannot serve {scenario.name} at {scenario.density:g} veh/h/lane, "
@@ -124,28 +123,18 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
             ) from error
 
 
-def _load(path: str | os.PathLike[str]) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_file("experiments", path).decode())
-    except (ValueError, RecursionError) as error:
-        raise FileError(f"{os.fspath(path)} is not valid TOML: {error}") from error
-
-
 def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     """Every combination of a block."""
-    if "arrivals" in block:
-        clash = [key for key in DRAWN if key in block]
-        if clash:
-            raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
+    if "arrivals" in block and (clash := [key for key in DRAWN if key in block]):
+        raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
     if "min_headway" in block and "shifted" not in axes["model"]:
         raise InputError("min_headway goes with the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
-    count = prod(map(len, axes.values()))
-    if count > MAX_RUNS:
+    if (count := prod(map(len, axes.values()))) > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
     single = {key: block.get(key, default) for key, default in SINGLE.items()}
-    reaction = choice("on_collision", single.pop("on_collision"), ON_COLLISION)
+    reaction = choice("on_collision", single.pop("on_collision"), hosting.ON_COLLISION)
     metrics = metrics_named(single.pop("metrics"))
     controllers, shares, _ = (axes.pop(key) for key in ("controller", "humans", "seeds"))
     for values in product(*axes.values()):
@@ -167,16 +156,15 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
         del chosen["min_headway"]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
-        _check_keys("key of a scenario", junction, JUNCTION)
         label = junction.pop("label", "")
+        _check_keys("key of a scenario", junction, JUNCTION)
         if junction["name"] == "custom" and "bearings" not in junction:
             raise InputError(f"custom needs bearings, such as scenario = {CUSTOM}")
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)
-        table = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
-        made = replace(made, recorded=table)
-    return replace(made, name=label or made.name)
+        recorded = read_arrivals(folder / recorded, made.intersection.n, start or 0.0)
+    return replace(made, recorded=recorded, name=label or made.name)
 
 
 def _table(given: object) -> dict[str, Any]:
@@ -204,10 +192,9 @@ def _seeds(value: object) -> list[int]:
     if isinstance(value, list):
         return [integer("seeds: a seed", seed, low=0) for seed in _listed("seeds", value)]
     try:
-        count = integer("seeds", value, low=1, high=MAX_RUNS)
+        return list(range(1, integer("seeds", value, low=1, high=MAX_RUNS) + 1))
     except InputError as error:
         raise InputError(f"{error}; or a list of seeds") from error
-    return list(range(1, count + 1))
 
 
 def _check_keys(what: str, table: Iterable[str], known: Iterable[str]) -> None:
@@ -216,7 +203,7 @@ def _check_keys(what: str, table: Iterable[str], known: Iterable[str]) -> None:
 
 
 def _check_names(recipes: Iterable[Recipe]) -> None:
-    """Raise `InputError` for two recipes whose rows would look alike."""
+    """Raise `InputError` if the rows of two recipes would look alike."""
     seen: set[tuple[Any, ...]] = set()
     for recipe in recipes:
         row = tuple(identity_of(recipe).values())
@@ -230,9 +217,8 @@ def _check_names(recipes: Iterable[Recipe]) -> None:
 
 @contextmanager
 def _at(place: str) -> Iterator[None]:
-    """Put the place before the message of an error in the block."""
+    """Put the place in front of the message of an error in the block."""
     try:
         yield
     except (InputError, FileError) as error:
-        kind: Callable[[str], MinisimError] = type(error)
-        raise kind(f"{place}: {error}") from error
+        raise type(error)(f"{place}: {error}") from error

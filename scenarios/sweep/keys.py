@@ -20,7 +20,7 @@ from minisim.errors import InputError, show
 from minisim.version import __version__
 from scenarios.recipe import Recipe
 
-#: Raise it by one when a recipe gives another row than before and the version of the package stays
+#: Raise it by one when recipes give other rows than before while the version of the package stays
 #: the same. Stored rows are then computed again.
 RESULTS = 5
 
@@ -44,10 +44,7 @@ def key_of(recipe: Recipe) -> str:
 
 
 def content_of(recipe: Recipe) -> str | None:
-    """A digest of what runs, whatever it is called; None if it cannot be described.
-
-    Equal for runs that differ in nothing but their seed and, if so, their recorded arrivals.
-    """
+    """A digest of all but label, seed and recorded arrivals; None if it cannot be described."""
     scenario = replace(recipe.scenario, recorded=None)
     try:
         return digest_of(json.dumps(canonical([scenario, recipe.driven])))[:16]
@@ -63,12 +60,9 @@ def digest_of(description: str) -> str:
 def canonical(value: object) -> Any:
     """The parameters of a recipe as JSON values, equal for equal recipes.
 
-    Dataclasses become their class and fields, and those that are not ours also the version of their
+    Dataclasses become their class and fields; those that are not ours also the version of their
     code (`_code`). Numbers become floats, since 350 and 350.0 are the same density. Arrays become
-    their type, shape and SHA-256.
-
-    Raises:
-        InputError: a value of another kind.
+    their type, shape and SHA-256. Raises `InputError` for a value of another kind.
     """
     if value is None or isinstance(value, bool | str):
         return value
@@ -81,11 +75,8 @@ def canonical(value: object) -> Any:
         return {"array": plain.dtype.str, "shape": list(plain.shape), "sha256": digest}
     if is_dataclass(value) and not isinstance(value, type):
         kind = type(value)
-        return {
-            "class": f"{kind.__module__}.{kind.__qualname__}",
-            **_code(kind),
-            **{field.name: canonical(getattr(value, field.name)) for field in fields(value)},
-        }
+        told = {field.name: canonical(getattr(value, field.name)) for field in fields(value)}
+        return {"class": f"{kind.__module__}.{kind.__qualname__}", **_code(kind), **told}
     if inspect.isfunction(value):
         code = _code(value)
         return {
@@ -102,17 +93,14 @@ def canonical(value: object) -> Any:
     if isinstance(value, set | frozenset):
         return {"set": sorted((canonical(item) for item in value), key=json.dumps)}
     raise InputError(
-        f"{show(value)} cannot be stored: {type(value).__qualname__} is no dataclass, so its "
-        "parameters are not known; make it a frozen dataclass, whose fields are numbers, texts, "
+        f"{show(value)} cannot be stored: {type(value).__qualname__} is not a dataclass, so its "
+        "parameters are unknown; make it a frozen dataclass, whose fields are numbers, texts, "
         "functions, arrays, other dataclasses, and collections of them"
     )
 
 
 def _rule(function: FunctionType) -> str:
-    """A digest of a function's instructions, its constants and the plain globals that it reads.
-
-    It tells apart two functions of one name in one file, such as lambdas.
-    """
+    """A digest of a function's instructions, constants and plain globals: lambdas share a name."""
 
     def told(code: CodeType) -> list[Any]:
         known = {name: function.__globals__.get(name) for name in code.co_names}
@@ -133,12 +121,9 @@ def _rule(function: FunctionType) -> str:
 def _code(kind: type | FunctionType) -> dict[str, Any]:
     """The `version` of a class or function, or else a digest of its modules' text.
 
-    Empty for our own classes, whose changes `RESULTS` counts. The rules of a controller are usually
-    in its session, so the whole file counts, but not what it imports.
-
-    Raises:
-        InputError: neither a version nor a file, as in an interactive session; or a class without a
-            version that a function has made, perhaps with values that are in no field.
+    It is empty for our own classes, whose changes `RESULTS` counts. The rules of a controller are
+    usually in its session, so the whole file counts, but not what it imports. Raises `InputError`
+    if there is neither a version nor a file, or if a function made a class without a version.
     """
     modules = sorted({
         parent.__module__
@@ -152,15 +137,15 @@ def _code(kind: type | FunctionType) -> dict[str, Any]:
         return {"version": canonical(version)}
     if isinstance(kind, type) and "<locals>" in kind.__qualname__:
         raise InputError(
-            f"{kind.__qualname__} cannot be stored: a function makes this class, and may give it "
-            "values that are in none of its fields; move it to the top of its module, or give it a "
+            f"{kind.__qualname__} cannot be stored: a function makes this class, perhaps with "
+            "values that are not in its fields; move it to the top of its module, or give it a "
             "`version` that says what it was made with"
         )
     try:
         texts = "".join(inspect.getsource(sys.modules[name]) for name in modules)
     except (OSError, TypeError, KeyError) as error:
         raise InputError(
-            f"{kind.__qualname__} cannot be stored: its code is in no file, so that a change would "
+            f"{kind.__qualname__} cannot be stored: its code is not in a file, so a change would "
             "go unnoticed; give it a text or an integer `version`"
         ) from error
     return {"code": hashlib.sha256(texts.encode()).hexdigest()}

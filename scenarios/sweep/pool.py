@@ -30,10 +30,10 @@ from typing import TypeVar
 from minisim.errors import integer
 from scenarios.termination import Terminated, raise_terminated
 
-#: Runs that a pool of ours holds per worker: the one that runs and the next one.
+#: Runs that a pool of ours holds per worker: the current one and the next one.
 IN_HAND = 2
 
-#: How often a worker is asked to end, once a second, before it is killed.
+#: How many times a worker is asked to end, once per second, before it is killed.
 PATIENCE = 10
 
 Task = TypeVar("Task")
@@ -63,8 +63,7 @@ def given(
     with closing(_results(function, todo, executor, len(todo))) as results:
         for k, result in results:
             left.discard(k)
-            if isinstance(result, BaseException):
-                reason = result
+            reason = result if isinstance(result, BaseException) else reason
             yield k, result
     for k in sorted(left):
         yield k, reason
@@ -78,17 +77,11 @@ def pooled(
     pool_of: Callable[[int], Executor] = workers,
     begin: Callable[[Executor], None] | None = None,
 ) -> Results[Answer]:
-    """Run in pools of our own; close the generator to give up.
+    """Run in pools of `jobs` processes of our own; close the generator to give up.
 
     When a worker dies, its pool is lost, and any of the runs that it held may have killed it. Each
-    of them is tried again alone. The others go on in a new pool.
-
-    Args:
-        function: runs a task; both go to another process.
-        todo: the tasks.
-        jobs: number of processes.
-        pool_of: makes a pool of as many.
-        begin: called with the first pool before it gets a task.
+    of them is tried again alone. The others go on in a new pool. The function and its tasks go to
+    other processes; `begin` is called with the first pool before it gets a task.
     """
     left = dict(todo)
     while left:
@@ -125,15 +118,22 @@ def _until_given_up(pool: Executor) -> Iterator[Executor]:
 
 
 def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-    """Hand one task over; raises `BrokenExecutor`."""
-    with _uninterrupted():
-        return executor.submit(partial(_ending, function), task)
+    """Hand one task over; Ctrl-C is delayed, and hidden from processes that start meanwhile."""
+    whole = partial(_ending, function)
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        return executor.submit(whole, task)
+    ensure_running()  # or the first process would start it, and that ends the delay
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return executor.submit(whole, task)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Processes(ProcessPoolExecutor):
-    """Spawned processes, since forking beside the threads of a progress bar can hang.
+    """Processes that end when their parent dies or lets them go.
 
-    They end when their parent has died or lets them go.
+    They are spawned, since forking beside the threads of a progress bar can hang.
     """
 
     def __init__(self, jobs: int) -> None:
@@ -174,19 +174,15 @@ def _ending(function: Callable[[Task], Answer], task: Task) -> Answer:
 
 
 def _results(
-    function: Callable[[Task], Answer],
-    todo: Mapping[int, Task],
-    executor: Executor,
-    in_hand: int,
+    function: Callable[[Task], Answer], todo: Mapping[int, Task], executor: Executor, in_hand: int
 ) -> Results[Answer]:
     """Results as they come, with at most `in_hand` runs in the executor; closing cancels these.
 
-    It ends early when the executor breaks, after at least one `BrokenExecutor` and one for each run
-    that it held.
+    If the executor breaks, it ends with one `BrokenExecutor` per run in the executor, at least one.
     """
     done: SimpleQueue[int] = SimpleQueue()
     running: dict[int, Future[Answer]] = {}
-    waiting = iter(list(todo.items()))  # a copy, since the caller removes finished tasks
+    waiting = iter([*todo.items()])  # a copy, since the caller removes finished tasks
     broken = False
 
     def hand_over(count: int) -> Iterator[tuple[int, BaseException]]:
@@ -196,7 +192,7 @@ def _results(
             except BrokenExecutor as error:
                 yield k, error
                 return
-            # k=k keeps this k and not the loop's last; mypy cannot infer such a default.
+            # k=k keeps this k, not the last one of the loop; mypy cannot infer such a default.
             running[k].add_done_callback(lambda _, k=k: done.put(k))  # type: ignore[misc]
 
     try:
@@ -205,7 +201,9 @@ def _results(
             yield refused
         while running:
             k = done.get()
-            result = _result(running.pop(k))
+            future = running.pop(k)
+            gone = CancelledError("the executor gave the run up") if future.cancelled() else None
+            result = gone or future.exception() or future.result()
             broken = broken or isinstance(result, BrokenExecutor)
             if not broken:
                 # Before the caller stores the result, so that no worker waits for the disk.
@@ -217,23 +215,3 @@ def _results(
         # Our own processes end with their runs; their pool fails over a run that is cancelled.
         for future in () if isinstance(executor, _Processes) else running.values():
             future.cancel()
-
-
-def _result(future: Future[Answer]) -> Answer | BaseException:
-    if future.cancelled():
-        return CancelledError("the executor gave the run up")
-    return future.exception() or future.result()
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Delay Ctrl-C, and hide it from processes that start meanwhile."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    ensure_running()  # or the first process would start it, and that ends the delay
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

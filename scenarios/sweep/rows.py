@@ -63,7 +63,7 @@ def outcome_of(recipe: Recipe) -> Outcome:
         return failed(recipe, error)
     identity = identity_of(recipe)
     row = {
-        **(identity | summary | identity),  # in this order; the controller is called by its label
+        **(identity | summary | identity),  # in this order: the label names the controller
         "growing": grows(summary, run.site.intersection.n),
         "arrivals": _fingerprint(run.columns),
         "cpu_s": cpu,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor
 from contextlib import closing
 from dataclasses import replace
@@ -40,42 +40,39 @@ def sweep(
 ) -> pd.DataFrame:
     """Run all recipes and return one row each, in their order.
 
-    The rows do not depend on the executor or the number of its workers, except for the column
-    `cpu_s`.
-
     Args:
         recipes: what to run.
         executor: any `concurrent.futures.Executor`, such as
             `dask.distributed.Client.get_executor()`; it stays open. None is a pool of processes
-            for this call. They are spawned, so a script that sweeps needs the usual
-            `if __name__ == "__main__":`.
-        progress: called in this process with the number of finished runs and that of all.
-        jobs: processes of the pool, one a core by default; 1 runs in this process.
-        store: rows go there as they come, and rows that it has are not computed again.
+            for this call. They are spawned, so a script needs `if __name__ == "__main__":`. Only
+            the column `cpu_s` depends on the executor.
+        progress: called in this process with the numbers of finished runs and of all runs.
+        jobs: processes of the pool, one per core by default; 1 runs in this process.
+        store: keeps each row as it comes; rows that it has are not computed again.
         metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`,
-            `Metric`s or functions of your own, or `module:name` of these. Several processes need
-            the function in a module that they can import.
+            `Metric`s or functions of your own, or `module:name` of these. With several processes
+            the function must be in a module.
 
     Returns:
-        What was run (`scenarios.sweep.rows.identity_of`), the keys of `Run.summary()`, nested
-        ones joined by "_" (`lanes_a_trips`, `complete_waiting_time_s`), `queue_growth`, `growing`
-        (`scenarios.statistics.growing`, with its limits), `arrivals` (equal for common arrivals),
-        `cpu_s`, `version`, `error`: why a run failed, missing where it did not, and `recipe`
-        (`scenarios.sweep.keys.content_of`).
+        What was run (`scenarios.sweep.rows.identity_of`); the keys of `Run.summary()`, nested
+        ones joined by "_" (`lanes_a_trips`); `queue_growth`; `growing`
+        (`scenarios.statistics.growing`); `arrivals`, equal for common arrivals; `cpu_s`;
+        `version`; `error`, why a run failed; and `recipe` (`scenarios.sweep.keys.content_of`).
 
     Raises:
-        InputError: something other than a `Recipe` or a `Store`, or a controller or metric that
-            cannot go to another process.
+        InputError: not a `Recipe` or `Store`, or a controller or metric that cannot go to another
+            process.
         FileError: the store cannot be written; what it has stays.
-        ExecutorError: a caller's executor gave runs up, such as a cluster whose scheduler died.
-            Finished runs are in the store. Without a store, the rows of the others say so.
+        ExecutorError: your executor gave runs up, such as a cluster whose scheduler died. Finished
+            runs are in the store. Without a store, the rows of the others say so.
     """
     import pandas as pd
 
     added = metrics_named(metrics)
-    todo = _checked(recipes)
-    if added:
-        todo = [replace(recipe, metrics=(*recipe.metrics, *added)) for recipe in todo]
+    todo: list[Recipe] = []
+    for recipe in recipes:
+        instance("recipe", recipe, Recipe)
+        todo.append(replace(recipe, metrics=(*recipe.metrics, *added)) if added else recipe)
     rows: dict[int, Row] = {}
     with closing(finished(todo, executor, jobs=jobs, store=store)) as results:
         for k, row in results:
@@ -86,22 +83,17 @@ def sweep(
 
 
 def finished(
-    recipes: Iterable[Recipe],
+    todo: Sequence[Recipe],
     executor: Executor | None = None,
     *,
     jobs: int | None = None,
     store: Store | None = None,
 ) -> Generator[tuple[int, Row]]:
-    """Position and row of each run as it finishes; rows of the store come first.
-
-    Arguments and errors are those of `sweep`. Close it to give up.
-    """
-    todo = _checked(recipes)
+    """Position and row of each run as it finishes, as for `sweep`; close it to give up."""
     jobs = integer("jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
-    if store is not None:
-        instance("store (open it with `Store(path)`)", store, Store)
     missing = dict(enumerate(todo))
     if store is not None:
+        instance("store (open it with `Store(path)`)", store, Store)
         keys = [key_of(recipe) for recipe in todo]
         valid = store.valid(keys)
         for k, key in enumerate(keys):
@@ -128,16 +120,9 @@ def finished(
             yield k, outcome.row
     if store is not None and lost:
         raise ExecutorError(
-            f"the executor gave up {lost} of {len(todo)} runs; what was done is in {store.path}, "
+            f"the executor gave up {lost} of {len(todo)} runs; the others are in {store.path}, "
             "and the same sweep goes on from there"
         )
-
-
-def _checked(recipes: Iterable[Recipe]) -> list[Recipe]:
-    todo = list(recipes)
-    for recipe in todo:
-        instance("recipe", recipe, Recipe)
-    return todo
 
 
 def _check_portable(recipes: Iterable[Recipe]) -> None:
@@ -154,11 +139,10 @@ def _check_portable(recipes: Iterable[Recipe]) -> None:
 
 
 def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
-    """Let one process compile to disk before the others start.
+    """Let one process compile to disk, or all would compile when minisim is freshly installed.
 
-    Otherwise all processes of a fresh installation would compile at the same time. The compiled
-    code depends on the class of the vehicle. A run that fails here fails again in its turn, where
-    its row says why.
+    The compiled code depends on the class of the vehicle. A run that fails here fails again in its
+    turn, and its row says why.
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
         dt = recipe.scenario.profile.dt

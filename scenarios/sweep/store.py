@@ -1,11 +1,11 @@
-"""Results on disk: one SQLite file, one row a run.
+"""Results on disk: one SQLite file, one row per run.
 
-Every run is a transaction of its own, written ahead (WAL) and forced to the disk. If a sweep is
-killed, all rows stored before are still there. Several processes may write at once: each waits for
-the other's transaction, and a run that two of them computed is one row.
+Every run is a transaction of its own, written ahead (WAL) and forced to the disk, so that a killed
+sweep loses no row. Several processes may write at once: each waits for the other's transaction, and
+a run that two of them computed is one row. SQLite needs a local disk, since network file systems do
+not lock files reliably.
 
 A key connects a row with its recipe. The row is valid while the version of the results is the same.
-SQLite needs a local disk, since network file systems do not lock files reliably.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from minisim.errors import FileError, instance, show
 from scenarios.recipe import Recipe
@@ -31,7 +31,7 @@ APPLICATION = 0x44494D73
 SCHEMA = 1
 
 #: How long to wait for another process [s]: for its transaction, and when opening. A sweep holds a
-#: store only for some milliseconds.
+#: store for a few milliseconds only.
 PATIENCE = 30.0
 OPENING = 3.0
 
@@ -43,33 +43,24 @@ COLUMNS = ("key", "version", "error", "experiment", "provenance", "row")
 _CREATE = f"""
 BEGIN EXCLUSIVE;
 CREATE TABLE IF NOT EXISTS runs (
-    key TEXT PRIMARY KEY,
-    version TEXT NOT NULL,
-    error TEXT,
-    experiment TEXT NOT NULL,
-    provenance TEXT NOT NULL,
-    row TEXT NOT NULL
+    key TEXT PRIMARY KEY, version TEXT NOT NULL, error TEXT, experiment TEXT NOT NULL,
+    provenance TEXT NOT NULL, row TEXT NOT NULL
 ) WITHOUT ROWID;
 PRAGMA application_id = {APPLICATION};
 PRAGMA user_version = {SCHEMA};
 COMMIT;
 """
 
-#: SQLite keeps these at bytes 60 and 68 of the file, 4 bytes each, big endian; the file begins
-#: with the magic text (SQLite, "Database File Format", 1.3).
+#: The file begins with it. The layout is at byte 60, the mark at byte 68, 4 bytes each, big endian
+#: (SQLite, "Database File Format", 1.3).
 _MAGIC = b"SQLite format 3\0"
 
 
 class Store:
     """Rows in a file; close it, or use it in a `with` statement.
 
-    Args:
-        path: of the file.
-        create: whether to make the file where there is none.
-
-    Raises:
-        FileError: no such file, not a store, one of another layout, or a damaged one. The file
-            stays as it was.
+    `create` makes the file if there is none. Raises `FileError` if it is missing, not a store, of
+    another layout or damaged; the file stays as it was.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, create: bool = True) -> None:
@@ -92,55 +83,40 @@ class Store:
     def put(self, recipe: Recipe, outcome: Outcome) -> None:
         """Store an outcome, in place of an earlier one of the same recipe.
 
-        Raises:
-            FileError: the disk is full, another process holds the store, …; stored rows stay.
-            InputError: a recipe that cannot be described (`canonical`).
+        Raises `FileError`, for example if the disk is full or another process holds the store, and
+        `InputError` as `canonical`. Earlier rows stay.
         """
-        description = description_of(recipe)
-        row = outcome.row
+        description, row = description_of(recipe), outcome.row
+        provenance, text = json.dumps(outcome.provenance), json.dumps(row, allow_nan=False)
+        values = (
+            digest_of(description), row["version"], row["error"], description, provenance, text,
+        )  # fmt: skip
         with self._guarded("write"):
-            self._database.execute(
-                "INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?)",
-                (
-                    digest_of(description),
-                    row["version"],
-                    row["error"],
-                    description,
-                    json.dumps(outcome.provenance),
-                    json.dumps(row, allow_nan=False),
-                ),
-            )
+            self._database.execute("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?, ?, ?)", values)
 
     def valid(self, keys: Iterable[str]) -> dict[str, Row]:
         """Key -> row of those that need not be computed again: neither failed nor outdated."""
         wanted = set(keys)
-        with self._guarded("read"):
-            rows = self._database.execute(
-                "SELECT key, row FROM runs WHERE error IS NULL AND version = ?",
-                (results_version(),),
-            )
-            return {key: self._row(row) for key, row in rows if key in wanted}
+        rows = self._select("key, row", "WHERE error IS NULL AND version = ?")
+        return {key: self._row(row) for key, row in rows if key in wanted}
 
     def __len__(self) -> int:
-        return self._count("")
+        ((count,),) = self._select("count(*)", "")
+        return int(count)
 
     @property
     def outdated(self) -> str:
         """How many rows of other versions of the results there are, in words; empty if none."""
-        if not (count := self._count(f" WHERE version != '{results_version()}'")):
-            return ""
+        ((count,),) = self._select("count(*)", "WHERE version != ?")
         rows = "1 row" if count == 1 else f"{count} rows"
-        return f"{self.path} also keeps {rows} of another version of minisim, not used here"
+        told = f"{self.path} also keeps {rows} of another version of minisim, not used here"
+        return told if count else ""
 
     def frame(self) -> pd.DataFrame:
-        """All rows but outdated ones, with the columns of `sweep`, sorted by `ORDER`."""
+        """The rows of this version, with the columns of `sweep`, sorted by `ORDER`."""
         import pandas as pd
 
-        with self._guarded("read"):
-            found = self._database.execute(
-                "SELECT row FROM runs WHERE version = ?", (results_version(),)
-            )
-            rows = [self._row(row) for (row,) in found]
+        rows = [self._row(row) for (row,) in self._select("row", "WHERE version = ?")]
         frame = pd.DataFrame(rows)
         return frame.sort_values(list(ORDER), ignore_index=True) if rows else frame
 
@@ -168,10 +144,11 @@ class Store:
         self._database.execute("PRAGMA synchronous = FULL")
         self._database.execute(f"PRAGMA busy_timeout = {round(1000 * PATIENCE)}")
 
-    def _count(self, which: str) -> int:
+    def _select(self, what: str, where: str) -> Iterator[Any]:
+        """Tuples of the table; `?` is the version of the results."""
+        versions = (results_version(),) * where.count("?")
         with self._guarded("read"):
-            (count,) = self._database.execute(f"SELECT count(*) FROM runs{which}").fetchone()
-        return int(count)
+            yield from self._database.execute(f"SELECT {what} FROM runs {where}", versions)
 
     def _row(self, text: str) -> Row:
         try:
@@ -179,7 +156,7 @@ class Store:
         except ValueError as error:
             raise FileError(f"store {self.path} is damaged: {error}") from error
         if not isinstance(row, dict) or not row.keys() >= {*ORDER, "version", "error"}:
-            raise FileError(f"store {self.path} is damaged: {show(text)} is no row")
+            raise FileError(f"store {self.path} is damaged: {show(text)} is not a row")
         return row
 
     @contextmanager
@@ -196,23 +173,24 @@ class Store:
 def _is_fresh(path: Path) -> bool:
     """Whether there is no store yet; raises `FileError` for a file that is not a store.
 
-    It reads the bytes itself, since SQLite would begin to repair another program's file.
+    SQLite itself would begin to repair another program's file.
     """
     try:
         if not path.parent.is_dir():
             raise FileError(f"cannot open store {path}: there is no folder {path.parent}")
-        if path.exists() and not path.is_file():
+        if not path.exists():
+            return True
+        if not path.is_file():
             raise FileError(f"cannot open store {path}: it is not an ordinary file")
-        with path.open("rb") if path.exists() else nullcontext() as file:
-            header = file.read(100) if file else b""
+        with path.open("rb") as file:
+            header = file.read(100)
     except (OSError, ValueError) as error:
         raise FileError(f"cannot open store {path}: {error}") from error
     if not header:
         return True
-    application = int.from_bytes(header[68:72], "big")
+    schema, application = (int.from_bytes(header[k : k + 4], "big") for k in (60, 68))
     if header[:16] != _MAGIC or application != APPLICATION:
         raise FileError(f"{path} is not a store of minisim; it was left as it is")
-    schema = int.from_bytes(header[60:64], "big")
     if schema != SCHEMA:
         raise FileError(
             f"store {path} has layout {schema}, this version of minisim reads layout {SCHEMA}; "

@@ -27,9 +27,14 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 BUDGET, BARE_BUDGET = 30.0, 10.0
+
+#: Options of every run of SUMO.
+STEPPED = ["--step-length", "0.1", "--time-to-teleport", "-1"]
+STEPPED += ["--no-step-log", "true", "--no-warnings", "true"]
 
 
 def main() -> None:
@@ -58,9 +63,8 @@ def main() -> None:
     }
     for name, seconds in rivals.items():
         _compare(name, seconds, median, BUDGET)
-    signal = statistics.median(
-        [_minisim_hour(s, "fixed-time") for s in range(options.runs + 1)][1:]
-    )
+    signals = [_minisim_hour(seed, "fixed-time") for seed in range(options.runs + 1)][1:]
+    signal = statistics.median(signals)
     print(f"minisim, fixed-time, the same:    {signal:7.3f} s CPU per simulated hour")
     bare = statistics.median(_bare_hour(home) for _ in range(3))
     _compare("sumo binary, fixed-time", bare, signal, BARE_BUDGET)
@@ -91,19 +95,20 @@ def _bare_hour(home: Path) -> float:
         _write_routes(Path(folder))
         _write_signal(Path(folder))
         command = [home / "bin" / "sumo", "-n", "x.net.xml", "-r", "x.rou.xml", "-a", "x.add.xml"]
-        command += ["--step-length", "0.1", "--end", "3600", "--time-to-teleport", "-1"]
-        command += ["--no-step-log", "true", "--no-warnings", "true"]
         before = os.times()
-        subprocess.run(
-            command, check=True, cwd=folder, capture_output=True,
-            env={**os.environ, "SUMO_HOME": str(home)},
-        )  # fmt: skip
+        _run([*command, "--end", "3600", *STEPPED], home, cwd=folder)
         after = os.times()
     return after.children_user + after.children_system - before[2] - before[3]
 
 
+def _run(command: list[Any], home: Path, **options: Any) -> str:
+    environment = {**os.environ, "SUMO_HOME": str(home)}
+    options |= {"check": True, "capture_output": True, "text": True, "env": environment}
+    return str(subprocess.run(command, **options).stdout)
+
+
 def _write_signal(folder: Path) -> None:
-    """One phase an arm in turn, with the greens and ambers of minisim's fixed-time signal."""
+    """One phase per arm in turn, with the greens and ambers of minisim's fixed-time signal."""
     from baselines import FixedTime
     from scenarios import four_way
 
@@ -140,10 +145,8 @@ def _sumo_hour(home: Path, junction: str) -> float:
     with tempfile.TemporaryDirectory() as folder:
         _write_network(Path(folder), home, junction)
         _write_routes(Path(folder))
-        command = [sys.executable, __file__, "--sumo", folder]
-        environment = {**os.environ, "SUMO_HOME": str(home)}
-        done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
-    return float(json.loads(done.stdout.splitlines()[-1]))
+        printed = _run([sys.executable, __file__, "--sumo", folder], home)
+    return float(json.loads(printed.splitlines()[-1]))
 
 
 def _write_network(folder: Path, home: Path, junction: str) -> None:
@@ -154,15 +157,12 @@ def _write_network(folder: Path, home: Path, junction: str) -> None:
     for arm, (x, y) in ends.items():
         nodes.append(f'<node id="{arm}" x="{x}" y="{y}" type="dead_end"/>')
         for name, origin, target in ((f"{arm}in", arm, "C"), (f"{arm}out", "C", arm)):
-            edges.append(
-                f'<edge id="{name}" from="{origin}" to="{target}" numLanes="1" speed="14"/>'
-            )
+            ends_of = f'from="{origin}" to="{target}"'
+            edges.append(f'<edge id="{name}" {ends_of} numLanes="1" speed="14"/>')
     (folder / "x.nod.xml").write_text(f"<nodes>{''.join(nodes)}</nodes>")
     (folder / "x.edg.xml").write_text(f"<edges>{''.join(edges)}</edges>")
     command = [home / "bin" / "netconvert", "-n", "x.nod.xml", "-e", "x.edg.xml", "-o", "x.net.xml"]
-    command += ["--lefthand", "true", "--no-turnarounds", "true"]
-    environment = {**os.environ, "SUMO_HOME": str(home)}
-    subprocess.run(command, check=True, cwd=folder, capture_output=True, env=environment)
+    _run([*command, "--lefthand", "true", "--no-turnarounds", "true"], home, cwd=folder)
 
 
 def _write_routes(folder: Path) -> None:
@@ -184,9 +184,7 @@ def _step_sumo(folder: Path) -> None:
     import libsumo
 
     command = ["sumo", "-n", str(folder / "x.net.xml"), "-r", str(folder / "x.rou.xml")]
-    command += ["--step-length", "0.1", "--time-to-teleport", "-1"]
-    command += ["--no-step-log", "true", "--no-warnings", "true"]
-    libsumo.start(command)
+    libsumo.start([*command, *STEPPED])
     start = time.process_time()
     metres = 0.0
     for _ in range(36_000):

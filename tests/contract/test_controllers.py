@@ -298,12 +298,12 @@ BROKEN = {
     "unknown lane": (Says(answer=(Open(4),)), "there is no such lane"),
     "past wake-up": (Says(answer=(Wake(0.0),)), "must be in the future"),
     "no command": (Says(answer=("go",)), "this is not a command"),
-    "no answer": (Says(answer=None), "must answer with commands, got None"),
-    "no session": (Starting(make=str), "must give a Session"),
-    "no plan": (Starting(make=without_plan), "must be a Plan"),
+    "no answer": (Says(answer=None), "must return commands, .* got None"),
+    "no session": (Starting(make=str), "must return a Session with a Plan"),
+    "no plan": (Starting(make=without_plan), "must return a Session with a Plan"),
     "no name": (Broken(name=""), "the name of .* must be a text"),
-    "no controller": (5, "is no controller"),
-    "a class": (FixedTime, "is no controller"),
+    "no controller": (5, "is not a controller"),
+    "a class": (FixedTime, "is not a controller"),
 }
 
 

@@ -42,18 +42,23 @@ def start(module: str, *arguments: str) -> subprocess.Popen[bytes]:
     )
 
 
-def worker(address: str) -> subprocess.Popen[bytes]:
-    """A worker of one thread; without a nanny, so that a killed one stays dead."""
-    return start(
-        "dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
-        "--memory-limit", "0",
-    )  # fmt: skip
+@contextmanager
+def stopping(*processes: subprocess.Popen[bytes]) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait(timeout=20)
 
 
-def stop(processes: Processes) -> None:
-    for process in processes:
-        process.kill()
-        process.wait(timeout=20)
+@contextmanager
+def workers(address: str, count: int = 1) -> Iterator[Processes]:
+    """Workers of one thread; without a nanny, so that a killed one stays dead."""
+    options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0")
+    processes = [start("dask_worker", address, *options) for _ in range(count)]
+    with stopping(*processes):
+        yield processes
 
 
 @contextmanager
@@ -63,15 +68,13 @@ def running_scheduler(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[by
         "dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
         "--scheduler-file", str(file),
     )  # fmt: skip
-    try:
+    with stopping(process):
         deadline = time.monotonic() + 60
         while not file.exists() or not file.read_text():
             assert process.poll() is None, "the scheduler died"
             assert time.monotonic() < deadline
             time.sleep(0.05)
         yield json.loads(file.read_text())["address"], process
-    finally:
-        stop([process])
 
 
 @pytest.fixture
@@ -87,22 +90,19 @@ def recipes(count: int, horizon: float = 120.0) -> list[Recipe]:
 def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:
     todo = recipes(24, horizon=600.0)
     here = sweep(todo, jobs=1)
-    processes = [worker(scheduler), worker(scheduler)]
-    killed = False
+    with (
+        workers(scheduler, 2) as processes,
+        cluster(scheduler, patience=60) as executor,
+        Store(tmp_path / "s.db") as store,
+    ):
 
-    def kill(done: int, total: int) -> None:
-        nonlocal killed
-        if done == 5:
-            processes[0].send_signal(signal.SIGKILL)
-            killed = True
+        def kill(done: int, total: int) -> None:
+            if done == 5:
+                processes[0].kill()
 
-    try:
-        with cluster(scheduler, patience=60) as executor, Store(tmp_path / "s.db") as store:
-            there = sweep(todo, executor, kill, store=store)
-            assert len(store) == len(todo)
-    finally:
-        stop(processes)
-    assert killed
+        there = sweep(todo, executor, kill, store=store)
+        assert len(store) == len(todo)
+        assert processes[0].wait(timeout=20) == -signal.SIGKILL
     pd.testing.assert_frame_equal(repeatable(here), repeatable(there))
 
 
@@ -111,21 +111,14 @@ def test_the_command_runs_there(
 ) -> None:
     file = tmp_path / "two.toml"
     file.write_text("horizon = 60\nseeds = 2\n")
-    processes = [worker(scheduler)]
     arguments = ["sweep", str(file), "--scheduler", scheduler, "--out", str(tmp_path / "s.db")]
-    try:
-        with cluster(scheduler, patience=60):  # there is a worker now
-            assert main(arguments) == 0
-    finally:
-        stop(processes)
+    with workers(scheduler), cluster(scheduler, patience=60):  # there is a worker now
+        assert main(arguments) == 0
     assert "2 runs in" in capsys.readouterr().out
 
 
 def test_a_scheduler_without_workers_is_told(scheduler: str) -> None:
-    with (
-        pytest.raises(InputError, match="has no workers"),
-        cluster(scheduler, patience=0.5),
-    ):
+    with pytest.raises(InputError, match="has no workers"), cluster(scheduler, patience=0.5):
         pass
 
 
@@ -133,11 +126,11 @@ def test_a_scheduler_without_workers_is_told(scheduler: str) -> None:
     ("address", "why"),
     [
         ("tcp://127.0.0.1:1", "Timed out"),
-        ("tcp://127.0.0.1:99999", "a port is 1 … 65535, got 99999"),
-        ("nowhere", "an address has the form tcp://host:port"),
-        ("tcp://127.0.0.1:port", "an address has the form tcp://host:port"),
-        ("ftp://127.0.0.1:8786", "an address has the form tcp://host:port"),
-        ("", "an address has the form tcp://host:port"),
+        ("tcp://127.0.0.1:99999", "with a port 1 … 65535"),
+        *(
+            (address, "an address has the form tcp://host:port")
+            for address in ("nowhere", "tcp://127.0.0.1:port", "ftp://127.0.0.1:8786", "")
+        ),
     ],
 )
 def test_no_scheduler_is_told_within_seconds(
@@ -158,18 +151,18 @@ def test_no_scheduler_is_told_within_seconds(
 
 def test_a_lost_scheduler_leaves_what_was_done(tmp_path: Path) -> None:
     todo = recipes(12, horizon=1200.0)
-    with running_scheduler(tmp_path) as (address, process):
-        processes = [worker(address)]
+    with (
+        running_scheduler(tmp_path) as (address, process),
+        workers(address),
+        Store(tmp_path / "s.db") as store,
+        cluster(address, patience=60) as executor,
+    ):
 
         def kill(done: int, total: int) -> None:
             if done == 2:
                 process.kill()
 
-        try:
-            with Store(tmp_path / "s.db") as store, cluster(address, patience=60) as executor:
-                with pytest.raises(ExecutorError, match=r"gave up .* of 12 runs; what was"):
-                    sweep(todo, executor, kill, store=store)
-                assert 2 <= len(store) < len(todo)
-                assert store.frame()["error"].isna().all()
-        finally:
-            stop(processes)
+        with pytest.raises(ExecutorError, match=r"gave up .* of 12 runs; what was"):
+            sweep(todo, executor, kill, store=store)
+        assert 2 <= len(store) < len(todo)
+        assert store.frame()["error"].isna().all()

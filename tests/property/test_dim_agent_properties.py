@@ -82,7 +82,7 @@ def model(holding: set[int], view: View, dim: Dim, site: Site, matrix: HarmonyMa
     admitted = [
         v
         for v in waiting
-        if all(c.lane == v.lane or matrix[v.movement, c.movement] for c in crossing)
+        if all(c.lane == v.lane or matrix.harmony(v.movement, c.movement) for c in crossing)
     ]
     chosen = decide([v.movement for v in admitted], matrix, dim.order, dim.ranks(site))
     going -= {v.id for v in waiting}

@@ -43,9 +43,9 @@ def test_the_right_of_way_is_a_best_maximal_clique(
     chosen = decide(participants, matrix, order, ranks)
     assert set(chosen) <= set(participants)
     assert bool(chosen) == bool(participants)
-    assert all(matrix[a, b] for a, b in itertools.combinations(chosen, 2))
+    assert all(matrix.harmony(a, b) for a, b in itertools.combinations(chosen, 2))
     outside = set(participants) - set(chosen)
-    assert not any(all(matrix[m, other] for other in chosen) for m in outside)
+    assert not any(all(matrix.harmony(m, other) for other in chosen) for m in outside)
     if participants and order == "lanes":  # the highest-priority lane present always goes
         first = min(participants, key=lambda m: ranks[m.origin])
         assert first in chosen

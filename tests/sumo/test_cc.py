@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import minisim
 from baselines import FixedTime
 from dim import AsRunDim
 from minisim.control import Advise, Controller, Plan, Unregulated
 from minisim.errors import InputError, SumoError
 from minisim.simulation import Run
 from minisim.sumo import simulate
-from minisim.testing import check_controller, small_scenario
+from minisim.testing import check_controller
+from minisim.vehicle import VehicleType
 from scenarios import five_way, four_way
-from scenarios.cli import main
-from scenarios.library import MAKERS
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.profiles import AS_RUN, FAIR
 from scenarios.scenario import Scenario
 from tests.builders import Fixed, as_run, replayed
+from tests.sumo.conftest import both
 
 
 def hosted(scenario: Scenario) -> Scenario:
@@ -37,47 +34,23 @@ def hosted(scenario: Scenario) -> Scenario:
 AS_RUN_FOUR = hosted(four_way(profile="as_run"))
 
 
-def both(scenario: Any, controller: Controller, **options: Any) -> tuple[Run, Run]:
-    options = {"on_collision": "record", **options}
-    return minisim.simulate(scenario, controller, **options), simulate(
-        scenario, controller, **options
-    )
-
-
-def until(scenario: Scenario, horizon: float) -> Scenario:
-    return replace(scenario, horizon=horizon)
-
-
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
 @pytest.mark.parametrize("controller", [Unregulated(), AsRunDim()], ids=lambda c: c.name)
 def test_a_vehicle_alone_drives_alike(controller: Controller, manoeuvre: int) -> None:
     """as_run.md: DIM left, straight and right 63.99, 64.26 and 64.24 s."""
     scenario = replayed(AS_RUN_FOUR, (0.0, 0, manoeuvre), horizon=80.0)
-    ours, theirs = both(scenario, controller, record="all")
+    ours, theirs = both(scenario, controller, record="all", on_collision="record")
     a, b = ours.trace, theirs.trace
     assert len(a) == pytest.approx(len(b), abs=1)  # minisim has no line of the insertion itself
     b = b[b["tick"] > 0][: len(a)]
-    a = a[: len(b)]
-    assert b["tick"].tolist() == a["tick"].tolist()
-    assert b["s"] == pytest.approx(a["s"], abs=1e-4)
-    assert b["v"] == pytest.approx(a["v"], abs=1e-4)
+    for column in ("tick", "s", "v"):
+        assert b[column] == pytest.approx(a[column][: len(b)], abs=1e-4)
     for column in ("travel_time_s", "waiting_time_s"):
         assert theirs.trips[column].tolist() == pytest.approx(ours.trips[column].tolist())
     assert theirs.columns.time_loss == pytest.approx(ours.columns.time_loss, abs=0.1)
     if isinstance(controller, AsRunDim):
         published = {1: 63.99, 2: 64.26, 3: 64.24}[manoeuvre]
         assert theirs.columns.travel_time == pytest.approx([published], abs=0.011)
-
-
-@pytest.mark.parametrize("arms", [3, 4, 5])
-def test_the_published_junctions_have_the_published_lengths(arms: int, tmp_path: Path) -> None:
-    from minisim.sumo import host, network
-
-    junction = MAKERS[arms](profile="as_run").intersection
-    made = network.build_network(junction, 14.0, tmp_path, host.sumo_home())
-    for path, approach, inside in zip(junction.paths, made.approach, made.inside, strict=True):
-        assert approach == pytest.approx(path.entry, abs=0.006)
-        assert inside == pytest.approx(path.exit - path.entry, abs=0.011)
 
 
 def test_ways_that_are_not_netconverts_are_refused() -> None:
@@ -110,7 +83,8 @@ SHARES = [
     ids=str,
 )
 def test_replays_are_minisims_trip_by_trip(cell: Cell, horizon: float, share: float) -> None:
-    ours, theirs = both(until(replay(*cell, sumo="1.28"), horizon), controller_of(*cell))
+    scenario = replace(replay(*cell, sumo="1.28"), horizon=horizon)
+    ours, theirs = both(scenario, controller_of(*cell), on_collision="record")
     a, b = ours.columns, theirs.columns
     ended = a.arrived & b.arrived
     assert ended.sum() > 10
@@ -133,13 +107,13 @@ def test_the_contract_holds_with_the_vehicle_of_the_published_runs(controller: C
 
 
 def test_the_same_replay_gives_the_same_trips_twice() -> None:
-    scenario = until(replay("balanced", 150, 4, sumo="1.28"), 100.0)
+    scenario = replace(replay("balanced", 150, 4, sumo="1.28"), horizon=100.0)
     first, second = (
         simulate(scenario, AsRunDim(), on_collision="record", record=kind)
         for kind in (None, "junction")
     )
     assert first.trips.drop(columns="time_loss_s").equals(second.trips.drop(columns="time_loss_s"))
-    # one is glanced at now and then after the junction, the other is watched a little longer
+    # Without a recording, vehicles past the junction are only looked at now and then.
     loss = (first.columns.time_loss - second.columns.time_loss)[first.columns.departed]
     assert np.abs(loss).max() < 0.05
 
@@ -161,7 +135,7 @@ def test_a_held_vehicle_stops_at_its_line(hold_distance: float) -> None:
 def test_advice_comes_before_and_after_insertion() -> None:
     scenario = replayed(AS_RUN_FOUR, (2.0, 0, 2), horizon=90.0)
     early = Fixed(Plan(lanes_open=True), (Advise(0, 8.0),))
-    ours, theirs = both(scenario, early)
+    ours, theirs = both(scenario, early, on_collision="record")
     assert ours.columns.travel_time[0] > 80.0 or not ours.columns.arrived[0]
     assert theirs.columns.travel_time == pytest.approx(ours.columns.travel_time, abs=0.02)
 
@@ -179,7 +153,7 @@ def test_teleporting_is_sumos_default(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_teleport_takes_a_vehicle_that_runs_into_another_off_the_road() -> None:
     """4:3:2:1 at 350: in SUMO 1.28 b2 of 2606 s runs into a3 of 2611 s, at 2649.93 s."""
-    scenario = until(replay("4:3:2:1", 350, 4, sumo="1.28"), 2660.0)
+    scenario = replace(replay("4:3:2:1", 350, 4, sumo="1.28"), horizon=2660.0)
     run = simulate(scenario, AsRunDim(), on_collision="teleport")
     (collision,) = run.collisions
     assert collision.time == pytest.approx(2649.93)
@@ -191,37 +165,16 @@ def test_teleport_takes_a_vehicle_that_runs_into_another_off_the_road() -> None:
 @pytest.mark.parametrize(
     ("profile", "model", "message"),
     [
-        (
-            FAIR,
-            "CC",
-            "CC does not .* 'idm'; choose IDM or Krauss, or a Cruise.*: use --profile as_run",
-        ),
+        (FAIR, "CC", "CC does not .* 'idm'; choose IDM or Krauss, .*: use --profile as_run"),
         (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
-        (
-            replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)),
-            None,
-            "CC keeps a spacing of 2 m and sees 250 m far, the vehicles 2 m and 100 m",
-        ),
+        (replace(FAIR, vehicle=VehicleType(model="krauss")), "IDM", "'krauss'; choose Krauss, or"),
+        (replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)), None,
+         "CC keeps a spacing of 2 m and sees 250 m far, the vehicles 2 m and 100 m"),
     ],
-)
+)  # fmt: skip
 def test_models_that_do_not_fit_are_told(profile: Any, model: str | None, message: str) -> None:
     with pytest.raises(InputError, match=message):
         simulate(replace(AS_RUN_FOUR, profile=profile), Unregulated(), model=model)
-
-
-def test_the_command_line_replays_in_sumo(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    source = resources.files("scenarios") / "data" / "arrivals" / "balanced_150_dim_4way.csv"
-    command = ["run", "four-way", "--profile", "as_run", "--host", "sumo", "--horizon", "120"]
-    command += ["--arrivals", str(source), "--on-collision", "record", "--json", "--no-safety"]
-    assert main(command) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["host"] == "sumo"
-    assert printed["travel_time_s"] == pytest.approx(66.0, abs=4.0)
-    assert simulate(
-        small_scenario(4, demand_time=5.0, drain=5.0), Unregulated()
-    ).provenance["sumo_model"] == "IDM"  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -240,7 +193,7 @@ def test_sumo_looks_for_collisions_between_foes_only(
     """Why minisim counts more touches in the published run of 5 arms at 350 veh/h."""
     five = hosted(five_way(profile="as_run"))
     scenario = replayed(five, *((0.0, *movement) for movement in pair), horizon=70.0)
-    ours, theirs = both(scenario, controller, record="all")
+    ours, theirs = both(scenario, controller, record="all", on_collision="record")
     assert len(ours.collisions) == 1
     assert len(theirs.collisions) == sumo_sees
     touch = ours.collisions[0]

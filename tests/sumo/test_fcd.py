@@ -7,13 +7,11 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
 from dim import Dim
 from minisim.results.trajectories import write_fcd
 from minisim.sumo import host, simulate
 from scenarios import four_way
-from scenarios.cli import main
 
 
 def as_table(file: Path) -> pd.DataFrame:
@@ -48,13 +46,3 @@ def test_both_load_in_sumos_tool_and_say_the_same(tmp_path: Path) -> None:
     # SUMO gives a vehicle that is told a speed a type of its own: car@7
     types = merged["vehicle_type_sumo"].str.partition("@")[0]
     assert (merged["vehicle_type"] == types).all()
-
-
-def test_the_command_line_writes_sumos_file(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    file = tmp_path / "sumo.xml"
-    command = ["run", "four-way", "-p", "fair", "-d", "300", "--horizon", "20", "--host", "sumo"]
-    assert main([*command, "--sumo-fcd", str(file), "--no-safety"]) == 0
-    assert f"wrote {file}" in capsys.readouterr().out.replace("\n", "")
-    assert file.read_text().count("<timestep") == 201  # 0 … 20 s

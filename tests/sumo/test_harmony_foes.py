@@ -63,8 +63,7 @@ def read_oracle(intersection: Intersection, file: Path) -> Oracle:
     node = net.getNode("C")
     links, lines = {}, {}
     for path in intersection.paths:
-        first = f"{ARM_NAMES[path.movement.origin]}_in"
-        last = f"{ARM_NAMES[path.exit_arm]}_out"
+        first, last = f"{ARM_NAMES[path.movement.origin]}_in", f"{ARM_NAMES[path.exit_arm]}_out"
         (connection,) = net.getEdge(first).getConnections(net.getEdge(last))
         links[path.movement] = node.getLinkIndex(connection)
         points, via = [], vias[first, last]
@@ -94,6 +93,12 @@ def as_netconvert_draws_it(intersection: Intersection, folder: Path) -> None:
     command += ["--output-file", network.NETWORK]
     command += ["--lefthand", str(intersection.side == "left").lower()]
     network.run_tool(command, folder, host.sumo_home())
+
+
+def oracle_of(intersection: Intersection, build: Callable[[Intersection, Path], None]) -> Oracle:
+    with tempfile.TemporaryDirectory() as name:
+        build(intersection, Path(name))
+        return read_oracle(intersection, Path(name) / network.NETWORK)
 
 
 def classes(intersection: Intersection, oracle: Oracle) -> Iterator[tuple[str, str]]:
@@ -135,19 +140,15 @@ def count(
     @settings(max_examples=geometries)
     @given(intersections())
     def ask(intersection: Intersection) -> None:
-        with tempfile.TemporaryDirectory() as name:
-            build(intersection, Path(name))
-            oracle = read_oracle(intersection, Path(name) / network.NETWORK)
         counts["junctions"] += 1
-        for kind, pair in classes(intersection, oracle):
+        for kind, pair in classes(intersection, oracle_of(intersection, build)):
             counts[kind] += 1
             if kind == "unclassified":
                 unclassified.append(pair)
 
     ask()
-    width = max(map(len, counts))
     for kind, pairs in counts.most_common():
-        print(f"{kind:<{width}} {pairs:>7}")  # noqa: T201  (shown by pytest -s)
+        print(f"{pairs:>7} {kind}")  # noqa: T201  (shown by pytest -s)
     return counts, unclassified
 
 
@@ -166,10 +167,7 @@ def test_foes_are_our_conflicts(
 def test_corridors_that_nearly_touch_are_our_conflict_alone() -> None:
     """On narrow lanes a near turn passes the far turn that comes back at less than that."""
     narrow = Intersection((0.0, 90.0, 180.0, 270.0), lane_width=2.8, junction_radius=5.8)
-    with tempfile.TemporaryDirectory() as name:
-        as_hosted(narrow, Path(name))
-        oracle = read_oracle(narrow, Path(name) / network.NETWORK)
-    found = list(classes(narrow, oracle))
+    found = list(classes(narrow, oracle_of(narrow, as_hosted)))
     near = {pair.split(" ")[0] for kind, pair in found if kind == NEAR}
     assert near == {"a1–b3", "b1–c3", "c1–d3", "a3–d1"}
     assert "unclassified" not in dict(found)
@@ -180,10 +178,7 @@ def test_the_far_turns_of_the_paper_are_the_ones_that_the_radius_decides() -> No
     four = Intersection((0.0, 90.0, 180.0, 270.0))
     found = {}
     for build in (as_hosted, as_netconvert_draws_it):
-        with tempfile.TemporaryDirectory() as name:
-            build(four, Path(name))
-            oracle = read_oracle(four, Path(name) / network.NETWORK)
-        paper = HarmonyMatrix.paper(4)
+        oracle, paper = oracle_of(four, build), HarmonyMatrix.paper(4)
         found[build] = {
             f"{a}{b}"
             for a, b in itertools.combinations(four.movements, 2)

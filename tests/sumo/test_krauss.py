@@ -7,16 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import minisim
 from baselines import FixedTime
-from minisim.errors import InputError
 from minisim.simulation import Run
-from minisim.sumo import simulate
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.paper import Cell, controller_of, replay
 from scenarios.profiles import AS_RUN_SIGNALS, FAIR
 from tests.builders import reference_value
+from tests.sumo.conftest import both
 
 FAIR_KRAUSS = replace(FAIR, name="fair-krauss", vehicle=VehicleType(model="krauss"))
 
@@ -32,18 +30,12 @@ def difference(ours: Run, theirs: Run, column: str) -> np.ndarray:
 
 def test_vehicles_of_krauss_drive_krauss_in_sumo_and_trips_agree_one_by_one() -> None:
     what = four_way(250, profile=FAIR_KRAUSS, horizon=600.0)
-    ours = minisim.simulate(what, FixedTime(greens=10.75), 1)
-    theirs = simulate(what, FixedTime(greens=10.75), 1)
+    ours, theirs = both(what, FixedTime(greens=10.75), 1)
     assert theirs.provenance["sumo_model"] == "Krauss"
     for column in ("travel_time", "waiting_time"):
         apart = np.abs(difference(ours, theirs, column))
         assert (apart <= 0.3).mean() >= 0.95
         assert apart.max() <= 1.5
-
-
-def test_another_model_of_sumo_does_not_drive_them() -> None:
-    with pytest.raises(InputError, match="choose Krauss"):
-        simulate(four_way(100, profile=FAIR_KRAUSS, horizon=10.0), FixedTime(), model="IDM")
 
 
 @pytest.mark.slow
@@ -52,11 +44,9 @@ def test_the_published_vehicle_agrees_except_behind_a_turning_one() -> None:
     the bodies are clear of each other, SUMO until its rear has left the lane.
     """
     cell = Cell("balanced", 350, 4, "fts")
-    ours = minisim.simulate(replay(*cell), controller_of(*cell), 0)
-    theirs = simulate(replay(*cell), controller_of(*cell), 0)
+    ours, theirs = both(replay(*cell), controller_of(*cell))
     assert abs(difference(ours, theirs, "waiting_time").mean()) <= 0.01 * 75.0
     assert 0.0 <= difference(ours, theirs, "travel_time").mean() <= 1.5
-    assert theirs.summary()["travel_time_s"] == pytest.approx(
-        reference_value(cell, "travel_time_s"), abs=2.0
-    )
+    published = reference_value(cell, "travel_time_s")
+    assert theirs.summary()["travel_time_s"] == pytest.approx(published, abs=2.0)
     assert theirs.site.vehicle == AS_RUN_SIGNALS.vehicle

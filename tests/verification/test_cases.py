@@ -104,12 +104,6 @@ def test_the_tie_break_in_the_papers_words() -> None:
     assert preferred((0b0111, 0b1011), (3, 2, 1, 0)) == (0b1011,)
 
 
-def test_brute_force_on_a_ring() -> None:
-    movements = tuple(Movement(lane, j) for lane, j in enumerate([1, 2, 1, 2]))
-    cliques = brute_force(movements, HarmonyMatrix.paper(4))
-    assert set(cliques.maximal) == set(cliques.largest) == {0b0011, 0b0101, 0b1010, 0b1100}
-
-
 def test_no_graph_has_more_cliques_than_moon_and_moser_say() -> None:
     most: dict[int, int] = defaultdict(int)
     for graph in nx.graph_atlas_g()[1:]:  # every graph of up to 7 nodes

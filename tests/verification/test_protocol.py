@@ -17,16 +17,8 @@ from dim.decision import ORDERS
 from dim.perception import COMMITS, Percept
 from dim.proofs.conformance import Checked, ConformanceError
 from dim.proofs.modelcheck import Lasso, explore, starvation
-from dim.proofs.protocol import (
-    COMMITTED,
-    PRIORITIES,
-    ROLLING,
-    WAITING,
-    Event,
-    Protocol,
-    State,
-)  # fmt: skip
-from minisim.control import Go, Hold, Site, View
+from dim.proofs.protocol import COMMITTED, PRIORITIES, WAITING, Event, Protocol, State
+from minisim.control import Site
 from minisim.errors import InputError
 from scenarios import Scenario, four_way, three_way
 from scenarios.counterexample import colliding_arrivals
@@ -51,9 +43,6 @@ def states_of(protocol: Protocol, at_most: int = 10_000) -> list[State]:
     return list(seen)
 
 
-# --- safety and liveness ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("n", "gate", "states"),
     [
@@ -72,7 +61,7 @@ def test_the_stoppable_rule_is_safe_and_never_stuck(n: int, gate: str, states: i
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("priorities", PRIORITIES)
 @pytest.mark.parametrize("gate", GATES)
-def test_so_it_is_with_every_order_of_priority(gate: str, priorities: str, order: str) -> None:
+def test_it_is_with_every_order_of_priority(gate: str, priorities: str, order: str) -> None:
     search = explore(Protocol(paper(3), order, gate, priorities=priorities))
     assert (search.complete, search.unsafe, search.stuck) == (True, (), None)
 
@@ -121,9 +110,6 @@ def test_with_the_stoppable_rule_all_vehicles_that_go_are_in_harmony() -> None:
             assert protocol.conflict(State((None,) * 3, going)) is None
 
 
-# --- the agents ------------------------------------------------------------------------------
-
-
 def agents_say(protocol: Protocol, state: State, table: DecisionTable) -> list[bool]:
     """Whether each front vehicle goes, by its own agent, after it has looked."""
     n, movements = protocol.matrix.n, protocol.matrix.movements
@@ -155,9 +141,6 @@ def test_in_every_state_the_agents_decide_as_the_model(gate: str, commit: str, o
         after = protocol.look(state)
         assert protocol.look(after) == after
         assert [f.goes for f in after.fronts if f] == agents_say(protocol, state, table)
-
-
-# --- starvation ------------------------------------------------------------------------------
 
 
 def replay(protocol: Protocol, lasso: Lasso) -> None:
@@ -218,9 +201,6 @@ def test_lanes_first_with_changing_priorities_starves_no_lane(priorities: str) -
     assert starvation(Protocol(paper(3), "lanes", priorities=priorities)) == (None,) * 3
 
 
-# --- simulated runs are paths of the model ---------------------------------------------------
-
-
 @given(
     scenarios(max_arms=5, max_density=600.0, horizon=60.0),
     st.integers(0, 2**32 - 1),
@@ -264,28 +244,7 @@ def test_a_run_that_leaves_the_model_is_found(monkeypatch: pytest.MonkeyPatch) -
             run(dim, **model)
 
 
-@pytest.mark.parametrize("wrong", ["all go", "none goes"])
-def test_a_session_that_disobeys_is_found(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    kind = Go if wrong == "all go" else Hold
-
-    def decide(self: object, view: View) -> list[Go | Hold]:
-        return [kind(v.id) for v in view.vehicles]
-
-    monkeypatch.setattr("dim.controller.DimSession.decide", decide)
-    with pytest.raises(ConformanceError):
-        minisim.simulate(four_way(horizon=300.0), Checked(Dim()), seed=1, on_collision="record")
-
-
 def test_only_the_lanes_own_priorities_are_checked() -> None:
     with pytest.raises(InputError, match="own priorities only"):
         Checked(Dim(priorities="rotating"))
     assert Checked(Dim(gate="harmonious")).name == "dim:gate=harmonious"
-
-
-@pytest.mark.parametrize(
-    ("commit", "phases"),
-    [("stoppable", {WAITING, COMMITTED}), ("paper", {WAITING, ROLLING, COMMITTED})],
-)
-def test_only_the_papers_rule_knows_rolling(commit: str, phases: set[object]) -> None:
-    states = states_of(Protocol(paper(3), commit=commit))
-    assert {front.phase for state in states for front in state.fronts if front} == phases

@@ -6,7 +6,7 @@ from minisim.carfollowing import braking_distance
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.state import ARRIVED, DRIVING, Records, Road
 from minisim.jit import njit
-from minisim.laws import Law
+from minisim.laws import PAST_THE_END, Law
 
 #: Length of the turnarounds at the far ends of the published roads [m].
 TURNAROUND = 4.67
@@ -50,6 +50,10 @@ def look(
     for lane in range(len(lanes)):
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             mine = cruise.memory[i]
+            if mine["at_red"] != 0:  # SUMO puts it on the line (`MSVehicle::processLaneAdvances`)
+                vehicles[i]["s"] = law.entry - PAST_THE_END
+                vehicles[i]["a"] = 0.0
+                mine["at_red"] = 0
             if i < lanes[lane]["front"] and mine["entered"] == 0:
                 mine["entered"] = tick
             p = vehicles[i]["path"]

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from minisim.carfollowing import STANDSTILL, distance_control, engine_lag
+from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
-from minisim.engine.state import Floats, Ints, Records
-from minisim.jit import njit_inline
+from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
-from minisim.laws import Law
+from minisim.laws import KRAUSS, Law
 from minisim.vehicle import CruiseVehicle
 
 #: What the law remembers of a vehicle, row by row as in `minisim.engine.state.VEHICLE`.
@@ -22,6 +22,7 @@ MEMORY = np.dtype(
         ("entered", np.int64),  # tick of entering the junction
         ("merged", np.int64),  # tick of passing the waiting position, if there is one
         ("left", np.int64),  # its front has left the junction
+        ("at_red", np.int64),  # it would have run a red light and stops dead
         ("stopping", np.int64),  # it was advised to stand still in the previous step
     ]
 )
@@ -32,6 +33,7 @@ class Cruise(NamedTuple):
 
     Attributes:
         teleports: whether a vehicle that runs into another on its exit is taken off the road.
+        obeys: whether vehicles keep to limits and lights (`CruiseVehicle.obeys`).
         crossing_foes: whether the radar sees vehicles that only cross.
         meetings: (p, 2, p, 2, 4), see `minisim.junction.meetings.meetings`.
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
@@ -53,6 +55,7 @@ class Cruise(NamedTuple):
     radar: float
     max_speed: float
     teleports: bool
+    obeys: bool
     crossing_foes: bool
     meetings: Floats
     waits: Floats
@@ -63,10 +66,13 @@ class Cruise(NamedTuple):
 
 
 def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | None:
-    """Collect what a run of `count` vehicles needs; None where they have no cruise control."""
+    """Collect what a run of `count` vehicles needs; None where they do not drive like SUMO's."""
     vehicle, intersection = site.vehicle, site.intersection
-    if not isinstance(vehicle, CruiseVehicle):
+    if vehicle.sumo is None:
         return None
+    looks_out = vehicle.looks_out
+    if not isinstance(vehicle, CruiseVehicle):
+        vehicle = CruiseVehicle()  # without effect under any other law
     waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
     return Cruise(
         cruise_speed=vehicle.cruise_speed,
@@ -81,9 +87,10 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         radar=vehicle.radar,
         max_speed=vehicle.max_speed,
         teleports=teleports,
-        crossing_foes=vehicle.sumo == "1.18",
+        obeys=vehicle.obeys,
+        crossing_foes=looks_out,
         meetings=meetings(intersection),
-        waits=np.stack([waits, sagittas(intersection, vehicle.length)], axis=-1),
+        waits=np.stack([waits, sagittas(intersection, site.vehicle.length)], axis=-1),
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
         memory=np.zeros(count, MEMORY),
@@ -105,11 +112,33 @@ def _turns_back(intersection: Intersection) -> Bools:
 
 
 @njit_inline
-def follow(v: float, gap: float, v_leader: float, cruise: Cruise) -> float:
-    """Acceleration that the ACC asks for behind a leader [m/s²]; infinite beyond the radar."""
+def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> float:
+    """Acceleration that a leader asks for [m/s²]; under the ACC infinite beyond the radar.
+
+    The gap is measured beyond `min_gap`.
+    """
+    if law.model == KRAUSS:
+        return (safe_speed(gap, v_leader, law.b, law.headway, law.dt) - v) / law.dt
     if gap > cruise.radar:
         return math.inf
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
+
+
+@njit
+def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise: Cruise) -> float:
+    """The speed that a vehicle which obeys limits may drive [m/s].
+
+    It takes its desired speed for a factor on the limit where it was one step before. So a limit
+    counts for the first step beyond it only.
+    Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
+    """
+    before = s - v * law.dt
+    limit, turn = road.section_speed[p, 0], road.section_speed[p, 1]
+    if before < law.entry <= s:
+        return float(v0 * turn / limit)
+    if before < road.ends[p, 0] <= s:
+        return float(min(v0 * limit / turn, cruise.max_speed))
+    return v0
 
 
 @njit_inline

@@ -13,8 +13,9 @@ from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, Floats, Ints, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.meetings import Meeting
-from minisim.laws import Law
+from minisim.laws import KRAUSS, Law, krauss_stop
 from minisim.ticks import NEVER
+from minisim.vehicle import POSITION_EPS
 
 #: The most vehicles inside the junction at once.
 INSIDE = 64
@@ -68,9 +69,15 @@ def meet(
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
     wait = cruise.waits[p, 0]
     part = 0 if wait > 0.0 and s < law.entry + wait else 1  # the next, or the one that it is on
-    u = seen = radar(vehicles, ends, law, cruise, inside, i, part, ahead)
-    if s < law.entry:
-        return u
+    if law.model == KRAUSS:
+        # It stops before the part of the way that others can meet, or before they do.
+        begin = law.entry + part * wait - POSITION_EPS - s
+        u, halt = math.inf, krauss_stop(v, begin, law)
+    else:
+        u = halt = radar(vehicles, ends, law, cruise, inside, i, part, ahead)
+        if s < law.entry:
+            return u
+    crossing = halt
     for j in inside:
         other = vehicles[j]
         q = other["path"]
@@ -79,15 +86,18 @@ def meet(
             if kind == NOWHERE:
                 continue
             gap, to_crossing, in_the_way = room(vehicles, ends, law, cruise, i, part, j, k)
-            if gap == math.inf or not (in_the_way or before(vehicles, cruise, i, j, kind)):
+            first = s < law.entry or before(vehicles, cruise, i, j, kind)
+            if gap == math.inf or not (in_the_way or first):
                 continue
-            a = follow(v, gap, other["v"], cruise) if gap >= 0.0 else seen
+            if law.model == KRAUSS:
+                crossing = krauss_stop(v, to_crossing - law.min_gap, law)
+            a = follow(v, gap, other["v"], law, cruise) if gap >= 0.0 else halt
             if kind == WAIT:
-                a = seen
+                a = max(halt, crossing)
             elif kind == CROSS and to_crossing >= 0.0:
                 time = (to_crossing - gap) / max(other["v"], HALTING)  # until that one is past
                 faster = max(v, 2.0 * (to_crossing - law.min_gap) / time - v)
-                a = max(a, min((faster - v) / time, seen))
+                a = max(a, min((faster - v) / time, crossing))
             u = min(u, a)
     return u
 
@@ -134,7 +144,7 @@ def radar(
                     gap = max(law.entry + here * cruise.waits[p, 0] - s, 0.0)
                 elif gap < 0.0:
                     gap = 0.0 if other["s"] < ends[q, 0] else math.inf
-                seen = follow(v, gap, other["v"], cruise)
+                seen = follow(v, gap, other["v"], law, cruise)
         if shortest < math.inf:
             return seen
     return ahead.tail

@@ -4,12 +4,27 @@ from __future__ import annotations
 
 import math
 
-from minisim.carfollowing import cruise_control
-from minisim.engine.cruise.law import Cruise, follow, realise
+import numpy as np
+
+from minisim.carfollowing import STANDSTILL, cruise_control
+from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.state import DRIVING, Records, Road
 from minisim.jit import njit
-from minisim.laws import Law, hold
+from minisim.laws import (
+    KRAUSS,
+    STOP_LINE_GAP,
+    Law,
+    braking_begins,
+    hold,
+    krauss_stop,
+    slow_down,
+    stop_at_line,
+)
+from minisim.laws import (
+    follow as follow_law,
+)
+from minisim.vehicle import POSITION_EPS
 
 
 @njit
@@ -30,12 +45,18 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 continue
             s, v, p = me["s"], me["v"], me["path"]
             v0 = cruise.cruise_speed if me["advice"] == math.inf else me["advice"]
-            u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if law.model == KRAUSS:
+                u = free(me, road, law)
+            else:
+                u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
+            if cruise.obeys:
+                u = min(u, (allowed(s, v, p, v0, road, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
             part = 2  # of its way on which the leader is, see `Ahead`
             leave = ends[p, 0]
             if s < leave:
-                u = min(u, (cruise.max_speed - v) / law.dt)
+                if law.model != KRAUSS:
+                    u = min(u, (cruise.max_speed - v) / law.dt)
                 wait = law.entry + cruise.waits[p, 0]
                 for j in range(i - 1, first - 1, -1):
                     ahead = vehicles[j]
@@ -45,7 +66,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     on_way = ahead["path"] == p and ahead["s"] >= law.entry and rear < leave
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
-                        asked = follow(v, rear - s - law.min_gap, ahead["v"], cruise)
+                        asked = follow(v, rear - s - law.min_gap, ahead["v"], law, cruise)
                         u = min(u, asked)
                         nearest = min(nearest, rear - s)
                         if part == 2:
@@ -56,27 +77,57 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 j = cruise.last[int(ends[p, 2])]
             else:
                 j = me["ahead"]
-            if j >= 0 and vehicles[j]["status"] == DRIVING:
+            held = not is_open and me["go"] == 0 and s < law.entry
+            blind = held and law.model == KRAUSS  # to what is beyond a red light
+            if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
                 ahead = vehicles[j]
                 rear = ahead["s"] - law.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
-                # A vehicle beside it on another way is left to the radar (`adaptToLeader`).
+                # A vehicle beside it on another way is left to the radar, or waited for before the
+                # junction (`adaptToLeader`).
                 beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
-                if not beside:
-                    tail = follow(v, gap - law.min_gap, ahead["v"], cruise)
+                if beside and law.model == KRAUSS:
+                    u = min(u, krauss_stop(v, law.entry - s - POSITION_EPS, law))
+                elif not beside:
+                    tail = follow(v, gap - law.min_gap, ahead["v"], law, cruise)
                     u = min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
-            near = law.entry - s <= cruise.radar and s < leave
+            near = law.entry - s <= cruise.radar and s < leave and not blind
+            if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
+                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, law)
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
-                u = min(u, meet(vehicles, ends, law, cruise, inside, i, foes))
+                asked = meet(vehicles, ends, law, cruise, inside, i, foes)
+                if law.model == KRAUSS and s < law.entry:
+                    asked = max(asked, stop_at_line(v, law.entry - s, law))
+                u = min(u, asked)
             overlap |= nearest <= 0.0
-            stopping = cruise.memory[i]["stopping"] != 0
-            a = realise(v, me["a"], u, stopping, law, cruise)
+            if law.model == KRAUSS:
+                a = max(u, -law.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
+            else:
+                stopping = cruise.memory[i]["stopping"] != 0
+                a = realise(v, me["a"], u, stopping, law, cruise)
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
-            if not is_open and me["go"] == 0 and s < law.entry:
+            if held and cruise.obeys:
+                if s + (v + a * law.dt) * law.dt >= law.entry:
+                    a = -v / law.dt
+                    cruise.memory[i]["at_red"] = 1
+            elif held:
                 a = max(min(a, hold(v, s, law)), -law.b_max)
             me["a"] = a
     return overlap
+
+
+@njit
+def free(me: np.void, road: Road, law: Law) -> float:
+    """The acceleration of a vehicle that no other one hinders, within the limits here and ahead."""
+    s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
+    start, speed = road.section_start, road.section_speed
+    acc = follow_law(v, min(speed[p, section] * factor, me["advice"]), 0.0, law)
+    k = section + 1
+    while braking_begins(v, start[p, k] - s, law):
+        acc = min(acc, slow_down(v, acc, speed[p, k] * factor, start[p, k] - s, law))
+        k += 1
+    return acc

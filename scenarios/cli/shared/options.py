@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from minisim.errors import InputError, integer
+from minisim.errors import InputError, integer, number
 from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
@@ -20,9 +20,13 @@ if TYPE_CHECKING:
 #: A group of options in the help.
 FILES = "Files"
 
+#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
+#: that none does is (1/2)^30, one in 10^9.
+ENOUGH = 30
+
 
 def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
-    """An option whose help text itself says all there is to say about its default."""
+    """An option whose help text says what its default is."""
     return typer.Option(*flags, metavar=metavar, help=help, show_default=False, **more)
 
 
@@ -34,7 +38,7 @@ ControllerName = Annotated[
 ]
 Humans = Annotated[float, option("Human drivers among DIM's, 0 … 1.", "SHARE")]
 Density = Annotated[
-    float | None, option("Mean inflow a lane; 350 unless told.", "VEH/H", "--density", "-d")
+    float | None, option("Mean inflow per lane; 350 by default.", "VEH/H", "--density", "-d")
 ]
 Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
 Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
@@ -43,25 +47,25 @@ ProfileName = Annotated[
 ]
 Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
 Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
-Seed = Annotated[int, option("Of the random arrivals; 0 unless told.", "N", "--seed", "-s")]
-Horizon = Annotated[float, option("Simulated time; 3600 unless told.", "S")]
+Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
+Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
     typer.Option(
         metavar="size|lanes",
-        help="Prefer the largest clique (the paper's words) or the highest-priority lanes "
+        help="Prefer the largest clique (the paper's text) or the lanes of highest priority "
         "(its published runs).",
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 Folder = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write to.")]
-Jobs = Annotated[int | None, option("Processes to use; one a core by default.", "N")]
+Jobs = Annotated[int | None, option("Processes to use; one per core by default.", "N")]
 Quick = Annotated[bool, typer.Option("--quick", help="Fewer and shorter runs: a smoke test.")]
 
 
 def _file_name(text: str) -> Path:
     if not text:
-        raise typer.BadParameter("'' is no file name")
+        raise typer.BadParameter("'' is not a file name")
     return Path(text)
 
 
@@ -72,22 +76,21 @@ Arrivals = Annotated[
 ]  # fmt: skip
 
 Start = Annotated[
-    str | None,
-    option("Begin at this time in the table.", "07:00", rich_help_panel=FILES),
+    str | None, option("Begin at this time in the table.", "07:00", rich_help_panel=FILES)
 ]
 
 
 def processes(jobs: int | None) -> int:
-    """The number of processes that --jobs asks for; one per core if it is not given."""
+    """The number of processes that --jobs asks for, or one per core."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
-    """Raise `InputError` for a value that an option has twice; None is an option not given."""
-    for option_name, values in given.items():
-        for k, value in enumerate(values or ()):
-            if value in (values or ())[:k]:
-                raise InputError(f"{option_name} {value} is given twice")
+    """Raise `InputError` if an option has a value twice; None is an option not given."""
+    for name, values in given.items():
+        for value, count in Counter(values or ()).items():
+            if count > 1:
+                raise InputError(f"{name} {value} is given twice")
 
 
 def build_scenario(
@@ -97,7 +100,7 @@ def build_scenario(
     start: str | None = None,
     **options: Any,
 ) -> Scenario:
-    """The scenario that the options describe; None stands for an option that was not given."""
+    """The scenario that the options describe; None is an option not given."""
     from minisim.recorded import read_arrivals
     from scenarios.library import scenario_named
 
@@ -112,33 +115,23 @@ def build_scenario(
         return made
     n = made.intersection.n
     recorded = read_arrivals(arrivals, n, start or 0.0)
-    if len(recorded) >= ENOUGH:
-        # A table from a junction with fewer arms is refused: its manoeuvres would mean other exits.
-        arms = max(int(recorded.lane.max()) + 1, int(recorded.manoeuvre.max()) + 1)
-        if arms < n:
-            raise InputError(
-                f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from "
-                f"lane {ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-            )
+    arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
+    if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
+        raise InputError(
+            f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from lane "
+            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+        )
     return replace(made, recorded=recorded)
 
 
-#: With this many arrivals, some use the last lane or the last manoeuvre. With equal shares on 4
-#: arms, the chance that none does is (1/2)^30, one in 10^9.
-ENOUGH = 30
-
-
-def _bearings(text: str) -> tuple[float, ...]:
+def _bearings(text: str) -> list[float]:
     values = []
     for part in text.split(","):
         try:
-            value = float(part)
+            values.append(number(part, float(part)))
         except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
             raise InputError(
-                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is no finite "
+                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is not a finite "
                 "number"
-            )
-        values.append(value)
-    return tuple(values)
+            ) from None
+    return values

@@ -14,7 +14,7 @@ from rich.text import Text
 from minisim.files import check_file
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.movements import ARM_NAMES
-from scenarios.cli.shared.options import build_scenario
+from scenarios.cli.shared.options import build_scenario, option
 from scenarios.cli.shared.terminal import show, show_json
 
 if TYPE_CHECKING:
@@ -35,16 +35,14 @@ def _check_figure(path: Path | None) -> Path | None:
 
 Plot = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE", callback=_check_figure, help="Draw the result (.png, .pdf or .svg)."
-    ),
+    option("Draw the result (.png, .pdf or .svg).", "FILE", callback=_check_figure),
 ]
 
 
 def junction(
     name: str, bearings: str | None, side: str, profile: str, clearance: float = CLEARANCE
 ) -> tuple[Scenario, HarmonyMatrix]:
-    """A scenario and the harmony matrix of its movements; raises `MinisimError`."""
+    """A scenario and the harmony matrix of its movements."""
     from dim import HarmonyMatrix
 
     scenario = build_scenario(name, bearings, profile=profile, side=side)
@@ -70,7 +68,7 @@ def names(things: Iterable[object]) -> list[str]:
 
 
 def claims_table(name: str, analysis: Analysis) -> Table:
-    """Each claim, with the number of cases in which it was tested and in which it is false."""
+    """Each claim, and the numbers of cases in which it was tested and in which it is false."""
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"{name}, {analysis.n} arms: all {analysis.cases} cases, order {analysis.order}",
@@ -79,12 +77,8 @@ def claims_table(name: str, analysis: Analysis) -> Table:
     for heading in ("claim", "cases", "false", "smallest counterexample"):
         table.add_column(heading, justify="right" if heading in ("cases", "false") else "left")
     for claim in analysis.claims:
-        table.add_row(
-            claim.statement,
-            str(claim.cases),
-            Text(str(claim.failures), style="bold green" if claim.holds else "bold red"),
-            "" if claim.example is None else _spaced(claim.example),
-        )
+        failures = Text(str(claim.failures), style="bold green" if claim.holds else "bold red")
+        table.add_row(claim.statement, str(claim.cases), failures, _spaced(claim.example or ()))
     return table
 
 
@@ -92,13 +86,14 @@ def analysis_text(analysis: Analysis) -> Text:
     """Sizes, ties and the worst cases."""
     from dim.proofs.verification import most_cliques
 
-    sizes = "  ".join(f"{size}: {cases}" for size, cases in analysis.sizes.items())
-    ties = "  ".join(f"{tied}: {cases}" for tied, cases in analysis.ties.items())
-    share = analysis.tied / analysis.cases
+    def counts(cases: Mapping[int, int]) -> str:
+        return "  ".join(f"{key}: {count}" for key, count in cases.items()) + "\n"
+
     text = Text.assemble(
-        ("cases by vehicles that go    ", "dim"), f"{sizes}\n",
-        ("cases by largest cliques     ", "dim"), f"{ties}\n",
-        ("cases with a tie             ", "dim"), f"{analysis.tied} ({share:.0%})\n",
+        ("cases by vehicles that go    ", "dim"), counts(analysis.sizes),
+        ("cases by largest cliques     ", "dim"), counts(analysis.ties),
+        ("cases with a tie             ", "dim"),
+        f"{analysis.tied} ({analysis.tied / analysis.cases:.0%})\n",
         ("worst case                   ", "dim"), f"{analysis.most_tied} cliques tie "
         f"(no graph of {analysis.n} nodes has more than {most_cliques(analysis.n)})",
     )  # fmt: skip
@@ -119,18 +114,19 @@ def protocol_text(name: str, search: Exploration, lassos: Sequence[Lasso | None]
         f"{search.states}, with {search.transitions} transitions",
         "" if search.complete else " up to the nearest unsafe ones",
     )
+    yes, no = ("yes", "bold green"), ("no", "bold red")
     text.append("\nsafe         ", "dim")
     if search.unsafe:
         first = search.unsafe[0]
-        text.append("no", "bold red").append(f": {_listed(first)}")
-        text.append(f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)")
+        paths = f"\n{'':13}({len(search.unsafe)} such paths of {len(first)} events)"
+        text.append(*no).append(f": {_listed(first)}{paths}")
     else:
-        text.append("yes", "bold green").append(": movements in conflict are never inside at once")
+        text.append(*yes).append(": movements in conflict are never inside at once")
     text.append("\nlive         ", "dim")
     if search.stuck is not None:
-        text.append("no", "bold red").append(f": {_listed(search.stuck)}")
+        text.append(*no).append(f": {_listed(search.stuck)}")
     elif search.complete:
-        text.append("yes", "bold green").append(": in every state a vehicle can go on")
+        text.append(*yes).append(": in every state a vehicle can go on")
     else:
         text.append("not stuck in the states visited")
     for lane, lasso in zip(ARM_NAMES, lassos, strict=False):
@@ -148,13 +144,18 @@ def harmony_table(matrix: HarmonyMatrix) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     manoeuvres = range(1, matrix.n)
+
+    def mark(harmony: bool, manoeuvre: int) -> Text:
+        text = f"{'●' if harmony else '·':<{len(str(manoeuvre)) + 2}}"
+        return Text(text, style="green" if harmony else "dim")
+
     for lane in ARM_NAMES[: matrix.n]:
         table.add_column(" ".join(f"{lane}{j}" for j in manoeuvres), no_wrap=True)
     for movement, values in zip(matrix.movements, matrix.values, strict=True):
         cells = [Text(str(movement), style="bold")]
         for first in range(0, len(values), matrix.n - 1):
             part = values[first:].tolist()
-            cells.append(Text("").join(map(_mark, part, manoeuvres)))
+            cells.append(Text("").join(map(mark, part, manoeuvres)))
         table.add_row(*cells, end_section=movement.manoeuvre == matrix.n - 1)
     return table
 
@@ -184,8 +185,3 @@ def _spaced(things: Iterable[object]) -> str:
 
 def _listed(things: Iterable[object]) -> str:
     return ", ".join(names(things))
-
-
-def _mark(harmony: bool, manoeuvre: int) -> Text:
-    width = len(str(manoeuvre)) + 2
-    return Text(f"{'●' if harmony else '·':<{width}}", style="green" if harmony else "dim")

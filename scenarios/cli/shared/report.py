@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from figures.studies.shared.section import Item
     from scenarios.recipe import Recipe
 
-#: The closest calls that the command line shows for every run.
+#: The closest calls, which are printed for every run.
 CLOSEST = ("min_ttc_s", "min_pet_s")
 
 #: Columns of the tables of a run and of a sweep, unless others are asked for.
@@ -29,21 +29,16 @@ CELL_COLUMNS = (
     "waiting_time_s", "complete_waiting_time_s", "travel_time_s", "complete_depart_delay_s",
 )  # fmt: skip
 
-#: What else may tell cells of a sweep apart.
+#: Further columns that may tell cells of a sweep apart.
 APART = ("side", "turns", "horizon_s", "warmup_s")
 
 
 def run_parts(
     summary: Mapping[str, Any], metrics: Sequence[Metric], by: str, counts: Mapping[str, float]
 ) -> Iterator[Text | Table]:
-    """What was run, its table, and the metrics with one number per run.
-
-    The counts are from `dim.senses.tally`: the effects of wrong perception.
-    """
-    yield Text.assemble(
-        (f"{summary['scenario']}, {summary['controller']}", "bold"),
-        f": {conditions(summary)}",
-    )
+    """What was run, its table, the `dim.senses.tally` counts, and metrics of the whole run."""
+    what = f"{summary['scenario']}, {summary['controller']}"
+    yield Text.assemble((what, "bold"), f": {conditions(summary)}")
     yield _run_table(summary, metrics, by)
     yield _safety(summary)
     if counts:
@@ -83,7 +78,7 @@ def _run_table(summary: Mapping[str, Any], metrics: Sequence[Metric], by: str) -
 def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
     """Column of a group of trips -> heading, of metrics with their percentiles or the usual ones.
 
-    Tables have a column for unfinished trips anyway.
+    Unfinished trips have a column in any case.
     """
     columns = {}
     for metric in metrics:
@@ -96,14 +91,10 @@ def _columns(metrics: Iterable[Metric], usual: Iterable[str]) -> dict[str, str]:
 
 def _safety(summary: Mapping[str, Any]) -> Text:
     collisions = summary["collisions"]
-    line = Text.assemble(
-        "  collisions ", (str(collisions), "bold red" if collisions else "bold green")
-    )
-    for name in CLOSEST:
-        if name in summary:
-            metric = METRICS[name]
-            line.append(f"   {metric.title} ")
-            line.append(_seconds(summary[name], f" {metric.unit}"), "bold")
+    line = Text("  collisions ").append(str(collisions), "bold red" if collisions else "bold green")
+    for metric in (METRICS[name] for name in CLOSEST if name in summary):
+        value = _seconds(summary[metric.name], f" {metric.unit}")
+        line.append(f"   {metric.title} ").append(value, "bold")
     return line
 
 
@@ -120,8 +111,7 @@ def gallery_table(items: Iterable[Item]) -> Table:
 def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
     """One line per cell: means over seeds with 95 % confidence intervals.
 
-    The columns are the usual ones or the metrics that the experiments ask for, and whatever tells
-    cells apart.
+    The columns are the usual ones, or else the metrics asked for, and whatever tells cells apart.
     """
     asked = {it.name: it for recipe in experiments for it in asked_metrics(recipe.metrics)}
     columns = _columns(asked.values(), CELL_COLUMNS)
@@ -137,51 +127,40 @@ def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
         parts = (cell[name] for name in ("scenario", "profile", "split", *apart, "density"))
         named = [part if isinstance(part, str) else f"{part:g}" for part in parts]
         failed = f" (+{cell['failed']} failed)" if cell["failed"] else ""
-        if cell["runs"]:
-            collisions = int(cell["collisions"])
-            unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
-            table.add_row(
-                *named,
-                cell["controller"],
-                f"{cell['runs']}{failed}",
-                *(_interval(cell, column) for column in columns),
-                f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–",
-                Text(str(collisions), style="bold red" if collisions else ""),
-                Text(unsettled, style="yellow"),
-            )
-        else:
-            table.add_row(*named, cell["controller"], f"0{failed}", style="red")
+        named += [cell["controller"], f"{cell['runs']}{failed}"]
+        if not cell["runs"]:
+            table.add_row(*named, style="red")
+            continue
+        means = (_interval(cell, column) for column in columns)
+        unfinished = f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–"
+        collisions = Text(f"{cell['collisions']:.0f}", "bold red" if cell["collisions"] else "")
+        unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
+        table.add_row(*named, *means, unfinished, collisions, Text(unsettled, "yellow"))
     return table
 
 
 def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[Recipe]) -> Text:
     """What to know about the table: growing queues, capped signals, the first failure."""
-    notes = []
-    if "too_short" in cells and cells["too_short"].eq(True).any():
-        notes.append(
-            "too short: the roads were still filling, so that nothing can be said of queues; "
-            f"simulate {FILLING:g} travel times or more."
-        )
-    if "growing" in cells and cells["growing"].eq(True).any():
-        notes.append(
-            "growing: queues had not settled by the horizon; a mean delay there says how long was "
-            "simulated."
-        )
+    meanings = {
+        "too_short": "too short: the roads were still filling, so nothing can be said of queues; "
+        f"simulate {FILLING:g} travel times or more.",
+        "growing": "growing: queues had not settled by the horizon; a mean delay there says how "
+        "long was simulated.",
+    }
+    notes = [text for key, text in meanings.items() if key in cells and cells[key].eq(True).any()]
     text = Text("\n").join(Text(f"  {note}") for note in (*notes, *_capped(experiments)))
     failures = rows[rows["error"].notna()]
     if len(failures):
         first = failures.iloc[0]
-        text.append("\n" if text else "").append(
-            f"  {len(failures)} of {len(rows)} runs failed; the first "
-            f"({first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane, seed "
-            f"{first['seed']}): {first['error']}",
-            "red",
-        )
+        what = f"{first['controller']}, {first['scenario']}, {first['density']:g} veh/h/lane"
+        told = f"the first ({what}, seed {first['seed']}): {first['error']}"
+        text.append("\n" if text else "")
+        text.append(f"  {len(failures)} of {len(rows)} runs failed; {told}", "red")
     return text
 
 
 def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
-    """A line for each signal whose demand exceeds what Webster's formula can handle."""
+    """A line for each signal with a demand over Webster's capacity."""
     from baselines import FixedTime
 
     return dict.fromkeys(

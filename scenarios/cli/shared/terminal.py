@@ -20,20 +20,19 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: Substitutes for characters that the terminal's encoding lacks: one for one, so that the columns
-#: of tables stay aligned.
+#: Substitutes for characters that the terminal's encoding lacks: one for one, so that tables stay
+#: aligned.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
-#: Shortest time between two lines of progress where there is no terminal [s].
+#: Shortest time between two lines of progress if stderr is not a terminal [s].
 SILENCE = 20.0
 
 
 class Bar:
-    """Progress: a bar on a terminal; elsewhere a line now and then."""
+    """Progress: a bar on a terminal, or else a line now and then."""
 
     def __init__(self, label: str, progress: Progress | None) -> None:
-        self._label = label
-        self._progress = progress
+        self._label, self._progress = label, progress
         self._task = progress.add_task(label, total=None) if progress else None
         self._said = time.monotonic()
 
@@ -83,22 +82,17 @@ def wrapped(text: str, indent: int) -> str:
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text, in plainer characters if need be.
-
-    Text for a stream that is closed is discarded.
-    """
+    """Let stdout and stderr take any text, in plainer characters if need be, even if closed."""
     codecs.register_error("minisim-plain", _plain)
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        if isinstance(stream := getattr(sys, name), io.TextIOWrapper):
             stream.reconfigure(errors="minisim-plain")
 
 
 def drop_output() -> None:
-    """Send the rest of stdout nowhere, since it cannot be written."""
+    """Discard the rest of stdout, since it cannot be written."""
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 

@@ -28,9 +28,8 @@ def find_in(store: Store | None) -> Find:
     def find(recipes: Sequence[Recipe]) -> list[Mapping[str, Any] | None]:
         if store is None:
             return [None] * len(recipes)
-        keys = [key_of(recipe) for recipe in recipes]
-        rows = store.valid(keys)
-        return [rows.get(key) for key in keys]
+        keys = [*map(key_of, recipes)]
+        return [*map(store.valid(keys).get, keys)]
 
     return find
 
@@ -48,9 +47,9 @@ class Archive:
         """The results of these studies; `MissingRunsError` if none has a run."""
         results = tuple(map(self.study, names))
         if names and all(each.good.empty for each in results):
+            extent = results[0].study.extent(self.effort)
             raise MissingRunsError(
-                f"the store has no run of {' or '.join(names)} with "
-                f"{results[0].study.extent(self.effort)}; make them with: "
+                f"the store has no run of {' or '.join(names)} with {extent}; make them with: "
                 f"{self.effort.command(*names)}"
             )
         return results

@@ -39,7 +39,7 @@ class Effort:
     seeds: int = whole("runs per point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
     densities: tuple[float, ...] | None = reals(
-        "only points with these demands, in studies that have any; none keeps all",
+        "only points with these demands, in studies that have any; none means all",
         "veh/h/lane", optional=True, label="densities", default=None,
     )  # fmt: skip
     search: Search = part("for studies that search", Search, default_factory=Search)
@@ -49,11 +49,10 @@ class Effort:
         """The full effort, or a smoke test at two demands. `seeds` replaces the number of seeds."""
         if not quick:
             return cls() if seeds is None else cls(seeds=seeds)
-        return cls(
-            seeds=2 if seeds is None else seeds, horizon=150.0, densities=(150.0, 350.0),
-            # Coarse, and its runs are too short to mean anything.
-            search=Search(step=200.0, steps=4, seeds=2, horizon=150.0),
-        )  # fmt: skip
+        search = Search(step=200.0, steps=4, seeds=2, horizon=150.0)
+        densities = (150.0, 350.0)
+        seeds = 2 if seeds is None else seeds
+        return cls(seeds=seeds, horizon=150.0, densities=densities, search=search)
 
     @property
     def warning(self) -> str:

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 #: Rates are events in this many crossings.
 CROSSINGS = 10_000
-#: Demand of these studies [veh/h/lane]: well below saturation, so that any loss is due to
-#: perception.
+#: Demand of these studies [veh/h/lane]: so low that any loss is due to perception.
 DENSITY = 250.0
 #: (whether all vehicles err alike, whether errors last) -> words.
 MANNERS = {
@@ -30,8 +29,7 @@ MANNERS = {
 }
 #: The rules alone, with a safety monitor, and with the highest-priority lane first.
 MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
-#: The most seeds. Vehicles that misread look around every 0.1 s, which costs 3 s of CPU per
-#: simulated hour, and more with a monitor.
+#: The most seeds: vehicles that misread look around every 0.1 s, which costs 3 s of CPU per hour.
 FEW = dict.fromkeys(MISREADERS, 5)
 
 
@@ -83,8 +81,7 @@ class Rate(NamedTuple):
 def rate_of(rows: pd.DataFrame, events: str) -> Rate | None:
     """The rate of a column's events over all runs of a point; None without a crossing.
 
-    Runs with exact perception have no tally: their crossings are the trips that ended, and all
-    decisions are right.
+    Runs with exact perception have no tally: their crossings are the trips that ended.
     """
     ended = rows["trips"] - rows["unfinished"]
     crossings = int(rows.get("crossings", ended).fillna(ended).sum())

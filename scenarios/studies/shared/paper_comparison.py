@@ -35,20 +35,19 @@ def published() -> pd.DataFrame:
 def compare(rows: pd.DataFrame) -> pd.DataFrame:
     """Every published value beside the rows of a study of the paper's grid: columns `COMPARED`.
 
-    `low` and `high` bound the 95 % prediction interval for one more run of ours, cut at 0,
-    since no time is negative. `inside` says whether the paper's value lies in it. It is missing if
-    there is only one value or all are equal. Without a run, `seeds` is 0 and the rest is missing.
+    `low` and `high` bound the 95 % prediction interval for one more run of ours, cut at 0, since no
+    time is negative. `inside` says whether the paper's value lies in it; it is missing if there is
+    only one value or all are equal. Without a run, `seeds` is 0 and the rest is missing.
     """
     import pandas as pd
 
     keys = ["series", "arms", "split", "density"]
-    cells = {key: cell for key, cell in rows.groupby(keys)}  # noqa: C416
+    cells = dict(iter(rows.groupby(keys)))
     compared = []
     for row in sorted(published().to_dict("records"), key=_order):
         ours = cells.get(tuple(row[key] for key in keys))
         lane = "" if row["lane"] == "all" else f"lanes_{row['lane']}_"
-        row.update(**_ours(ours, f"{lane}{row['metric']}", row["paper"]))
-        compared.append(row)
+        compared.append(row | _ours(ours, f"{lane}{row['metric']}", row["paper"]))
     return pd.DataFrame(compared)[list(COMPARED)]
 
 
@@ -105,10 +104,8 @@ class Discrepancy(NamedTuple):
 
     def holds(self, study: str, row: Mapping[Any, Any]) -> bool:
         """Whether it holds for a study's row of `compare`."""
-        return self.study in ("", study) and all(
-            getattr(self, key) in ("", str(row[key]))
-            for key in ("series", "arms", "split", "density", "metric")
-        )
+        where = {**row, "study": study}
+        return all(getattr(self, key) in ("", str(where[key])) for key in self._fields[1:-1])
 
 
 @lru_cache
@@ -134,6 +131,6 @@ def labels() -> Mapping[str, str]:
 
 
 def causes(study: str, row: Mapping[Any, Any]) -> tuple[Discrepancy, ...]:
-    """The known causes of a difference in a row of `compare`, for a study of the paper's grid."""
+    """Known causes of a difference in a row of `compare`, for a study of the paper's grid."""
     choice("study of the paper's grid", study, ("text", "as-run"))
     return tuple(known for known in discrepancies() if known.holds(study, row))

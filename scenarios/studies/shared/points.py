@@ -45,7 +45,7 @@ class ControllerPoint(NamedTuple):
     series: str  # the controller as readers know it, such as "dim"
     controller: str  # the variant of it that the study needs, as on the command line
     arms: int  # of the junction
-    split: str  # of the inflow over the lanes, "balanced" or shares such as "4:3:2:1"
+    split: str  # of the inflow over the lanes: "balanced", or shares such as "4:3:2:1"
     density: float  # mean inflow per lane [veh/h]
     humans: float = 0.0  # share of human drivers
 
@@ -73,6 +73,4 @@ def fair_grid(
     controllers: Iterable[str], arms: Iterable[int], densities: Iterable[float]
 ) -> tuple[ControllerPoint, ...]:
     """Every combination of controllers, arms and demands [veh/h/lane] on equal terms."""
-    return tuple(
-        fair(name, n, density) for n, name, density in product(arms, controllers, densities)
-    )
+    return tuple(fair(name, n, q) for n, name, q in product(arms, controllers, densities))

@@ -37,8 +37,7 @@ def reproduce(
     """
     study = study_named(name)
     total = study.most_runs(effort)
-    known = 0
-    hours = 0.0
+    known, hours = 0, 0.0
     rows: list[Row] = []
     began = time.monotonic()
 

@@ -28,10 +28,9 @@ class Study:
     name: str  # on the command line
     question: str  # in one line
     points: tuple[Point, ...]  # each once
-    #: Series -> most seeds, if more would cost too much.
+    #: Series -> most seeds, if more would cost too much
     few: Mapping[str, int] = field(default_factory=dict)
-    #: Whether its figures show collisions; if so, the report does not list them.
-    about_collisions: bool = False
+    about_collisions: bool = False  # its figures show them, so the report does not list them
 
     def runs(
         self, seeds: int, horizon: float = 3600.0, points: Sequence[Point] = ()
@@ -45,15 +44,10 @@ class Study:
 
     def chosen(self, effort: Effort) -> tuple[Point, ...]:
         """The points with the effort's demands; all points if none has one of them."""
-        wanted = effort.densities
-        some = tuple(p for p in self.points if wanted is None or p.density in wanted)
-        return some or self.points
+        return tuple(p for p in self.points if p.density in (effort.densities or ())) or self.points
 
     def collect(self, effort: Effort, find: Find) -> Results:
-        """Ask `find` for the rows of all runs; it makes the runs or looks them up.
-
-        A study that chooses runs by the results of earlier ones asks several times.
-        """
+        """Ask `find` for the rows of all runs: several times if the study searches."""
         runs = self.runs(effort.seeds, effort.horizon, self.chosen(effort))
         points, recipes = zip(*runs, strict=True)
         return Results.of(self, effort, [*zip(points, find(recipes), strict=True)])
@@ -100,11 +94,6 @@ class Results:
         )  # fmt: skip
 
     @property
-    def missing(self) -> tuple[Point, ...]:
-        """Points without a successful run."""
-        return tuple(point for point, runs in self.runs.items() if not runs.made)
-
-    @property
     def good(self) -> pd.DataFrame:
         """The rows of runs that did not fail."""
         return self.rows[self.rows["error"].isna()]
@@ -113,10 +102,7 @@ class Results:
 def with_total_delay(rows: pd.DataFrame) -> pd.DataFrame:
     """Add `total_delay_s`: mean time loss on the road plus mean departure delay, both complete.
 
-    SUMO's total delay counts only trips that have ended. This one includes vehicles that have not
-    arrived, and those that have not even departed.
+    Unlike SUMO's total delay, it includes vehicles that have not arrived or not even departed.
     """
-    lost, late = (
-        rows[column].astype(float) for column in ("complete_time_loss_s", "complete_depart_delay_s")
-    )
-    return rows.assign(total_delay_s=lost + late)
+    lost, late = rows["complete_time_loss_s"], rows["complete_depart_delay_s"]
+    return rows.assign(total_delay_s=lost.astype(float) + late.astype(float))

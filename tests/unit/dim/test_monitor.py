@@ -71,9 +71,6 @@ def braking(
     return {command.vehicle: command.deceleration for command in commands}
 
 
-# What another may do.
-
-
 def test_a_reading_holds_as_long_as_motion_does_not_contradict_it() -> None:
     """a3 is read as a2, in harmony with c2, until it is 0.3 m beside that path."""
     shows = showing(SITE.intersection, 0.3)[2, 1]
@@ -111,9 +108,6 @@ def test_a_vehicle_that_can_stop_before_the_junction_endangers_none() -> None:
     assert braking(started(), true, going=set()) == {}
 
 
-# How hard.
-
-
 def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
     """v²/2d before the conflict area, and not at all while less than b will do."""
     shared, _ = regions(A2, B2)
@@ -127,14 +121,6 @@ def test_it_brakes_as_hard_as_it_takes_from_comfortable_on() -> None:
             assert needed > 0.6 * b, "one step more at full acceleration would take more than b"
         else:
             assert needed < b
-
-
-def test_it_brakes_no_harder_than_told() -> None:
-    for weak in (2.0, 5.0):
-        true = view(car(1, "a2", 2.0, 6.0), car(2, "b2", 2.0, 6.0))
-        told = braking(started(deceleration=weak), true)
-        assert told
-        assert max(told.values()) <= weak
 
 
 def test_a_vehicle_that_is_out_in_good_time_goes_on() -> None:
@@ -229,9 +215,6 @@ def test_it_is_needed_where_two_lanes_may_meet() -> None:
         assert monitors.needed is needed, (cars, going)
 
 
-# Which vehicle goes on.
-
-
 def conflicting() -> list[tuple[int, int]]:
     m = MATRIX.movements
     return [
@@ -269,14 +252,6 @@ def test_where_all_stand_and_wait_the_first_lane_goes_alone() -> None:
         assert going == [False, tick >= 20, False], "b has rank 0"
     inside = view(*cars, car(9, "d2", 1.0, 5.0), time=4.0)
     assert not monitors.patience.goes(inside, inside, cars[1], False, ranks), "its turn is over"
-
-
-def test_no_vehicle_goes_alone_where_another_moves_or_crosses() -> None:
-    for moving in (car(9, "d2", -6.0, 2.0), car(9, "d2", 3.0, 0.0)):
-        monitors = started(patience=1.0)
-        for tick in range(30):
-            seen = view(car(0, "a2", -2.25, 0.0), moving, time=tick / 10)
-            assert not monitors.patience.goes(seen, seen, seen.vehicles[0], False, (0, 1, 2, 3))
 
 
 def stands(monitors: Monitors, seen: View, vehicle: int, decided: bool = False) -> bool:
@@ -323,9 +298,6 @@ def test_a_vehicle_that_went_alone_goes_on_once_it_is_inside() -> None:
     assert not stands(monitors, view(ego, time=1.7), 0), "it gave it back"
 
 
-# Whether it helps.
-
-
 def wrong(read: dict[int, int], reader: int | None = None) -> Reading:
     """All others, or one, read the vehicles of these lanes to want these manoeuvres."""
 
@@ -360,15 +332,6 @@ def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
     assert not any(
         isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*WAITING, time=t))
     )
-
-
-def test_a_vehicle_that_arrives_at_the_yellow_zone_ends_the_wait() -> None:
-    """As above, with c3, which is in conflict with all; 8 m before the junction it takes part."""
-    for past, goes in ((-8.0, False), (-8.001, True)):
-        session = Dim(perception=wrong({3: 2}, reader=1), monitor=Monitor()).start(SITE)
-        for time in (0.0, 9.0):
-            commands = list(session.decide(view(*WAITING, car(3, "c3", past, 1.0), time=time)))
-        assert (Go(1) in commands) is goes
 
 
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:

@@ -13,13 +13,11 @@ import minisim
 from dim import Dim, Zones
 from dim.controller import DimSession
 from dim.priorities import SAME_TIME, TURN_TIME, PassingTimes, longest_waiting, memory_of, rotating
-from minisim.control import Command, Go, Hold, Site, View, Wake
+from minisim.control import Command, Site, View
 from minisim.errors import InputError
 from scenarios import four_way
 from scenarios.strategies import scenarios
-from tests.builders import digest, drained, seen
-
-# --- by hand ---------------------------------------------------------------------------------
+from tests.builders import digest, drained, said, seen
 
 
 def test_turns_follow_the_clock() -> None:
@@ -88,33 +86,22 @@ def test_passing_times_by_hand() -> None:
     assert watch.look(5.0, [seen(2, 0, 2, 2.0), seen(5, 2, 2, 3.0)]) == {0: 3.0, 2: 5.0}
 
 
-# --- the session -----------------------------------------------------------------------------
-
-
-def words(commands: Iterable[Command]) -> list[str]:
-    names = {Go: "go", Hold: "hold"}
-    return [
-        f"wake {c.time:g}" if isinstance(c, Wake) else f"{names[type(c)]} {c.vehicle}"
-        for c in commands
-    ]
-
-
 def test_a_session_looks_again_when_the_turn_ends() -> None:
     session = Dim(priorities="rotating").start(four_way().site())
     both = (seen(0, 0, 2, 2.2), seen(1, 1, 2, 2.2))  # a2 and b2 are in conflict
-    assert words(session.decide(View(9.0, both))) == ["go 0", "wake 10"]
-    assert words(session.decide(View(10.0, both))) == ["hold 0", "go 1", "wake 20"]
+    assert said(session.decide(View(9.0, both))) == ["Go 0", "Wake 10"]
+    assert said(session.decide(View(10.0, both))) == ["Hold 0", "Go 1", "Wake 20"]
     alone = (both[0],)
-    assert words(session.decide(View(11.0, alone))) == ["go 0"]  # none waits: no wake-up
+    assert said(session.decide(View(11.0, alone))) == ["Go 0"]  # none waits: no wake-up
 
 
 def test_the_longest_waiting_lane_goes() -> None:
     session = Dim(priorities="waiting").start(four_way().site())
     first, second = seen(1, 1, 2, 2.2), seen(0, 0, 2, 2.2)
-    assert words(session.decide(View(1.0, (first,)))) == ["go 1"]
-    assert words(session.decide(View(3.0, (second, first)))) == ["wake 9.28"]
+    assert said(session.decide(View(1.0, (first,)))) == ["Go 1"]
+    assert said(session.decide(View(3.0, (second, first)))) == ["Wake 9.28"]
     # Both have waited for 8.28 s, which is as much as counts; it is b's turn from 10 s on.
-    assert words(session.decide(View(12.0, (second, first)))) == ["wake 20"]
+    assert said(session.decide(View(12.0, (second, first)))) == ["Wake 20"]
 
 
 @given(
@@ -132,9 +119,6 @@ def test_safe_and_wake_ups_lose_nothing(scenario, seed, priorities, gate, order)
     assert woken.columns.arrived.all()
     always = minisim.simulate(scenario, replace(dim, period=scenario.profile.dt), seed=seed)
     assert digest(woken) == digest(always)
-
-
-# --- unanimity -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("reach", "agree"), [(100.0, True), (12.0, False)])

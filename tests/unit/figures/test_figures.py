@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
-import itertools
 import json
 import math
 import re
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import numpy as np
@@ -51,9 +50,8 @@ INTERSECTIONS = [
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    return minisim.simulate(
-        four_way(400, horizon=130), Dim(), seed=4, record="all", record_window=(100, 130)
-    )
+    recorded = {"record": "all", "record_window": (100, 130)}
+    return minisim.simulate(four_way(400, horizon=130), Dim(), seed=4, **recorded)
 
 
 @pytest.fixture(scope="module")
@@ -74,26 +72,20 @@ def crash() -> Run:
 
 
 @pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
-def test_every_body_stays_on_the_asphalt(intersection: Intersection) -> None:
+def test_bodies_stay_on_the_asphalt_and_lanes_lie_under_paths(intersection: Intersection) -> None:
     asphalt = shapely.Polygon(drawing.outline(intersection, 100.0))
     assert asphalt.is_valid
     vehicle = VehicleType()
     for path in intersection.paths:
         # A long body cuts the tightest corners by a few centimetres.
         assert asphalt.buffer(0.2).covers(corridor(path, vehicle))
-
-
-@pytest.mark.parametrize("intersection", INTERSECTIONS, ids=lambda i: str(i.bearings))
-def test_lanes_lie_under_their_paths(intersection: Intersection) -> None:
-    for path in intersection.paths:
         corners = drawing.lane_strip(intersection, path.movement.origin, 38.0, 8.0)
         strip = shapely.Polygon(corners)
         way = shapely.LineString(path.position([path.entry - 38.0, path.entry - 8.0]))
         assert strip.area == pytest.approx(30.0 * intersection.lane_width)
         assert way.hausdorff_distance(strip.centroid) == pytest.approx(15.0)
-        assert strip.buffer(1e-6).covers(
-            way.buffer(0.4 * intersection.lane_width, cap_style="flat")
-        )
+        wide = way.buffer(0.4 * intersection.lane_width, cap_style="flat")
+        assert strip.buffer(1e-6).covers(wide)
 
 
 def test_hold_lines_cross_the_paths_at_the_hold_distance() -> None:
@@ -164,9 +156,8 @@ def test_collisions_are_ringed(crash: Run) -> None:
     clear = film.s > film.exit[film.path] + crash.site.vehicle.length
     unharmed = set(crash.trajectories["vehicle"][clear]) - harmed
     assert film.served(150.0) == len(unharmed), "what collided was not served"
-    front = crash.site.intersection.path(
-        crash.site.intersection.parse(first.movements[0])
-    ).position(first.positions[0])
+    junction = crash.site.intersection
+    front = junction.path(junction.parse(first.movements[0])).position(first.positions[0])
     assert np.linalg.norm(ring.mean(axis=0) - front) < 6.0
 
 
@@ -251,8 +242,8 @@ def lab(colour: str, eyes: str) -> npt.NDArray[np.float64]:
 @pytest.mark.parametrize("eyes", EYES)
 def test_zones_are_told_apart_without_red_and_green(eyes: str) -> None:
     zones = list(style.ZONES.values())
-    pairs = [*itertools.combinations(zones, 2)]
-    beside = [(zone, ground) for zone in zones for ground in (style.ASPHALT, style.BLUE)]
+    pairs = [*combinations(zones, 2)]
+    beside = [*product(zones, (style.ASPHALT, style.BLUE))]
     for least, close in ((20.0, pairs), (15.0, beside)):
         for one, other in close:
             assert np.linalg.norm(lab(one, eyes) - lab(other, eyes)) >= least
@@ -283,7 +274,7 @@ images = st.lists(
 
 
 def palette_for(frames: list[Image.Image]) -> Image.Image:
-    """A palette of all pictures at once: four levels a channel, few enough to change none."""
+    """A palette of all pictures at once: four levels per channel, few enough to change none."""
     strip = Image.new("RGB", (4, 4 * len(frames)))
     for k, frame in enumerate(frames):
         strip.paste(frame, (0, 4 * k))
@@ -417,9 +408,14 @@ def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> N
     assert (len(graph.lines), len(strong)) == (len(explanation.edges), 1)
     assert any(t.get_text() == "Right of way: a1, b2" for t in figure.texts)
     (zones,) = figure.legends
-    assert [t.get_text() for t in zones.get_texts()] == [
-            "red 38–8 m", "yellow 8–2 m", "green 2–0 m",
-        ]  # fmt: skip
+    words = ["red 38–8 m", "yellow 8–2 m", "green 2–0 m"]
+    assert [t.get_text() for t in zones.get_texts()] == words
+    # c2 and d2 cross at (-w/2, w/2), b2 and c2 at (-w/2, -w/2) for lanes w wide; a1 joins d2.
+    half = site.intersection.lane_width / 2.0
+    (marks,) = [line for line in scene.lines if line.get_marker() == "x"]
+    crossed = {tuple(point) for point in np.round(marks.get_xydata(), 6)}
+    assert len(crossed) == 3
+    assert crossed >= {(-half, half), (-half, -half)}
     figure.draw_without_rendering()
     boxes = [t.get_window_extent() for t in (*scene.texts, *graph.texts, *figure.texts)]
     assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 for box in boxes)

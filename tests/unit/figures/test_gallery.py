@@ -245,9 +245,8 @@ def test_capacity_table_has_what_the_rows_hold(archive: Archive) -> None:
 
 def test_table_formats(tmp_path: Path) -> None:
     table = Table("50 % & more", ("a_b", "c"), (("x", "1 ± 2"),), notes=("≥ 3",))
-    assert (
-        table.markdown() == "**50 % & more**\n\n| a_b | c |\n| --- | ---: |\n| x | 1 ± 2 |\n\n≥ 3\n"
-    )
+    text = "**50 % & more**\n\n| a_b | c |\n| --- | ---: |\n| x | 1 ± 2 |\n\n≥ 3\n"
+    assert table.markdown() == text
     assert list(csv.reader(io.StringIO(table.csv()))) == [["a_b", "c"], ["x", "1 ± 2"]]
     latex = table.latex()
     assert r"\caption{50 \% \& more}" in latex
@@ -293,11 +292,8 @@ def test_a_report_on_one_study_has_nothing_of_others(
 ) -> None:
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
     made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
-    count = report.write_report(
-        Archive(synthetic_find, EFFORT), made, 2, tmp_path, lambda done, total: None,
-        parts=("gate",),
-    )  # fmt: skip
-    assert count == 1
+    archive = Archive(synthetic_find, EFFORT)
+    assert report.write_report(archive, made, 2, tmp_path, lambda *_: None, parts=("gate",)) == 1
     assert {file.stem for file in (tmp_path / "figures").iterdir()} == {"gate"}
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
     headings = [line.removeprefix("## ") for line in text.splitlines() if line.startswith("## ")]
@@ -318,8 +314,7 @@ def test_collisions_of_published_rules_have_their_cause(tmp_path: Path) -> None:
     assert "- `as-run`: A smoke test: its numbers mean nothing. " in text
 
 
-def test_the_report_keeps_its_appendix_for_the_end() -> None:
-    assert [section.appendix for section in SECTIONS] == sorted(s.appendix for s in SECTIONS)
+def test_no_two_drawings_have_the_same_name() -> None:
     names = [item.name for section in SECTIONS for item in section.items]
     assert len(names) == len(set(names))
 

@@ -1,36 +1,21 @@
-"""The control room: sites, plans, and what an observer can tell about a vehicle."""
+"""Sites, markings, and whether a vehicle can stop."""
 
 from __future__ import annotations
 
-import pickle
+from typing import Any
 
 import numpy as np
 import pytest
 
-from minisim.control import (
-    COMMIT_MARGIN,
-    Controller,
-    Marking,
-    Observed,
-    Plan,
-    Session,
-    Site,
-    Unregulated,
-    View,
-    can_stop,
-    stopping_distance,
-)
+from minisim.control import COMMIT_MARGIN, Marking, Plan, Site, can_stop, stopping_distance
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
+from tests.builders import seen
 
 FOUR = Intersection((0.0, 90.0, 180.0, 270.0))
 SITE = Site(FOUR, VehicleType(), speed_limit=14.0, demand=(350.0,) * 4)
-
-
-def observed(distance: float, speed: float) -> Observed:
-    return Observed(id=1, lane=2, manoeuvre=3, distance=distance, speed=speed, length=5.0)
 
 
 def test_stopping_distance_is_v_squared_over_2b() -> None:
@@ -42,17 +27,10 @@ def test_stopping_distance_is_v_squared_over_2b() -> None:
 
 def test_a_vehicle_can_stop_while_the_stopping_distance_fits_before_the_junction() -> None:
     needed = stopping_distance(10.0, 2.0) + COMMIT_MARGIN
-    assert can_stop(observed(needed + 1e-9, 10.0), 2.0)
-    assert not can_stop(observed(needed - 1e-6, 10.0), 2.0)
-
-
-def test_a_standing_vehicle_can_stop_unless_it_stands_inside() -> None:
-    assert can_stop(observed(0.0, 0.0), 2.0)
-    assert not can_stop(observed(-0.01, 0.0), 2.0)
-
-
-def test_an_observed_vehicle_has_its_movement() -> None:
-    assert observed(5.0, 1.0).movement == Movement(2, 3)
+    assert can_stop(seen(1, 2, 3, needed + 1e-9, 10.0), 2.0)
+    assert not can_stop(seen(1, 2, 3, needed - 1e-6, 10.0), 2.0)
+    assert can_stop(seen(1, 2, 3, 0.0), 2.0), "it stands"
+    assert not can_stop(seen(1, 2, 3, -0.01), 2.0), "it stands inside"
 
 
 def test_conflicts_leave_out_movements_of_one_arm() -> None:
@@ -87,28 +65,10 @@ def test_sites_are_checked(change: dict[str, object], message: str) -> None:
         Site(**{**options, "demand": (350.0,) * 4, **change})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"markings": ("red",)}, "marking must be a Marking"),
-        ({"markings": Marking("red", 30, 8)}, "markings must be a tuple"),
-    ],
-)
-def test_plans_are_checked(change: dict[str, object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Plan(**change)  # type: ignore[arg-type]
-
-
-def test_a_marking_starts_before_it_ends() -> None:
+def test_markings_are_checked() -> None:
+    wrong: Any = ("red",), Marking("red", 30, 8)
+    for markings, message in zip(wrong, ("must be a Marking", "must be a tuple"), strict=True):
+        with pytest.raises(InputError, match=message):
+            Plan(markings=markings)
     with pytest.raises(InputError, match=r"start of marking red .* above 30"):
         Marking("red", 8.0, 30.0)
-
-
-def test_unregulated_opens_every_lane_and_says_nothing() -> None:
-    controller = Unregulated()
-    session = controller.start(SITE)
-    assert isinstance(controller, Controller)
-    assert isinstance(session, Session)
-    assert session.plan.lanes_open
-    assert list(session.decide(View(0.0, (observed(5.0, 10.0),)))) == []
-    assert pickle.loads(pickle.dumps(controller)) == controller

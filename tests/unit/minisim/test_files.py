@@ -23,6 +23,7 @@ from minisim.files import (
     read_file,
     replacing,
     write_table,
+    write_text,
 )
 from minisim.recorded import read_arrivals
 from minisim.results.run import Run
@@ -41,10 +42,9 @@ def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
 
 def test_a_symbolic_link_keeps_pointing_to_the_file(tmp_path: Path) -> None:
     real, link = tmp_path / "real.txt", tmp_path / "link.txt"
-    real.write_text("old", encoding="utf-8")
+    real.touch()
     link.symlink_to(real)
-    with replacing(link) as temporary:
-        temporary.write_text("new", encoding="utf-8")
+    write_text(link, "new")
     assert link.is_symlink()
     assert real.read_text(encoding="utf-8") == "new"
 
@@ -66,18 +66,16 @@ def test_a_markdown_cell_stays_in_its_column() -> None:
     assert lines == ["| name | n |", "| --- | ---: |", r"| a\|b c | 1 |"]
 
 
-def test_a_check_leaves_no_trace(tmp_path: Path) -> None:
+def test_a_check_leaves_no_trace_and_says_what_cannot_be_written(tmp_path: Path) -> None:
     assert check_file(tmp_path / "new.xml", ".xml", ".csv") == tmp_path / "new.xml"
     assert not list(tmp_path.iterdir())
-
-
-def test_what_cannot_be_written_is_said_before(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="it is a folder"):
-        check_file(tmp_path)
-    with pytest.raises(FileError, match="there is no folder"):
-        check_file(tmp_path / "none" / "x.csv")
-    with pytest.raises(FileError, match="not an ordinary file"):
-        check_file(os.devnull)
+    for path, why in (
+        (tmp_path, "it is a folder"),
+        (tmp_path / "none" / "x.csv", "there is no folder"),
+        (os.devnull, "it is not an ordinary file"),
+    ):
+        with pytest.raises(FileError, match=f"cannot write .*: {why}"):
+            check_file(path)
     with pytest.raises(InputError, match=r"allowed: \.xml"):
         check_file(tmp_path / "x.csv", ".xml")
 

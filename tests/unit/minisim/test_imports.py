@@ -17,19 +17,21 @@ HEAVY = {"numpy", "pandas", "numba", "matplotlib", "shapely", "networkx", "pymun
 PROBE = """
 import json, sys, time
 start = time.process_time()
-import minisim
+import {}
 print(json.dumps([time.process_time() - start, sorted(sys.modules)]))
 """
 
 
-def python(code: str) -> str:
-    """Standard output of the code in a fresh interpreter."""
+def imported(name: str) -> tuple[float, set[str]]:
+    """Processor time of an import in a fresh interpreter [s], and the modules that it loads."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.check_output([sys.executable, "-c", code], text=True, env=environment)
+    told = subprocess.check_output([sys.executable, "-c", PROBE.format(name)], env=environment)
+    seconds, modules = json.loads(told)
+    return seconds, set(modules)
 
 
 def test_importing_minisim_is_quick_and_loads_nothing_heavy() -> None:
-    seconds, modules = json.loads(python(PROBE))
+    seconds, modules = imported("minisim")
     assert seconds < 0.5
     assert HEAVY.isdisjoint(modules)
 
@@ -48,17 +50,10 @@ def test_unknown_names_are_attribute_errors() -> None:
 @pytest.mark.parametrize("room", ["dim", "baselines"])
 def test_controllers_do_not_load_the_engine(room: str) -> None:
     """What import-linter proves of the source holds when it runs, too."""
-    modules = set(
-        json.loads(python(f"import json, sys, {room}; print(json.dumps([*sys.modules]))"))
-    )
-    assert {"minisim.simulation", "minisim.engine.state", "minisim.engine.kernel"}.isdisjoint(
-        modules
-    )
-    assert {"pymunk", "matplotlib", "figures", "scenarios"}.isdisjoint(modules)
+    _, modules = imported(room)
+    assert {"minisim.simulation", "minisim.engine", "minisim.results", "pymunk"}.isdisjoint(modules)
+    assert {"matplotlib", "figures", "scenarios"}.isdisjoint(modules)
 
 
 def test_the_command_line_draws_only_when_asked() -> None:
-    modules = json.loads(
-        python("import json, sys, scenarios.cli; print(json.dumps([*sys.modules]))")
-    )
-    assert "matplotlib" not in modules
+    assert "matplotlib" not in imported("scenarios.cli")[1]

@@ -6,17 +6,15 @@ import math
 
 import pytest
 
-from minisim.control import Plan, Unregulated
-from minisim.laws import Law, build_law, closeness, follow, insertable
+from minisim.control import Plan
+from minisim.laws import Law, build_law, closeness, follow, insertable, stop_at_line
 from minisim.testing import small_scenario
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 
 
 def law(model: str) -> Law:
     vehicle = CruiseVehicle() if model == "cc" else VehicleType(model=model)
-    site = small_scenario(vehicle=vehicle).site(0)
-    plan = Unregulated().start(site).plan
-    return build_law(site, plan, depart_speed=None, record=None, record_window=(0.0, math.inf))
+    return build_law(small_scenario(vehicle=vehicle).site(0), Plan())
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -49,8 +47,24 @@ def test_a_desired_speed_of_zero_is_comfortable_braking(model: str) -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_the_table_says_how_a_model_steps_and_where_it_inserts(name: str) -> None:
     assert law(name).semi_implicit == (name in ("krauss", "cc"))
-    assert law(name).margin == (0.1 if name == "cc" else 0.0)
+    assert law(name).margin == (0.1 if name == "cc" else 0.0)  # as in SUMO, where it drives so
     assert list(MODELS)[law(name).model] == name
+
+
+def test_sumos_vehicles_stop_a_metre_before_the_line_or_nearer_if_they_must() -> None:
+    """SUMO 1.18, fixed-time, balanced 150: its vehicles stand 1.001 m before a red light."""
+    signals = law("krauss")._replace(a=50.0, b=1000.0, b_max=1000.0, dt=0.01, sumo=True)
+
+    def ends(to_line: float, v: float) -> float:
+        s = signals.hold - to_line
+        for _ in range(100):
+            v = max(v + stop_at_line(v, signals.hold - s, signals) * signals.dt, 0.0)
+            s += v * signals.dt
+        return signals.hold - s
+
+    assert ends(5.0, 14.0) == pytest.approx(1.001, abs=1e-9)
+    assert ends(0.9, 14.0) == pytest.approx(0.861, abs=1e-9)  # 0.04 m are what it needs to brake
+    assert ends(0.05, 14.0) == pytest.approx(0.05)  # SUMO keeps 0.1 m, but never drives back
 
 
 def test_whole_numbers_do_not_have_the_kernels_compiled_once_more() -> None:

@@ -44,7 +44,7 @@ class Bicycle:
 
     gear: str = word("which gear", ("low", "high"), default="low", label="gear name")
     bell: bool = switch("whether it has one", default=True)
-    owner: str = text("who rides it", empty=True, default="")
+    owner: str = text("its rider", empty=True, default="")
     load: float | None = real("what it carries", "kg", low=0, optional=True, default=None)
     stops: tuple[float, ...] = reals("where it stops", "m", low=0, default=())
     front: Wheel = part("the front wheel", Wheel, kinds={"small": Wheel}, default=Wheel(0.3))
@@ -84,12 +84,6 @@ def test_what_is_not_allowed_is_one_sentence(given: dict[str, Any], message: str
     assert str(error.value).startswith(message)
 
 
-@pytest.mark.parametrize("radius", [0, 2.5, float("nan"), float("inf"), "1", True, None])
-def test_numbers_are_finite_and_in_range(radius: Any) -> None:
-    with pytest.raises(InputError, match=r"radius \[m\] must be"):
-        Wheel(radius)
-
-
 def test_values_are_kept_as_given_but_for_their_form() -> None:
     assert Bicycle(stops=[1, 2]).stops == (1.0, 2.0)
     assert repr(Wheel(1)) == "Wheel(radius=1, spokes=32)"
@@ -98,11 +92,8 @@ def test_values_are_kept_as_given_but_for_their_form() -> None:
 
 def test_parameters_tell_what_was_declared() -> None:
     radius, spokes = parameters(Wheel)
-    assert (radius.name, radius.parameter.unit, radius.default) == (
-        "radius",
-        "m",
-        dataclasses.MISSING,
-    )
+    assert (radius.name, radius.parameter.unit) == ("radius", "m")
+    assert radius.default is dataclasses.MISSING
     assert (spokes.parameter.allowed, spokes.default) == ("integer 3 … 40", 32)
     by_name = {it.name: it.parameter for it in parameters(Bicycle)}
     assert by_name["gear"].words == ("low", "high")
@@ -145,20 +136,15 @@ def test_a_subclass_keeps_the_rules_between_fields() -> None:
         Tandem(seats=1)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"radus": 1}, "unknown Wheel parameter 'radus'; allowed: radius, spokes; did you mean"),
-        ({}, "Wheel needs radius"),
-    ],
-)
-def test_arguments_that_a_class_does_not_take_are_one_sentence(
-    given: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        Wheel(**given)
+def test_arguments_that_a_class_does_not_take_are_one_sentence() -> None:
+    wheel: Any = Wheel
+    known = "unknown Wheel parameter 'radus'; allowed: radius, spokes; did you mean 'radius'"
+    with pytest.raises(InputError, match=known):
+        wheel(radus=1)
+    with pytest.raises(InputError, match="Wheel needs radius"):
+        wheel()
     with pytest.raises(InputError, match="too many positional"):
-        Wheel(1, 3, 3)  # type: ignore[call-arg]
+        wheel(1, 3, 3)
 
 
 def test_values_may_be_written_as_on_command_lines() -> None:
@@ -168,10 +154,9 @@ def test_values_may_be_written_as_on_command_lines() -> None:
     assert Bicycle(**written) == Bicycle(front=Wheel(0.5, 20), bell=False)
     table: Any = {"radius": 0.5}
     assert Bicycle(front=table).front == Wheel(0.5)
-    with pytest.raises(
-        InputError, match=r"front=small needs radius; write front=small\(radius=…\)"
-    ):
-        Bicycle(front="small")  # type: ignore[arg-type]
+    written = {"front": "small"}
+    with pytest.raises(InputError, match=r"=small needs radius; write front=small\(radius=…\)"):
+        Bicycle(**written)
 
 
 def test_a_parameter_without_effect_is_refused() -> None:

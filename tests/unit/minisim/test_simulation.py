@@ -7,7 +7,6 @@ import math
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,15 +36,22 @@ from minisim.simulation import Simulation
 from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.profiles import Profile
+from scenarios.scenario import Scenario
+from tests import ROOT
 from tests.builders import Fixed, Scripted, digest, replayed
 
 STRAIGHT = (0.0, 0, 2)
-OPEN = Plan(lanes_open=True)
+KRAUSS = dataclasses.replace(FAIR, name="krauss", vehicle=VehicleType(model="krauss"))
+
+
+def lone(profile: Profile = FAIR, horizon: float = 200.0, manoeuvre: int = 2) -> Scenario:
+    """One vehicle from lane a."""
+    return replayed(four_way(profile=profile), (0.0, 0, manoeuvre), horizon=horizon)
 
 
 @pytest.mark.parametrize("profile", [PAPER, FAIR], ids=lambda p: p.name)
 def test_free_flow_takes_length_over_speed(profile: Profile) -> None:
-    scenario = replayed(four_way(profile=profile), STRAIGHT, horizon=200.0)
+    scenario = lone(profile)
     run = minisim.simulate(scenario, Unregulated())
     path = scenario.intersection.paths[1]
     expected = (path.length - profile.vehicle.length) / profile.speed_limit
@@ -56,7 +62,7 @@ def test_free_flow_takes_length_over_speed(profile: Profile) -> None:
 
 def test_turning_vehicle_takes_the_arc_at_the_lateral_limit() -> None:
     """v = √(a_lat·r) on the arc, reached by braking at b: both closed forms."""
-    scenario = replayed(four_way(profile="fair"), (0.0, 0, 1), horizon=200.0)
+    scenario = lone(manoeuvre=1)
     run = minisim.simulate(scenario, Unregulated(), record="all")
     path = scenario.intersection.paths[0]
     limit = math.sqrt(LATERAL_ACCELERATION * path.radius)
@@ -71,26 +77,27 @@ def test_turning_vehicle_takes_the_arc_at_the_lateral_limit() -> None:
 
 
 @pytest.mark.parametrize("hold_distance", [0.0, 2.0, 40.0])
-@pytest.mark.parametrize("profile", [PAPER, FAIR], ids=lambda p: p.name)
-def test_held_vehicle_stands_just_before_its_line(hold_distance: float, profile: Profile) -> None:
-    scenario = replayed(four_way(profile=profile), STRAIGHT, horizon=120.0)
+@pytest.mark.parametrize(("profile", "spared"), [(PAPER, 0.0), (FAIR, 0.0), (KRAUSS, 0.1)])
+def test_held_vehicle_stands_just_before_its_line(
+    hold_distance: float, profile: Profile, spared: float
+) -> None:
+    """It brakes at b, or up to a tenth less if it slows in whole steps, and not too early."""
+    scenario = lone(profile, 120.0)
     run = minisim.simulate(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
     line = scenario.intersection.approach_length - hold_distance
     last = run.trajectories.iloc[-1]
     assert 0.0 <= line - last["s_m"] <= 0.3
     assert last["speed_mps"] == 0.0
     braking = run.trajectories["acceleration_mps2"].min()
-    assert braking == pytest.approx(-profile.vehicle.deceleration)
+    assert braking == pytest.approx(-profile.vehicle.deceleration, rel=spared + 1e-6)
     begins = run.trajectories.query("acceleration_mps2 < -0.01")["s_m"].iloc[0]
     needed = profile.speed_limit**2 / (2 * profile.vehicle.deceleration)
-    assert line - begins <= needed + 0.3, "brakes when it must, not earlier"
+    assert line - begins <= needed * (1.0 + spared) + 0.3
 
 
 def test_marking_slows_ahead_of_its_start_and_ends() -> None:
     slow = Plan(lanes_open=True, markings=(Marking("slow", 100.0, 50.0, 5.0),))
-    run = minisim.simulate(
-        replayed(four_way(profile="fair"), STRAIGHT, horizon=200.0), Fixed(slow), record="all"
-    )
+    run = minisim.simulate(lone(), Fixed(slow), record="all")
     entry = run.site.intersection.approach_length
     inside = run.trajectories.query(f"{entry - 100} <= s_m < {entry - 50}")["speed_mps"]
     assert inside.max() <= 5.0 + 1e-9
@@ -104,8 +111,7 @@ def test_advice_caps_the_speed_and_infinity_lifts_it() -> None:
         lambda view: [Advise(0, next(advised))] if view.time else [],
         Plan(lanes_open=True, marks=(400.0, 300.0), sight=450.0),
     )
-    scenario = replayed(four_way(profile="fair"), STRAIGHT, horizon=200.0)
-    run = minisim.simulate(scenario, advisor, record="all")
+    run = minisim.simulate(lone(), advisor, record="all")
     entry = run.site.intersection.approach_length
     capped = run.trajectories.query(f"{entry - 330} < s_m < {entry - 305}")["speed_mps"]
     assert capped.to_numpy() == pytest.approx(8.0, abs=0.3)
@@ -124,8 +130,7 @@ def braked(
     vehicle: VehicleType, script: dict[float, tuple[Command, ...]], reach: float = 60.0
 ) -> minisim.Run:
     """One vehicle at 14 m/s, straight on; it is in view up to `reach` past the entry [m]."""
-    profile = dataclasses.replace(FAIR, vehicle=vehicle)
-    scenario = replayed(four_way(profile=profile), STRAIGHT, horizon=60.0)
+    scenario = lone(dataclasses.replace(FAIR, vehicle=vehicle), 60.0)
     return minisim.simulate(scenario, timed(script, reach), record="all")
 
 
@@ -166,9 +171,8 @@ def test_braking_ends_when_lifted_and_changes_nothing_else(model: str) -> None:
 
 def test_the_harder_of_two_brakings_counts() -> None:
     """A vehicle held at its line at 4.5 m/s² is not braked more softly by a command of 1."""
-    scenario = replayed(four_way(profile="fair"), STRAIGHT, horizon=60.0)
-    held = minisim.simulate(scenario, Fixed(Plan()), record="all").trace["a"].min()
-    told = minisim.simulate(scenario, timed({33.0: (Brake(0, 1.0),)}, is_open=False), record="all")
+    held = minisim.simulate(lone(), Fixed(Plan()), record="all").trace["a"].min()
+    told = minisim.simulate(lone(), timed({33.0: (Brake(0, 1.0),)}, is_open=False), record="all")
     assert told.trace["a"].min() == pytest.approx(held) == pytest.approx(-4.5)
 
 
@@ -182,18 +186,14 @@ def test_braking_ends_when_the_vehicle_leaves_the_view() -> None:
     assert digest(gone) == digest(free)
 
 
-def test_queue_stands_at_the_minimum_gap() -> None:
+@pytest.mark.parametrize(("profile", "error"), [(FAIR, 0.2), (KRAUSS, 0.01)])
+def test_queue_stands_at_the_minimum_gap(profile: Profile, error: float) -> None:
     trips = [(10.0 * k, 0, 2) for k in range(4)]
-    run = minisim.simulate(
-        replayed(four_way(profile="fair"), *trips, horizon=200.0), Fixed(), record="all"
-    )
+    scenario = replayed(four_way(profile=profile), *trips, horizon=200.0)
+    run = minisim.simulate(scenario, Fixed(), record="all")
     s = run.trajectories.groupby("vehicle")["s_m"].last().to_numpy()
-    gaps = s[:-1] - FAIR.vehicle.length - s[1:]
-    assert gaps == pytest.approx(FAIR.vehicle.min_gap, abs=0.2)
-    waited = minisim.simulate(
-        replayed(four_way(profile="fair"), *trips, horizon=200.0), Fixed()
-    ).summary()["complete"]["waiting_time_s"]
-    assert waited > 100.0
+    assert s[:-1] - 5.0 - s[1:] == pytest.approx(profile.vehicle.min_gap, abs=error)
+    assert run.summary()["complete"]["waiting_time_s"] > 100.0
 
 
 def test_insertion_is_fifo_and_delay_grows_when_the_road_is_full() -> None:
@@ -230,9 +230,8 @@ def test_hold_after_the_hold_line_stops_before_the_junction() -> None:
         return [Hold(0)] if view.vehicles[0].distance < 11.0 else []
 
     revoking = Scripted(revoke, Plan(hold_distance=20.0, marks=(20.0, 10.0), sight=60.0))
-    slow = dataclasses.replace(FAIR, speed_limit=6.0)
-    scenario = replayed(four_way(profile=slow), STRAIGHT, horizon=300.0)
-    run = minisim.simulate(scenario, revoking, record="all")
+    slow = lone(dataclasses.replace(FAIR, speed_limit=6.0), 300.0)
+    run = minisim.simulate(slow, revoking, record="all")
     distance = run.site.intersection.approach_length - run.trajectories["s_m"].iloc[-1]
     assert 10.0 - 6.0**2 / 9.0 - 0.6 - 0.3 < distance < 10.0 - 6.0**2 / 9.0 + 0.3
     assert run.trajectories["speed_mps"].iloc[-1] == 0.0
@@ -269,18 +268,13 @@ def test_collision_stops_the_run_with_a_replayable_report() -> None:
     again = caught.value.replay(seconds=5.0)
     assert again.collisions == (collision,)
     assert again.trajectories["time_s"].min() == pytest.approx(collision.time - 5.0, abs=0.11)
-
-
-def test_collision_is_recorded_once_when_asked() -> None:
-    scenario = replayed(four_way(), (0.0, 0, 2), (0.0, 1, 2), horizon=100.0)
     run = minisim.simulate(scenario, Unregulated(), on_collision="record")
-    assert len(run.collisions) == 1
-    assert run.summary()["collisions"] == 1
+    assert len(run.collisions) == run.summary()["collisions"] == 1
     assert run.columns.arrived.all()
 
 
 def test_overlap_in_a_lane_is_a_collision_that_no_floor_hides() -> None:
-    """The law does not let it happen, so the follower is put where it must not be."""
+    """The law does not let it happen, so the follower is put into its leader."""
     scenario = replayed(four_way(), (0.0, 0, 2), (5.0, 0, 2), horizon=100.0)
     sim = Simulation(scenario, Unregulated())
     sim.advance(20.0)
@@ -305,35 +299,24 @@ def test_metrics_come_in_two_forms() -> None:
     assert set(MEANS) <= set(complete)
 
 
-def test_trip_table_has_the_documented_columns_in_demand_order() -> None:
-    run = minisim.simulate(four_way(150, horizon=600.0), Dim(), seed=5)
+def test_a_run_has_the_documented_columns_and_keys() -> None:
+    run = minisim.simulate(three_way(100, horizon=300.0), Dim(), seed=2)
     assert tuple(run.trips.columns) == TRIP_COLUMNS
     assert run.trips["demand_time_s"].is_monotonic_increasing
-    assert set(run.trips["lane"]) <= set("abcd")
     assert run.trips["vehicle"].tolist() == list(range(len(run.trips)))
     ended = run.trips.dropna()
-    assert (ended["arrival_s"] - ended["depart_s"]).to_numpy() == pytest.approx(
-        ended["travel_time_s"].to_numpy()
-    )
-
-
-def test_summary_has_the_documented_keys() -> None:
-    summary = minisim.simulate(three_way(100, horizon=300.0), Dim(), seed=2).summary()
+    travel = (ended["arrival_s"] - ended["depart_s"]).to_numpy()
+    assert travel == pytest.approx(ended["travel_time_s"].to_numpy())
     documented = (
         "controller scenario profile density seed horizon_s trips unfinished waiting_time_s "
         "travel_time_s depart_delay_s lanes collisions complete"
     )
-    assert set(documented.split()) <= set(summary)
-    assert set(summary["lanes"]) == {"a", "b", "c"}
+    assert set(documented.split()) <= set(run.summary())
+    assert set(run.summary()["lanes"]) == set(run.trips["lane"]) == {"a", "b", "c"}
 
 
-def test_same_seed_same_bytes_in_two_processes() -> None:
-    assert _digest_elsewhere() == _digest_elsewhere(PYTHONHASHSEED="7")
-
-
-def test_compiled_and_plain_kernel_give_equal_runs() -> None:
-    """Bytes of trips and trajectories, with numba and without."""
-    assert _digest_elsewhere() == _digest_elsewhere(MINISIM_JIT="0")
+def test_a_seed_gives_the_same_bytes_in_two_processes_compiled_and_plain() -> None:
+    assert _digest_elsewhere() == _digest_elsewhere(PYTHONHASHSEED="7", MINISIM_JIT="0")
 
 
 def test_advancing_in_pieces_is_the_same_run() -> None:
@@ -350,8 +333,8 @@ def test_advancing_in_pieces_is_the_same_run() -> None:
     ("arguments", "message"),
     [
         ({"scenario": "four-way"}, "scenario must be"),
-        ({"controller": "dim"}, "is no controller"),
-        ({"controller": Dim}, "is no controller"),
+        ({"controller": "dim"}, "is not a controller"),
+        ({"controller": Dim}, "is not a controller"),
         ({"seed": -1}, "seed"),
         ({"seed": 1.5}, "seed"),
         ({"record": "everything"}, "record"),
@@ -374,9 +357,8 @@ def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> 
     ids=repr,
 )  # fmt: skip
 def test_bad_commands_are_named(command: object) -> None:
-    scenario = replayed(four_way(), STRAIGHT, horizon=10.0)
     with pytest.raises(ControllerError, match="fixed"):
-        minisim.simulate(scenario, Fixed(first=(command,)))
+        minisim.simulate(lone(horizon=10.0), Fixed(first=(command,)))
 
 
 def test_trajectories_need_a_recording() -> None:
@@ -394,7 +376,7 @@ def test_recording_the_junction_is_part_of_recording_all() -> None:
 
 
 def _digest_elsewhere(**environment: str) -> str:
-    """Digest of three short runs in a process of its own."""
+    """Digest of four short runs in a process of its own."""
     code = """
 import minisim
 from dim import Dim
@@ -405,19 +387,15 @@ for scenario, controller in (
     (four_way(350, horizon=150.0, arm_length=200.0), Dim()),
     (five_way(300, horizon=120.0, arm_length=200.0, profile="fair"), Dim(gate="harmonious")),
     (three_way(350, horizon=120.0, arm_length=200.0), FixedTime()),
+    (four_way(300, profile="as_run_signals", horizon=60.0), FixedTime(greens=7.0)),
 ):
     print(digest(minisim.simulate(scenario, controller, seed=11, record="all")))
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, **environment},
+    told = subprocess.check_output(
+        [sys.executable, "-c", code], text=True, cwd=ROOT, env={**os.environ, **environment}
     )
-    assert len(done.stdout.split()) == 3
-    return done.stdout
+    assert len(told.split()) == 4
+    return told
 
 
 @pytest.mark.parametrize("model", ["idm", "iidm"])
@@ -426,9 +404,7 @@ def test_advised_to_stand_a_follower_still_brakes_for_its_leader(model: str) -> 
     vehicle = VehicleType(deceleration=1.5, acceleration=3.0, max_deceleration=6.0, model=model)
     profile = Profile(name="test", vehicle=vehicle, speed_limit=14.0)
     scenario = replayed(four_way(100, profile=profile), (0.0, 0, 2), (0.0, 0, 2), horizon=120.0)
-    simulation = Simulation(
-        scenario, Fixed(Plan(lanes_open=True)), record="all", on_collision="record"
-    )
+    simulation = Simulation(scenario, Fixed(Plan(lanes_open=True)), on_collision="record")
     simulation.advance(20.0)
     rows = simulation._vehicles
     rows["v"][0], rows["advice"][:] = 2.0, 0.0  # the leader, suddenly slow

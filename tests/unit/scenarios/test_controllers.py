@@ -23,6 +23,8 @@ from scenarios.controllers import (
     unused_plugins,
 )
 
+NOISY = Dim(perception=NoisyPerception(0.1))
+
 
 @pytest.mark.parametrize("name", [*CONTROLLERS, *VARIANTS])
 def test_names_are_spellings(name: str) -> None:
@@ -51,20 +53,16 @@ def test_the_paper_s_four_come_first_among_the_rivals() -> None:
         ("fixed-time:order=(c,b,a,d)", FixedTime(order=(2, 1, 0, 3))),
         ("dim:zones=zones(green=3)", Dim(zones=Zones(green=3))),
         ("fixed-time:equal_greens=TRUE", FixedTime(equal_greens=True)),
-        ("fixed-time:all_red=1,greens=[5,6.5,7,8]",
-         FixedTime(all_red=1, greens=(5, 6.5, 7, 8))),
+        ("fixed-time:greens=[5,6.5,7,8]", FixedTime(greens=(5, 6.5, 7, 8))),
         ("dim-as-run:names='acbd'", AsRunDim(names="acbd")),
         ("baselines:FixedTime(amber=3)", FixedTime(amber=3)),
         ("baselines.signals.fixed_time:FixedTime(5)", FixedTime(5)),
         ({"name": "dim", "gate": "harmonious"}, Dim(gate="harmonious")),
         ({"name": "dim", "monitor": "on", "period": "none"}, Dim(monitor=Monitor())),
         ({"name": "dim:gate=harmonious", "order": "lanes"}, Dim(order="lanes", gate="harmonious")),
-        ({"name": "dim", "perception": {"name": "noisy", "intent_error": 0.15}},
-         Dim(perception=NoisyPerception(0.15))),
-        ({"name": "dim", "perception": "noisy(delay=0.1)"},
-         Dim(perception=NoisyPerception(delay=0.1))),
-        ({"name": "dim", "perception": NoisyPerception(0.1)},
-         Dim(perception=NoisyPerception(0.1))),
+        ({"name": "dim", "perception": {"name": "noisy", "intent_error": 0.1}}, NOISY),
+        ({"name": "dim", "perception": "noisy(intent_error=0.1)"}, NOISY),
+        ({"name": "dim", "perception": NoisyPerception(0.1)}, NOISY),
         (Dim(order="lanes"), Dim(order="lanes")),
     ],
 )  # fmt: skip
@@ -83,7 +81,6 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
     ("spec", "message"),
     [
         ("dum", "unknown controller 'dum'; allowed: dim, .*; did you mean 'dim'"),
-        ("dum:gate=clear", "unknown controller 'dum'.*; did you mean 'dim'"),
         ("dim:gat=clear", "unknown dim parameter 'gat'.*; did you mean 'gate'"),
         ("dim:gate=harmonius", "dim: unknown gate 'harmonius'.*; did you mean 'harmonious'"),
         ("dim:gate=harmonious(k=1)", r"unknown gate harmonious\(k=1\)"),
@@ -95,7 +92,6 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("dim:perception=noisy(knd=1)", "unknown perception=noisy parameter 'knd'.*mean 'kind'"),
         ("dim:gate=clear,gate=clear", "dim is given gate twice"),
         ("dim:gate", "written dim:key=value,key=value, got 'dim:gate'"),
-        ("dim:", "written dim:key=value"),
         ("dim:gate=", "cannot read 'gate=', the parameters of dim"),
         ("dim:a=b)(c", "cannot read"),
         ("dim:gate=1+1", r"cannot read '1\+1' among the parameters of dim"),
@@ -106,39 +102,29 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("DIM", "unknown controller 'DIM'.*or a class of your own.*; did you mean 'dim'"),
         ("DIM:gate=clear", "cannot read controller .*; did you mean 'dim:gate=clear'"),
         ("dim(gate=clear)", "; did you mean 'dim:gate=clear'"),
-        ("dim gate=clear", "; did you mean 'dim:gate=clear'"),
         ("dim:gate=clear,", "the parameters of dim end with a comma"),
-        ("dim:monitor=on(patience=3,)", "the parameters of on end with a comma"),
         ("dim:monitor=on(patience=3", "cannot read .*; a bracket is missing"),
         ("dim:perception=none", "perception must be exact, noisy or a Perception, got None"),
         ("dim:perception=noisy(shared=no)", "shared must be true or false, got 'no'"),
         ("dim:matrix=paper", r"matrix=paper needs n; write matrix=paper\(n=…\)"),
-        ("dim:matrix=file", r"matrix=file needs path; write matrix=file\(path=…\)"),
-        (
-            "dim:matrix=file(my/m.csv)",
-            "cannot read 'my/m.csv' .* quoted texts such as 'my/file.csv'",
-        ),
+        ("dim:matrix=file(my/m.csv)", "cannot read 'my/m.csv' .* quoted texts such as 'my/file."),
         ("dim:matrix=file(/m.csv)", "cannot read .* paths in quotes"),
         ("dim:turn_time=5", "turn_time has an effect only with priorities=rotating or waiting"),
         ("dim:priorities=rotating,sensor_range=90", "sensor_range .* only with priorities=waiting"),
         ("fixed-time:greens=5,max_cycle=99", "max_cycle has an effect only with Webster's greens"),
-        ("fixed-time:greens=5,lost_time=1", "lost_time has an effect only with Webster's greens"),
-        ("fixed-time:max_cycle=5", "max_cycle .* at least 6"),
         ("adaptive:order=(a,z)", "unknown lane in order 'z'"),
         ("mine.Fast", "; did you mean 'mine:Fast'"),
         ("pkg.mine.Fast(k=3)", r"; did you mean 'pkg.mine:Fast\(k=3\)'"),
         ("mine:Fast(k=(1,2)", "the parameters of mine:Fast: .*; a bracket is missing"),
         ("mine:Fast(k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
         ("mine:Fast:k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
-        ("mine:Fast k=3", r"; did you mean 'mine:Fast\(k=3\)'"),
         ("one-at-a-time:sight=60", "unknown controller 'one-at-a-time'.*or a class of your own"),
-        ("os:PathLike", "os:PathLike is no controller: it has no name and no start"),
-        ("minisim.control:Controller", "Controller is no controller: it is a class"),
-        ({"gate": "clear"}, "needs a name"),
+        ("os:PathLike", "os:PathLike is not a controller: it has no name and no start"),
+        ("minisim.control:Controller", "Controller is not a controller: it is a class"),
         ({"name": 3}, "needs a name"),
         ({"name": "dim", "gate": 3}, "unknown gate 3"),
-        (Dim, "is no controller: it is a class"),
-        (5, "5 is no controller: it has no name and no start"),
+        (Dim, "is not a controller: it is a class"),
+        (5, "5 is not a controller: it has no name and no start"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(spec: Any, message: str) -> None:
@@ -167,14 +153,14 @@ def _no_plugins_left() -> Any:
 
 
 def test_installed_packages_add_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    plugin(monkeypatch, ("webster", "baselines:FixedTime"), ("dim", "baselines:FixedTime"))
+    plugin(monkeypatch, ("webster", "baselines:FixedTime"))
     assert controller_named("webster:amber=3") == FixedTime(amber=3)
-    assert controller_named("dim") == Dim(), "ours are not hidden"
 
 
 def test_names_that_are_taken_are_listed_as_unused(monkeypatch: pytest.MonkeyPatch) -> None:
     twice = ("own", "baselines:FixedTime"), ("own", "baselines:Adaptive")
     plugin(monkeypatch, ("dim", "baselines:FixedTime"), *twice)
+    assert controller_named("dim") == Dim(), "ours are not hidden"
     assert controller_named("own") == FixedTime()
     assert unused_plugins() == {
         "dim of minisim-extra": "not used: minisim has a controller of that name",
@@ -182,9 +168,9 @@ def test_names_that_are_taken_are_listed_as_unused(monkeypatch: pytest.MonkeyPat
     }
 
 
-def test_a_registered_class_that_is_no_controller(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_registered_class_that_is_not_a_controller(monkeypatch: pytest.MonkeyPatch) -> None:
     plugin(monkeypatch, ("extra", "os:PathLike"))
-    with pytest.raises(InputError, match="extra is no controller: it has no name and no start"):
+    with pytest.raises(InputError, match="extra is not a controller: it has no name and no start"):
         controller_named("extra")
 
 

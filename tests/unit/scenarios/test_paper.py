@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections.abc import Iterable
 
 import pytest
 
@@ -17,6 +18,7 @@ from minisim.errors import InputError
 from minisim.junction.movements import Movement
 from scenarios.paper import (
     BASELINE_GRID,
+    DENSITIES,
     GREENS,
     GRID,
     PHASES,
@@ -28,36 +30,21 @@ from scenarios.paper import (
     replay,
     scenario,
 )
-from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
+from scenarios.profiles import AS_RUN, AS_RUN_OBEYING, AS_RUN_SIGNALS
 from scenarios.published import published_arrivals, published_ways
 from tests.builders import reference_value
 
-#: Means of SUMO 1.18 on the same arrivals: waiting and travel [s]. Where no vehicle was teleported
-#: they are the published ones, to the last digit.
+#: Means of SUMO 1.18 on the same arrivals, waiting and travel [s], where they are not the published
+#: ones to the last digit: vehicles were teleported, or the paper rounds (balanced, 4 arms).
 SUMO = {
-    Cell("balanced", 150, 3): (0.3113, 64.7888),
-    Cell("balanced", 200, 3): (0.4536, 65.1907),
-    Cell("balanced", 250, 3): (0.5359, 65.5841),
-    Cell("balanced", 300, 3): (0.9524, 67.2984),
-    Cell("balanced", 350, 3): (1.0447, 67.8727),
     Cell("balanced", 150, 4): (0.7084, 65.9427),
     Cell("balanced", 200, 4): (1.3676, 68.0629),
     Cell("balanced", 250, 4): (1.5513, 68.8290),
     Cell("balanced", 300, 4): (2.2580, 71.3836),
     Cell("balanced", 350, 4): (3.9578, 80.3505),
-    Cell("balanced", 150, 5): (0.9820, 66.5304),
-    Cell("balanced", 200, 5): (1.8261, 69.2819),
     Cell("balanced", 250, 5): (3.9285, 76.3352),
     Cell("balanced", 300, 5): (10.2468, 98.2507),
-    Cell("balanced", 350, 5): (25.5077, 153.6784),
-    Cell("4:1:4:1", 150, 4): (0.5097, 65.6543),
     Cell("4:1:4:1", 200, 4): (1.0816, 67.6040),
-    Cell("4:1:4:1", 250, 4): (1.5082, 69.1067),
-    Cell("4:1:4:1", 300, 4): (2.1333, 71.3460),
-    Cell("4:1:4:1", 350, 4): (4.3662, 80.7408),
-    Cell("4:3:2:1", 150, 4): (0.6656, 65.9373),
-    Cell("4:3:2:1", 200, 4): (1.0305, 67.2343),
-    Cell("4:3:2:1", 250, 4): (1.4195, 68.5731),
     Cell("4:3:2:1", 300, 4): (2.0152, 71.0457),
     Cell("4:3:2:1", 350, 4): (4.5474, 79.5909),
 }
@@ -100,12 +87,6 @@ def test_every_run_can_be_set_up_and_replayed() -> None:
             assert (arrivals.time % 1.0).max() == pytest.approx(0.01, abs=1e-9)
 
 
-def test_drawn_scenarios_of_the_grid_have_the_split() -> None:
-    what = scenario("4:3:2:1", 300, 4, profile="fair")
-    assert what.rates == pytest.approx((480, 360, 240, 120))
-    assert what.profile_name == "fair"
-
-
 def test_reference_numbers() -> None:
     cell = Cell("balanced", 350, 4)
     assert reference_value(cell, "waiting_time_s") == 3.9629
@@ -131,13 +112,10 @@ def test_runs_that_were_not_published(cell: Cell, message: str) -> None:
     for ask in (scenario, replay, controller_of):
         with pytest.raises(InputError, match=message):
             ask(*cell)
-
-
-def test_ways_and_arrivals_that_were_not_published() -> None:
-    with pytest.raises(InputError, match="published junction"):
-        published_ways(6)
     with pytest.raises(InputError, match="published run"):
         published_arrivals("balanced", 100, 4)
+    with pytest.raises(InputError, match="published junction"):
+        published_ways(6)
 
 
 # --- what ran ----------------------------------------------------------------------------------
@@ -182,16 +160,17 @@ def test_each_run_has_its_vehicle() -> None:
 
     assert profile("fts", "balanced") == profile("ats", "4:1:4:1") == AS_RUN_SIGNALS
     assert profile("dim", "4:3:2:1") == profile("v2ic", "balanced") == AS_RUN
-    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN
+    assert profile("fts", "4:3:2:1") == profile("fts", "4:1:4:1") == AS_RUN_OBEYING
     assert profile("fts", "4:3:2:1", as_labelled=True) == AS_RUN_SIGNALS
 
 
 def test_the_adaptive_signal_was_an_actuated_one_at_4321() -> None:
     """as_run.md, discrepancy 12; the phases come in the order of the authors' network."""
-    assert controller_of("balanced", 150, 4, "ats") == Adaptive(order=PHASES)
-    assert controller_of("4:1:4:1", 150, 4, "ats") == Adaptive(order=PHASES)
-    assert controller_of("4:3:2:1", 150, 4, "ats") == Actuated(order=PHASES, presence=False)
-    assert controller_of("4:3:2:1", 150, 4, "ats", as_labelled=True) == Adaptive(order=PHASES)
+    for split in SPLITS:
+        assert controller_of(split, 150, 4, "ats", as_labelled=True) == Adaptive(order=PHASES)
+        actuated = Actuated(order=PHASES, presence=False)
+        wanted = actuated if split == "4:3:2:1" else Adaptive(order=PHASES)
+        assert controller_of(split, 150, 4, "ats") == wanted
 
 
 def test_the_names_of_arms_decide_which_lane_is_first() -> None:
@@ -203,23 +182,6 @@ def test_the_names_of_arms_decide_which_lane_is_first() -> None:
     assert {str(m) for m in winner(matrix, case, "lanes", "acbd")} == {"c1"}
     assert controller_of("4:1:4:1", 200, 4) == AsRunDim(names="acbd")
     assert controller_of("4:3:2:1", 200, 4) == AsRunDim()
-
-
-def test_the_names_of_arms_are_checked() -> None:
-    with pytest.raises(InputError, match="names must be different letters"):
-        AsRunDim(names="abca")
-    with pytest.raises(InputError, match="names must be 4 letters"):
-        AsRunDim(names="abc").start(scenario("balanced", 150, 4).site())
-
-
-def test_phases_come_in_the_given_order() -> None:
-    what = scenario("balanced", 150, 4, "fts")
-    program = controller_of("balanced", 150, 4, "fts").start(what.site())._program  # type: ignore[attr-defined]
-    assert tuple(program._order) == (2, 1, 0, 3)
-    with pytest.raises(InputError, match="order must be the lanes a … d"):
-        FixedTime(order=(0, 1, 2)).start(what.site())
-    with pytest.raises(InputError, match="lane in order"):
-        FixedTime(order=(0, 1.5, 2, 3))  # type: ignore[arg-type]
 
 
 # --- replays -------------------------------------------------------------------------------------
@@ -238,29 +200,33 @@ def means(cell: Cell, seed: int = 0) -> tuple[float, float]:
 
 def published(cell: Cell, rel: float, travel: float) -> tuple[object, object]:
     """The published means, within a share of the wait and some seconds of the travel time."""
-    return (
-        pytest.approx(reference_value(cell, "waiting_time_s"), rel=rel),
-        pytest.approx(reference_value(cell, "travel_time_s"), abs=travel),
+    wait_s, travel_s = published_means(cell)
+    return pytest.approx(wait_s, rel=rel), pytest.approx(travel_s, abs=travel)
+
+
+def published_means(cell: Cell) -> tuple[float, float]:
+    return reference_value(cell, "waiting_time_s"), reference_value(cell, "travel_time_s")
+
+
+def cells(grid: Iterable[Cell], *quick: tuple[str, int, int]) -> pytest.MarkDecorator:
+    """Parametrise by the cells of a grid; all but the `quick` ones are slow: hours of traffic."""
+    marks = {cell: () if cell[:3] in quick else pytest.mark.slow for cell in grid}
+    return pytest.mark.parametrize(
+        "cell", [pytest.param(cell, marks=mark) for cell, mark in marks.items()], ids=str
     )
 
 
-QUICK = [Cell("balanced", 150, 3), Cell("balanced", 150, 4), Cell("4:1:4:1", 350, 4)]
-
-
-@pytest.mark.parametrize(
-    "cell",
-    [cell if cell in QUICK else pytest.param(cell, marks=pytest.mark.slow) for cell in SUMO],
-    ids=str,
-)
+@cells(GRID, ("balanced", 150, 3), ("balanced", 150, 4), ("4:1:4:1", 350, 4))
 def test_replays_of_dim_are_those_of_sumo_1_18_and_meet_the_published_means(cell: Cell) -> None:
     """Wait within 10 %, travel within 0.5 s (as_run.md); far closer in fact."""
     ours = means(cell)
     assert ours == published(cell, rel=0.02, travel=0.06)
     # SUMO's trips are rounded to 0.01 s, and its means to four decimals.
-    assert ours == pytest.approx(SUMO[cell], abs=2e-2 if cell == PARTS else 2e-4)
+    theirs = SUMO.get(cell, published_means(cell))
+    assert ours == pytest.approx(theirs, abs=2e-2 if cell == PARTS else 2e-4)
 
 
-@pytest.mark.parametrize("density", [150, 200, 250, 300, 350])
+@pytest.mark.parametrize("density", DENSITIES)
 def test_replays_of_the_fixed_signal_meet_the_published_means(density: int) -> None:
     """Wait within 10 % (as_run.md); travel within 2.5 s: drivers' speed factors are not on record,
     and minisim follows vehicles that turn off longer than SUMO does (tests/sumo/test_krauss.py).
@@ -269,17 +235,16 @@ def test_replays_of_the_fixed_signal_meet_the_published_means(density: int) -> N
     assert means(cell) == published(cell, rel=0.10, travel=2.5)
 
 
-@pytest.mark.parametrize("split", SPLITS)
-@pytest.mark.parametrize(("density", "allowed"), [(150, 0.10), (250, 0.10), (350, 0.13)])
-def test_replays_of_the_adaptive_signal_meet_the_published_means(
-    split: str, density: int, allowed: float
-) -> None:
+@cells(
+    [Cell(split, density, 4, "ats") for split in SPLITS for density in (150, 250, 350)],
+    ("balanced", 350, 4), ("4:3:2:1", 250, 4), ("4:1:4:1", 150, 4),
+)  # fmt: skip
+def test_replays_of_the_adaptive_signal_meet_the_published_means(cell: Cell) -> None:
     """Wait within 10 %, travel within 2 s (as_run.md), over three drawings of drivers' factors.
 
     At 350 ours wait 12 % longer: SUMO 1.28 with the same factors waits 4 % longer than published;
     another 5 % is that our heads turn green only when the junction is clear.
     """
-    cell = Cell(split, density, 4, "ats")
     waits, travels = zip(*(means(cell, seed) for seed in range(3)), strict=True)
     ours = statistics.fmean(waits), statistics.fmean(travels)
-    assert ours == published(cell, rel=allowed, travel=2.0)
+    assert ours == published(cell, rel=0.13 if cell.density == 350 else 0.10, travel=2.0)

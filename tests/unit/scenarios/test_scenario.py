@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -33,11 +31,6 @@ def test_paper_profile_is_what_the_text_prescribes() -> None:
     assert PAPER.vehicle.deceleration == 2.0
 
 
-def test_fair_profile_is_sumos_passenger_car_on_the_authors_roads() -> None:
-    assert FAIR.vehicle == VehicleType()
-    assert FAIR.speed_limit == 14.0
-
-
 def test_profiles_are_found_by_name() -> None:
     assert set(PROFILES) >= {"paper", "fair"}
     for name, profile in PROFILES.items():
@@ -53,10 +46,9 @@ def test_site_carries_everything_a_controller_may_know() -> None:
         name="x", intersection=FOUR, demand=Demand(density=350, split=(4, 3, 2, 1)), profile=FAIR
     )
     site = scenario.site(seed=5)
-    assert site.intersection is FOUR
-    assert (site.vehicle, site.speed_limit, site.dt) == (FAIR.vehicle, 14.0, 0.1)
+    assert (site.intersection, site.seed) == (FOUR, 5)
+    assert (site.vehicle, site.speed_limit, site.dt) == (VehicleType(), 14.0, 0.1)
     assert site.demand == pytest.approx((560.0, 420.0, 280.0, 140.0))
-    assert site.seed == 5
     assert scenario.density == pytest.approx(350.0)
 
 
@@ -94,21 +86,12 @@ def test_the_horizon_is_exclusive() -> None:
     assert len(run.trips) == 1
 
 
-def test_scenarios_are_values() -> None:
-    scenario = Scenario(name="x", intersection=FOUR, demand=DEMAND)
-    again = pickle.loads(pickle.dumps(scenario))
-    assert again == scenario
-    assert hash(again) == hash(scenario)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"warmup": 60, "horizon": 60}, r"warmup \[s\] must be below 60"),
-        ({"demand": Demand(density=350, split=(1, 1, 1))}, "split has 3 shares for 4 lanes"),
         ({"demand": Demand(density=350, turns=(1, 1))}, "turns has 2 shares for 3 manoeuvres"),
         ({"demand": Demand(density=1000, split=(1, 0, 0, 0))}, "at most 3600"),
-        ({"demand": Demand(density=900, model="shifted", min_headway=4)}, "leave no room for"),
         ({"recorded": table((0.0, 4, 1))}, "lane e is not in the geometry"),
         ({"recorded": table((0.0, 0, 4))}, "manoeuvre 4 does not exist with 4 arms"),
     ],

@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 
 from baselines.signals.heads import Colour, Heads, committed, stopping_sight
-from minisim.control import COMMIT_MARGIN, Observed, View
+from minisim.control import COMMIT_MARGIN, Observed, View, can_stop
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
 from tests.builders import said
@@ -51,7 +51,7 @@ def test_vehicles_that_cannot_stop_and_all_before_them_are_committed(
     lane: list[tuple[float, float]], those: list[int]
 ) -> None:
     vehicles = [observed(k, 0, 1, *place) for k, place in enumerate(lane)]
-    assert [v.id for v in committed(vehicles, BRAKING)] == those
+    assert [v.id for v in committed(vehicles, lambda v: can_stop(v, BRAKING))] == those
 
 
 # Heads.

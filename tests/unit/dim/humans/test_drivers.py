@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ import pytest
 from dim import Humans
 from dim.humans.drivers import TRUSTS, Drivers, Readings
 from minisim.control import Observed, Site
-from minisim.errors import InputError
 from minisim.junction.turns import Turn
-from minisim.streams import stream
 from scenarios import four_way, three_way
 from tests import builders
 
@@ -46,12 +43,6 @@ def test_drivers_do_not_depend_on_the_order_of_asking() -> None:
     assert [backwards[1, i] for i in reversed(range(1000))] == wanted[::-1]
     for other in (Drivers(Humans(deviation=0.3), 0.5, 8), forwards):
         assert wanted != [other[2, i] for i in range(1000)]
-
-
-def test_drawing_drivers_shifts_no_other_stream() -> None:
-    before = stream(7, "drivers").bytes(64)
-    human(0.5, seed=7, count=100)
-    assert stream(7, "drivers").bytes(64) == before
 
 
 def test_critical_gaps_are_log_normal_about_the_published_mean() -> None:
@@ -129,20 +120,3 @@ def test_where_no_way_leads_straight_on_silence_says_nothing() -> None:
     drivers = Drivers(Humans(), 1.0, 1)
     silent = next(i for i in range(100) if drivers[0, i].careless < 0.25)
     assert read.possible(seen(silent, 1), "silence") == [0, 1]
-
-
-def test_gaps_are_triples_and_turns_pairs() -> None:
-    for wrong, message in (
-        ({"critical_gaps": (6.2, 6.5)}, r"critical_gaps \[s\] must be 3 numbers"),
-        ({"critical_gaps": (6.2, 6.5, -1)}, r"critical_gaps \[s\]\[2\] must be at least 0"),
-        ({"follow_up": (3.3, 4.0, 61.0)}, r"follow_up \[s\]\[2\] must be .* at most 60"),
-        ({"unsignalled": (0.2, 0.2, 0.2)}, "unsignalled must be 2 numbers"),
-    ):
-        with pytest.raises(InputError, match=message):
-            Humans(**wrong)  # type: ignore[arg-type]
-
-
-def test_lists_become_tuples() -> None:
-    """As in an experiment file; a recipe must hash."""
-    gaps: Any = [5, 5, 5]
-    assert hash(Humans(critical_gaps=gaps)) == hash(Humans(critical_gaps=(5.0, 5.0, 5.0)))

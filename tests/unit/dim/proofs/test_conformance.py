@@ -40,7 +40,7 @@ def test_it_follows_a_vehicle_across() -> None:
     assert front is not None
     assert (front.manoeuvre, front.phase, front.goes) == (2, WAITING, True)
     assert checked.steps == 3  # arrive, look
-    checked.decide(view(2.0, seen(7, 1, 2, 0.1, 5.0)))
+    checked.decide(view(2.0, seen(7, 1, 2, 0.0, 5.0)))  # on the line it is not yet inside
     assert checked.state.fronts[1] == (2, COMMITTED, True)
     checked.decide(view(3.0, seen(7, 1, 2, 0.1, 0.0)))
     assert checked.state.fronts[1] == (2, WAITING, True)  # it can stop again
@@ -68,13 +68,6 @@ def test_of_two_on_one_movement_the_last_one_leaves_it() -> None:
     assert checked.state.inside == 1 << 1
     checked.decide(view(4.0))
     assert checked.state.inside == 0
-
-
-def test_on_the_line_it_is_not_yet_inside() -> None:
-    checked = session()
-    checked.decide(view(0.0, seen(7, 1, 2, 6.0, 1.0)))
-    checked.decide(view(1.0, seen(7, 1, 2, 0.0, 1.0)))
-    assert checked.state == State((None, (2, COMMITTED, True), None, None))
 
 
 def test_a_vehicle_that_appears_inside_is_refused() -> None:

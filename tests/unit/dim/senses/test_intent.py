@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dim.senses.intent import KINDS, Lane, confidence, confusion, doubts
 from dim.senses.noise import UNSIGNALLED
@@ -66,7 +64,8 @@ def test_readings_follow_the_confusion(kind: str, unsignalled: tuple[float, floa
 @pytest.mark.parametrize("kind", KINDS)
 def test_who_is_misread_at_a_small_error_is_at_a_larger_one(kind: str) -> None:
     def misread(error: float) -> set[int]:
-        return {v for v in range(500) if lane(error, kind).read(DRAWS, 1, v) != 1}
+        subject = lane(error, kind)
+        return {v for v in range(500) if subject.read(DRAWS, 1, v) != 1}
 
     assert not misread(0.0)
     assert misread(0.05) < misread(0.15) < misread(0.25)
@@ -116,8 +115,3 @@ def test_each_look_has_a_confidence_of_its_own(read: int) -> None:
 def test_what_is_never_read_is_no_doubt() -> None:
     assert doubts(((1.0, 0.0), (1.0, 0.0))) == (0.5, 0.0)
     assert doubts(((0.0, 1.0), (1.0, 0.0))) == (1.0, 1.0)
-
-
-@given(st.floats(0.0, 1.0), st.booleans(), st.floats(1e-9, 1 - 1e-9), st.floats(1e-9, 1 - 1e-9))
-def test_confidence_is_a_probability(error: float, right: bool, u: float, v: float) -> None:
-    assert 0.0 <= confidence(error, right, (u, v)) <= 1.0

@@ -154,16 +154,6 @@ def test_a_vehicle_that_must_wait_anyway_does_not_disagree(gate: str, lasts: flo
     assert tally.counts["disagreement_s"] == lasts
 
 
-def test_errors_of_intent_end_in_false_grants_disagreement_and_collisions() -> None:
-    """The experiment can fail: with one reading in four wrong, bodies touch."""
-    scenario = small_scenario(4, density=300.0, demand_time=1200.0)
-    wrong = NoisyPerception(0.25, "symmetric")
-    run = simulate(scenario, Dim(perception=wrong), 1, on_collision="record")
-    assert run.collisions
-    assert run.counts["false_grants"] >= len(run.collisions)
-    assert run.counts["disagreement_s"] > 0.0
-
-
 @pytest.mark.parametrize("confidence", [None, 0.9])
 def test_lanes_first_never_blocks_on_wrong_intents(confidence: float | None) -> None:
     """The first lane that takes part is in the clique of every case: it always goes."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import minisim
-from baselines import V2ICAsRun
-from minisim.arrivals import Arrivals
+from baselines import FixedTime, V2ICAsRun
 from minisim.carfollowing import (
     cruise_control,
     distance_control,
@@ -18,9 +18,10 @@ from minisim.carfollowing import (
     semi_implicit,
 )
 from minisim.control import Advise, Plan, Unregulated
+from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.cruise.step import accelerate
-from minisim.engine.state import DRIVING, build_lanes, build_road, build_vehicles
+from minisim.engine.state import DRIVING, Records, build_lanes, build_road, build_vehicles
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.laws import build_law
@@ -32,11 +33,6 @@ from scenarios.published import published_ways
 from tests.builders import Fixed, Scripted, replayed
 
 DT = AS_RUN.dt
-
-
-def arrivals(*rows: tuple[float, int, int]) -> Arrivals:
-    time, lane, manoeuvre = zip(*rows, strict=True)
-    return Arrivals(np.array(time, float), np.array(lane), np.array(manoeuvre))
 
 
 def scenario(*rows: tuple[float, int, int]) -> Scenario:
@@ -51,9 +47,6 @@ def trace(*rows: tuple[float, int, int], until: float, controller: object = None
     return simulation.result()
 
 
-# --- the law -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("v", "u"), [(0.0, 4.0), (10.0, 4.0), (13.0, 1.0), (14.0, 0.0), (15.0, -1.0), (20.0, -1.5)]
 )
@@ -61,12 +54,9 @@ def test_cruise_control_is_proportional_within_its_bounds(v: float, u: float) ->
     assert cruise_control(v, 14.0, 1.0, 4.0, 1.5) == pytest.approx(u)
 
 
-@pytest.mark.parametrize("v", [0.0, 5.0, 14.0])
-def test_acc_is_in_equilibrium_at_headway_and_spacing(v: float) -> None:
-    assert distance_control(v, 1.5 * v + 2.0, v, 1.5, 0.1, 2.0) == pytest.approx(0.0)
-
-
 def test_acc_answers_speed_difference_and_spacing_error() -> None:
+    for v in (0.0, 5.0, 14.0):
+        assert distance_control(v, 1.5 * v + 2.0, v, 1.5, 0.1, 2.0) == pytest.approx(0.0)
     assert distance_control(10.0, 17.0, 8.5, 1.5, 0.1, 2.0) == pytest.approx(-1.5 / 1.5)
     assert distance_control(10.0, 32.0, 10.0, 1.5, 0.1, 2.0) == pytest.approx(0.1 * 15.0 / 1.5)
 
@@ -79,17 +69,12 @@ def test_step_response_of_the_lag_is_geometric() -> None:
         assert a == pytest.approx(u * (1.0 - (1.0 - alpha) ** k))
         assert a == pytest.approx(u * (1.0 - math.exp(-k * DT / 0.5)), abs=u * DT)
 
-
-def test_without_lag_the_engine_obeys_at_once() -> None:
-    assert engine_lag(-3.0, 2.0, 0.0, DT) == 2.0
+    assert engine_lag(-3.0, 2.0, 0.0, DT) == 2.0, "without lag it obeys at once"
 
 
 def test_semi_implicit_step_moves_with_the_new_speed_and_never_reverses() -> None:
     assert semi_implicit(5.0, 10.0, -2.0, 0.1) == pytest.approx((5.98, 9.8))
     assert semi_implicit(5.0, 0.1, -2.0, 0.1) == (5.0, 0.0)
-
-
-# --- the vehicle in the kernel -------------------------------------------------------------------
 
 
 def test_a_vehicle_starts_at_rest_as_the_closed_form_says() -> None:
@@ -102,16 +87,10 @@ def test_a_vehicle_starts_at_rest_as_the_closed_form_says() -> None:
     assert frame["s_m"].to_numpy()[:200] == pytest.approx(position)
 
 
-def test_sixteen_steps_of_the_start_count_as_waiting() -> None:
-    run = minisim.simulate(scenario((0.0, 0, 2)), Unregulated())
-    assert run.summary()["waiting_time_s"] == pytest.approx(0.16)
-
-
 def test_speed_limits_mean_nothing() -> None:
     """No vehicle slows for a turn; the cruise speed holds all the way."""
     run = minisim.simulate(scenario((0.0, 0, 3)), Unregulated(), record="all")
-    frame = run.trajectories
-    inside = frame[(frame["s_m"] > 480.0) & (frame["s_m"] < 520.0)]
+    inside = run.trajectories[run.trajectories["s_m"].between(480.0, 520.0)]
     assert inside["speed_mps"].to_numpy() == pytest.approx(14.0, abs=1e-6)
     assert run.site.intersection.turn_speed(run.site.intersection.movements[2], 5.5) < 9.0
 
@@ -134,8 +113,7 @@ def test_insertion_waits_for_min_gap_and_nothing_else() -> None:
 
 
 def test_advice_of_zero_stops_within_a_metre_one_step_later() -> None:
-    """SUMO's quirk: a desired speed of 0 asks for standstill within one step, from the next on."""
-
+    """SUMO's quirk: a desired speed of 0 asks for standstill within a step, from the next on."""
     stop = Scripted(
         lambda view: [Advise(vehicle.id, 0.0) for vehicle in view.vehicles],
         Plan(lanes_open=True, marks=(100.0,), sight=100.0),
@@ -161,6 +139,7 @@ def test_closed_lanes_hold_it() -> None:
 
 def test_it_arrives_a_decimetre_before_the_end_of_the_road() -> None:
     run = minisim.simulate(scenario((0.0, 0, 2)), Unregulated(), record="all")
+    assert run.summary()["waiting_time_s"] == pytest.approx(0.16), "sixteen steps of the start"
     length = run.site.intersection.paths[1].length
     last = run.trajectories["s_m"].iloc[-1]
     assert last < length - 0.1 <= last + 14.0 * DT + 1e-6
@@ -171,9 +150,6 @@ def test_cruise_control_and_model_go_together() -> None:
         VehicleType(model="cc")
     with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
         CruiseVehicle(model="idm")
-
-
-# --- which vehicle is followed -------------------------------------------------------------------
 
 
 def test_a_vehicle_bound_for_the_same_exit_slows_the_first_of_another_lane() -> None:
@@ -205,8 +181,9 @@ def chosen(
     14 m/s before it.
     """
     profile = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, sumo=sumo))
-    demanded = arrivals(*((0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars))
-    what = replace(MAKERS[arms](profile="as_run", recorded=demanded), profile=profile)
+    demanded = [(0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars]
+    what = replayed(MAKERS[arms](profile="as_run"), *demanded, horizon=200.0)
+    what = replace(what, profile=profile)
     site = what.site(0)
     plan = Unregulated().start(site).plan
     road = build_road(site, plan)
@@ -266,9 +243,6 @@ def test_a_vehicle_beside_in_the_exit_lane_holds_no_other_back(
     assert chosen(d2, c3)[0] == pytest.approx(acceleration, abs=1e-6)
 
 
-# --- what the radar of SUMO 1.18 sees, and that of 1.28 does not ----------------------------------
-
-
 def asked(v: float, gap: float, v_leader: float, a: float = 0.0) -> float:
     """Acceleration of the next step behind such a leader [m/s²]."""
     return engine_lag(a, distance_control(v, gap, v_leader, 1.5, 0.1, 2.0), 0.5, DT)
@@ -317,18 +291,6 @@ def test_inside_the_one_that_must_yield_counts_from_its_waiting_position() -> No
     assert against(498.0)[0] == pytest.approx(alone[0], abs=1e-9)
 
 
-# --- the ends of the roads ------------------------------------------------------------------------
-
-
-def departs(leaving: int, back: float) -> float:
-    """Delay of a vehicle demanded on an arm that another leaves by, `back` s before its arrival."""
-    first = (0.0, (leaving + 2) % 4, 2)
-    end = trace(first, until=100.0).columns.arrival[0]
-    when = round(end - back, 2)
-    run = trace(first, (when, leaving, 2), until=when + 3.0)
-    return float(run.columns.depart[run.columns.lane == leaving][0] - when)
-
-
 @pytest.mark.parametrize(
     ("arm", "back", "delay"),
     # A vehicle at 14 m/s wants 14 m, and the turnaround of 4.67 m counts.
@@ -337,7 +299,11 @@ def departs(leaving: int, back: float) -> float:
 def test_where_the_road_leads_back_one_that_arrives_delays_an_insertion(
     arm: int, back: float, delay: float
 ) -> None:
-    assert departs(arm, back) == pytest.approx(delay)
+    """The other leaves by the same arm, `back` s after the insertion is due."""
+    first = (0.0, (arm + 2) % 4, 2)
+    when = round(trace(first, until=100.0).columns.arrival[0] - back, 2)
+    columns = trace(first, (when, arm, 2), until=when + 3.0).columns
+    assert columns.depart[columns.lane == arm][0] - when == pytest.approx(delay)
 
 
 def test_teleport_takes_the_one_off_the_road_that_runs_into_another_on_its_exit() -> None:
@@ -356,9 +322,6 @@ def test_its_top_speed_holds_up_to_the_junctions_exit_only() -> None:
         what = replace(scenario((4.0, 0, 1)), profile=replace(AS_RUN, vehicle=vehicle))
         run = minisim.simulate(what, V2ICAsRun())
         assert run.columns.travel_time[0] == pytest.approx(travel)
-
-
-# --- given ways ----------------------------------------------------------------------------------
 
 
 def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
@@ -385,3 +348,46 @@ def test_given_ways_are_the_lengths_of_the_published_networks() -> None:
 def test_ways_are_checked(ways: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         Intersection((0.0, 90.0, 180.0, 270.0), ways=ways)  # type: ignore[arg-type]
+
+
+# --- speed mode 31: limits and lights -------------------------------------------------------------
+
+
+def obeying(
+    s: float, v: float, a: float, *, lane: int = 0, manoeuvre: int = 1
+) -> tuple[Records, Callable[[], bool]]:
+    """The vehicle's acceleration, and its row, of a car alone that obeys limits at a red light."""
+    car = (0.0, lane, manoeuvre)
+    what = replayed(MAKERS[4](profile="as_run_obeying"), car, horizon=200.0)
+    site = what.site(0)
+    road = build_road(site, FixedTime().start(site).plan)
+    law = build_law(
+        site, FixedTime().start(site).plan, depart_speed=0.0, record=None,
+        record_window=(0.0, math.inf),
+    )  # fmt: skip
+    vehicles = build_vehicles(site, what.arrivals(0))
+    lanes = build_lanes(site, vehicles, lanes_open=False)
+    cruise = build_cruise(site, 1)
+    assert cruise is not None
+    vehicles["status"], lanes["next"][lane] = DRIVING, 1
+    vehicles["s"], vehicles["v"], vehicles["a"] = s, v, a
+    lanes["front"][lane] = int(s >= law.entry)
+    accelerate(vehicles, lanes, road, law, cruise)
+    return vehicles, lambda: look(vehicles, lanes, road, law, cruise, 1)
+
+
+def test_a_limit_counts_for_the_first_step_beyond_it_and_through_the_lag() -> None:
+    """SUMO 1.18, fixed-time, 4:3:2:1 at 150 veh/h, 83.29 s: vehicle 6 (d1) has entered its turn."""
+    v, before = 13.798586948920386, 13.797885076884404
+    vehicles, _ = obeying(492.8 + 0.06216767704455606, v, (v - before) / 0.01, lane=3)
+    assert v + vehicles["a"][0] * 0.01 == pytest.approx(13.65636158917291, abs=1e-9)
+
+
+def test_it_stops_dead_on_the_line_at_red_and_starts_from_an_engine_at_rest() -> None:
+    """SUMO 1.18, the same run, 53.18 s: vehicle 1 (c2) stops from 14 m/s within a step."""
+    vehicles, after = obeying(492.78271338554714, 13.999999999995646, 0.0)
+    assert 13.999999999995646 + vehicles["a"][0] * 0.01 == 0.0
+    after()
+    assert vehicles["s"][0] == pytest.approx(492.8, abs=1e-8)
+    assert vehicles["s"][0] < 492.8
+    assert vehicles["a"][0] == 0.0

@@ -12,10 +12,8 @@ from minisim.vehicle import VehicleType
 
 def test_a_departure_speed_above_a_drivers_own_is_capped_and_shuts_no_lane() -> None:
     """Each driver whose factor is below 10/14 would have kept its lane shut for ever."""
-    scenario = small_scenario(
-        4, density=400.0, demand_time=200.0, depart_speed=10.0,
-        vehicle=VehicleType(speed_deviation=0.3),
-    )  # fmt: skip
+    slow = VehicleType(speed_deviation=0.3)
+    scenario = small_scenario(4, density=400, demand_time=200, depart_speed=10.0, vehicle=slow)
     columns = simulate(scenario, FixedTime(), seed=1).columns
     assert columns.departed[columns.demand_time < 190.0].all()
 

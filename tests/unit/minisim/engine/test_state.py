@@ -39,10 +39,8 @@ def test_speed_factors_are_normal_and_cut() -> None:
     drawn = np.array(factors(Arrivals(*many), 0))
     assert drawn.mean() == pytest.approx(1.0, abs=5 * 0.1 / len(drawn) ** 0.5)
     assert drawn.std() == pytest.approx(0.1, rel=0.03)
-    wild = replace(SITE, vehicle=VehicleType(speed_deviation=0.5))
-    assert (min(factors(Arrivals(*many), 0, wild)), max(factors(Arrivals(*many), 0, wild))) == (
-        0.2, 2.0,
-    )  # fmt: skip
+    wild = factors(Arrivals(*many), 0, replace(SITE, vehicle=VehicleType(speed_deviation=0.5)))
+    assert (min(wild), max(wild)) == (0.2, 2.0)
 
 
 def test_ranks_are_places_in_the_lane() -> None:

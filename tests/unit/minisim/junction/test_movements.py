@@ -22,15 +22,11 @@ PATTERN = re.compile(
 )
 
 #: Expressions that it must find.
-BY_HAND = [
-    "lane * (site.intersection.n - 1)",
-    "path % (len(lanes) - 1) + 1",
-    "path_of // manoeuvres",
-    "(m.origin + m.manoeuvre) % self.n",
-    "1 << manoeuvre - 1",
-    "np.repeat(np.arange(n), n - 1)",
+BY_HAND = (
+    "lane * (site.intersection.n - 1)", "path % (len(lanes) - 1) + 1", "path_of // manoeuvres",
+    "(m.origin + m.manoeuvre) % self.n", "1 << manoeuvre - 1", "np.repeat(np.arange(n), n - 1)",
     "[(i, j) for i in range(n) for j in range(1, n)]",
-]
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 12])
@@ -59,21 +55,10 @@ def test_there_is_one_object_for_an_arm_count_and_it_is_read_only() -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        Movement(0, 0),
-        Movement(3, 1),
-        Movement(-1, 1),
-        "a3",
-        "",
-        "a",
-        "a0",
-        "A1",
-        "a1 ",
-        "a²",
-        None,
-        ["a1"],
-        np.eye(2),
+        Movement(0, 0), Movement(3, 1), Movement(-1, 1), "a3", "", "a", "a0", "A1", "a1 ", "a²",
+        None, ["a1"], np.eye(2),
     ],
-)
+)  # fmt: skip
 def test_an_unknown_movement_is_refused(wrong: object) -> None:
     with pytest.raises(InputError, match="lane a … c and a manoeuvre 1 … 2, such as a1"):
         movements_of(3).number(wrong)  # type: ignore[arg-type]

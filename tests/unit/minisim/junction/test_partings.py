@@ -42,9 +42,8 @@ def test_branch_from_a_straight_path_is_where_the_arc_is_left_behind() -> None:
     assert branch(FOUR, CAR)[straight, left] == pytest.approx(FOUR.approach_length + x, abs=0.3)
     angle = math.acos(1.0 - 2.3 / 5.6)
     along_arc = 5.6 * angle
-    assert branch(FOUR, CAR)[left, straight] == pytest.approx(
-        FOUR.approach_length + along_arc, abs=0.3
-    )
+    wanted = FOUR.approach_length + along_arc
+    assert branch(FOUR, CAR)[left, straight] == pytest.approx(wanted, abs=0.3)
 
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.3, 0.6])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import os
 import signal
@@ -33,12 +32,12 @@ from scenarios.cli.shared.terminal import show
 from scenarios.controllers import controller_named
 from scenarios.demo import Tour
 from tests import ROOT
+from tests.builders import python
 
 Captured = pytest.CaptureFixture[str]
 
 SHORT = ("--horizon", "240", "--density", "300")
 
-#: The issue's keys of `minisim run --json`.
 RUN_KEYS = {
     "controller", "scenario", "profile", "density", "seed", "horizon_s", "trips", "unfinished",
     "waiting_time_s", "travel_time_s", "depart_delay_s", "lanes", "collisions", "complete",
@@ -59,6 +58,15 @@ def fails(capsys: Captured, *arguments: str, code: int = 2) -> str:
     assert captured.err.startswith("minisim: ")
     assert captured.err.count("\n") == 1, "one line"
     return captured.err
+
+
+def answer(capsys: Captured, *arguments: str) -> Any:
+    return json.loads(ok(capsys, *arguments, "--json"))
+
+
+def lines_of(text: str) -> dict[str, list[str]]:
+    """The first word of each line -> the others."""
+    return {words[0]: words[1:] for line in text.splitlines() if (words := line.split())}
 
 
 def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -98,60 +106,51 @@ def test_help_loads_nothing_heavy() -> None:
         "import sys; from scenarios.cli import main; main(['run', '--help']); "
         "print(sorted({'pandas', 'matplotlib', 'numba', 'networkx', 'pymunk'} & set(sys.modules)))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
+    assert python("-c", script).stdout.splitlines()[-1] == "[]"
 
 
 def test_run_json_is_the_summary_and_safety(capsys: Captured) -> None:
-    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, "--seed", "3", "--json"))
+    printed = answer(capsys, "run", "four-way", *SHORT, "--seed", "3")
     run = minisim.simulate(four_way(300, horizon=240), controller_named("dim"), seed=3)
     assert set(printed) >= RUN_KEYS
     safety = {name: printed.pop(name) for name in SAFETY}
+    assert safety["min_ttc_s"] > 0 < safety["min_pet_s"]
     assert printed == run.summary()
     assert set(printed["lanes"]) == set("abcd")
-    assert set(printed["lanes"]["a"]) >= {"trips", "waiting_time_s", "travel_time_s"}
-    assert safety["min_ttc_s"] > 0
-    assert safety["min_pet_s"] > 0
 
 
 def test_run_prints_every_lane_and_the_total(capsys: Captured) -> None:
     out = ok(capsys, "run", "five-way", *SHORT, "-c", "fixed-time", "-p", "fair")
-    rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
+    rows = lines_of(out)
     served = [int(rows[lane][0]) for lane in "abcde"]
     assert int(rows["all"][0]) == sum(served)
     assert rows["collisions"][0] == "0"
-    for word in ("waiting [s]", "travel [s]", "departure delay [s]", "minimum TTC", "minimum PET"):
-        assert word in out
+    heads = ("waiting [s]", "travel [s]", "departure delay [s]", "minimum TTC", "minimum PET")
+    assert all(word in out for word in heads)
 
 
 def test_run_tells_humans_from_the_others(capsys: Captured) -> None:
     arguments = ("run", "four-way", *SHORT, "-p", "fair", "--humans", "0.4")
-    printed = json.loads(ok(capsys, *arguments, "--json"))
+    printed, rows = answer(capsys, *arguments), lines_of(ok(capsys, *arguments))
     assert printed["controller"] == "dim+humans=0.4"
     groups = printed["kinds"]
     assert groups["human"]["trips"] + groups["automated"]["trips"] == printed["trips"]
-    rows = {words[0]: words[1:] for line in ok(capsys, *arguments).splitlines()
-            if (words := line.split())}  # fmt: skip
     for name in ("human", "automated"):
         assert int(rows[name][0]) == groups[name]["trips"] - groups[name]["unfinished"]
 
 
 def test_run_counts_false_grants_where_perception_errs(capsys: Captured) -> None:
-    run = ("run", "four-way", "--density", "250", "--profile", "fair", "--horizon", "300",
-           "--no-safety", "--on-collision", "record")  # fmt: skip
+    run = ("run", "four-way", "-p", "fair", *SHORT, "--no-safety", "--on-collision", "record")
     told = ok(capsys, *run, "-c", "dim:perception=noisy(intent_error=0.15,kind=symmetric)")
     assert "false grants" in told
-    silent = "dim:perception=noisy(unsignalled=(0.29,0.25))"
-    summary = json.loads(ok(capsys, *run, "--json", "-c", silent))
+    summary = answer(capsys, *run, "-c", "dim:perception=noisy(unsignalled=(0.29,0.25))")
     assert summary["crossings"] >= summary["trips"] - summary["unfinished"]
     assert "false grants" not in ok(capsys, *run)
 
 
 def test_run_without_vehicles(capsys: Captured) -> None:
     arguments = ("run", "three-way", "--density", "0", "--horizon", "60")
-    assert json.loads(ok(capsys, *arguments, "--json"))["waiting_time_s"] is None
+    assert answer(capsys, *arguments)["waiting_time_s"] is None
     assert "–" in ok(capsys, *arguments)
 
 
@@ -163,9 +162,8 @@ def test_run_writes_trips_trajectories_and_fcd(capsys: Captured, tmp_path: Path)
         "--trajectories", str(table), "--fcd", str(fcd),
     )  # fmt: skip
     assert plain == full, "what is written changes no result"
-    with trips.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == TRIP_COLUMNS
+    rows = pd.read_csv(trips)
+    assert tuple(rows) == TRIP_COLUMNS
     assert len(rows) == json.loads(full)["trips"]
     assert pd.read_parquet(table)["time_s"].max() == pytest.approx(240.0)
     assert ET.parse(fcd).getroot().tag == "fcd-export"
@@ -175,9 +173,7 @@ def test_run_writes_trips_trajectories_and_fcd(capsys: Captured, tmp_path: Path)
 def test_run_replays_recorded_arrivals(capsys: Captured, tmp_path: Path) -> None:
     arrivals = tmp_path / "arrivals.csv"
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,c,1\n")
-    printed = json.loads(
-        ok(capsys, "run", "four-way", "--horizon", "120", "--arrivals", str(arrivals), "--json")
-    )
+    printed = answer(capsys, "run", "four-way", "--horizon", "120", "--arrivals", str(arrivals))
     assert (printed["trips"], printed["unfinished"]) == (2, 0)
     assert printed["lanes"]["c"]["trips"] == 1
     arrivals.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n3,e,1\n")
@@ -185,28 +181,24 @@ def test_run_replays_recorded_arrivals(capsys: Captured, tmp_path: Path) -> None
 
 
 def test_split_turns_and_side_reach_the_scenario(capsys: Captured) -> None:
-    lanes = json.loads(
-        ok(capsys, "run", "four-way", *SHORT, "--split", "1:0:0:0", "--turns", "0:1:0",
-           "--side", "right", "--json")
-    )["lanes"]  # fmt: skip
-    assert [lanes[lane]["trips"] == 0 for lane in "abcd"] == [False, True, True, True]
+    demand = ("--split", "1:0:0:0", "--turns", "0:1:0", "--side", "right", "--by", "movement")
+    groups = answer(capsys, "run", "four-way", *SHORT, *demand)["movements"]
+    assert [name for name, means in groups.items() if means["trips"]] == ["a2"]
 
 
 def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: Path) -> None:
     trips = tmp_path / "trips.csv"
     arguments = ("run", "four-way", *SHORT, "-c", "unregulated", "--trips", str(trips))
-    said = fails(capsys, *arguments, code=1)
-    assert "touched" in said
-    assert f"{trips} not written; --on-collision record notes collisions and goes on" in said
+    advice = f"{trips} not written; --on-collision record notes collisions and goes on"
+    assert advice in fails(capsys, *arguments, code=1)
     assert list(tmp_path.iterdir()) == []
     assert main([*arguments, "--json"]) == 1
     printed = capsys.readouterr()
     facts = json.loads(printed.out)
     assert (facts["controller"], facts["seed"], facts["collisions"]) == ("unregulated", 0, 1)
     assert len(facts["touched"][0]["vehicles"]) == 2
-    assert f"minisim: {facts['error']}; {trips} not written" in printed.err
-    out = ok(capsys, *arguments, "--on-collision", "record")
-    assert " touched" in out
+    assert f"minisim: {facts['error']}; {advice}" in printed.err
+    assert " touched" in ok(capsys, *arguments, "--on-collision", "record")
     assert trips.exists()
 
 
@@ -220,26 +212,23 @@ def test_without_safety_nothing_is_recorded(
         return real(*arguments, **options)
 
     monkeypatch.setattr("minisim.simulation.Simulation", spy)
-    with_safety = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json"))
-    without = json.loads(ok(capsys, "run", "four-way", *SHORT, "--json", "--no-safety"))
+    with_safety = answer(capsys, "run", "four-way", *SHORT)
+    without = answer(capsys, "run", "four-way", *SHORT, "--no-safety")
     assert records == ["junction", None]
     assert without == {k: v for k, v in with_safety.items() if k not in SAFETY}
-    assert "TTC" not in ok(capsys, "run", "four-way", *SHORT, "--no-safety")
 
 
 def test_metrics_that_were_asked_for_by_movement(capsys: Captured) -> None:
     asked = ("--metrics", "time_loss_s,max_drac_mps2,queue_growth", "--by", "movement")
-    printed = json.loads(ok(capsys, "run", "four-way", *SHORT, *asked, "--json"))
-    assert printed["time_loss_s_p50"] <= printed["time_loss_s_p95"] <= printed["time_loss_s_max"]
+    printed = answer(capsys, "run", "four-way", *SHORT, *asked)
     assert len(printed["movements"]) == 12
     assert printed["max_drac_mps2"] > 0.0
     out = ok(capsys, "run", "four-way", *SHORT, *asked)
-    rows = {words[0]: words[1:] for line in out.splitlines() if (words := line.split())}
     means = printed["movements"]["a1"]
     expected = [means[f"time_loss_s{what}"] for what in ("", "_p50", "_p95", "_max")]
-    assert rows["a1"][2:] == [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
-    for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"):
-        assert word in out
+    shown = [f"{value:.2f}" for value in (*expected, means["queue_growth"])]
+    assert lines_of(out)["a1"][2:] == shown
+    assert all(word in out for word in ("time loss [s]", "p95", "queue growth", "maximum DRAC"))
 
 
 def test_each_number_is_printed_once(capsys: Captured) -> None:
@@ -248,9 +237,8 @@ def test_each_number_is_printed_once(capsys: Captured) -> None:
     for word in ("collisions", "minimum TTC", "trips", "unfinished", "hardest braking"):
         assert out.replace("with unfinished", "").count(word) == 1, word
     assert "crossings – (counted only where perception errs)" in out
-    noisy = "dim:perception=noisy(unsignalled=(0.29,0.25))"
-    out = ok(capsys, "run", "four-way", "--horizon", "60", "--metrics", "crossings", "-c", noisy)
-    assert out.count("crossings") == 1
+    noisy = ("-c", "dim:perception=noisy(unsignalled=(0.29,0.25))", "--metrics", "crossings")
+    assert ok(capsys, "run", "four-way", "--horizon", "60", *noisy).count("crossings") == 1
 
 
 def test_the_warmup_is_named_and_left_out(capsys: Captured, tmp_path: Path) -> None:
@@ -260,7 +248,7 @@ def test_the_warmup_is_named_and_left_out(capsys: Captured, tmp_path: Path) -> N
     trips = pd.read_csv(file)
     assert trips["demand_time_s"].min() >= 60.0
     assert trips["vehicle"][0] > 0
-    assert len(trips) == json.loads(ok(capsys, *arguments, "--json"))["trips"]
+    assert len(trips) == answer(capsys, *arguments)["trips"]
 
 
 OWN = """
@@ -280,35 +268,34 @@ def broken(run):
 """
 
 
-def test_metrics_of_ones_own(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "own_metrics.py").write_text(OWN, encoding="utf-8")
+    return tmp_path
+
+
+def test_metrics_of_your_own(capsys: Captured, here: Path) -> None:
+    (here / "own_metrics.py").write_text(OWN, encoding="utf-8")
     run = ("run", "four-way", *SHORT, "--no-safety", "--metrics")
-    printed = json.loads(ok(capsys, *run, "own_metrics:delay, own_metrics.py:twice", "--json"))
+    printed = answer(capsys, *run, "own_metrics:delay, own_metrics.py:twice")
     assert printed["delay"] == printed["depart_delay_s"]
     assert printed["twice"] == 2 * printed["trips"]
     assert "delay [s]" in ok(capsys, *run, "own_metrics:delay")
     said = fails(capsys, *run, "own_metrics:broken")
     assert "metric 'broken' raised KeyError: 'dely' (own_metrics.py, line 14)" in said
     assert "unknown metric of own_metrics 'dealy'" in fails(capsys, *run, "own_metrics:dealy")
-    (tmp_path / "e.toml").write_text(
-        'horizon = 60\nseeds = 2\nmetrics = ["own_metrics:delay", "own_metrics:twice"]\n'
-    )
+    asked = 'metrics = ["own_metrics:delay", "own_metrics:twice"]\n'
+    (here / "e.toml").write_text(f"horizon = 60\nseeds = 2\n{asked}")
     out = ok(capsys, "sweep", "e.toml", "--out", "s.db", "--jobs", "2")
-    for word in ("delay [s]", "p95", "twice"):
-        assert word in out
+    assert all(word in out for word in ("delay [s]", "p95", "twice"))
     del sys.modules["own_metrics"]
 
 
 def test_metrics_lists_the_table(capsys: Captured) -> None:
-    listed = json.loads(ok(capsys, "metrics", "--json"))
-    assert [metric["name"] for metric in listed] == list(METRICS)
+    assert [metric["name"] for metric in answer(capsys, "metrics")] == list(METRICS)
     out = ok(capsys, "metrics")
-    for metric in METRICS.values():
-        assert metric.name in out
-        assert metric.meaning in out
+    assert all(metric.name in out and metric.meaning in out for metric in METRICS.values())
 
 
 def test_harmony_csv_is_the_papers_file(capsys: Captured) -> None:
@@ -318,9 +305,8 @@ def test_harmony_csv_is_the_papers_file(capsys: Captured) -> None:
 
 def test_harmony_table_json_and_csv_agree(capsys: Captured) -> None:
     arguments = ("harmony", "custom", "--bearings", "0,80,190,260", "--side", "right")
-    printed = json.loads(ok(capsys, *arguments, "--json"))
-    text = ok(capsys, *arguments, "--csv")
-    header, *rows = (line.split(",") for line in text.split())
+    printed = answer(capsys, *arguments)
+    header, *rows = (line.split(",") for line in ok(capsys, *arguments, "--csv").split())
     assert printed["movements"] == header[1:]
     assert [[str(v) for v in row] for row in printed["harmony"]] == [row[1:] for row in rows]
     table = ok(capsys, *arguments)
@@ -330,26 +316,25 @@ def test_harmony_table_json_and_csv_agree(capsys: Captured) -> None:
 def test_harmony_of_twelve_arms_is_not_cut(capsys: Captured) -> None:
     show(harmony_table(HarmonyMatrix(12, np.zeros((132, 132), dtype=bool))))
     lines = capsys.readouterr().out.splitlines()
-    assert "…" not in "".join(lines)
     assert "l10 l11" in lines[1]
     assert [line.count("·") for line in lines if line.startswith((" a", " l"))] == [132] * 22
 
 
 def test_clearance_only_removes_harmony(capsys: Captured) -> None:
-    def pairs(clearance: str) -> int:
-        text = ok(capsys, "harmony", "five-way", "--clearance", clearance, "--json")
-        return sum(map(sum, json.loads(text)["harmony"]))
-
-    assert pairs("0") >= pairs("0.5") > pairs("3")
+    harmony = ("harmony", "five-way", "--clearance")
+    found = [answer(capsys, *harmony, clearance)["harmony"] for clearance in ("0", "0.5", "3")]
+    none, usual, wide = (sum(map(sum, values)) for values in found)
+    assert none >= usual > wide
 
 
 def test_decide_answers_as_the_paper(capsys: Captured) -> None:
-    printed = json.loads(ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2", "--json"))
+    arguments = ("decide", "four-way", "a1", "b2", "c2", "d2")
+    printed = answer(capsys, *arguments)
     assert printed["right_of_way"] == ["a1", "b2"]
     # Paper, section "Deadlock Analysis": (c2, a1), (a1, b2), (b2, d2).
-    assert sorted(map(sorted, printed["tied"])) == [["a1", "b2"], ["a1", "c2"], ["b2", "d2"]]
-    assert sorted(map(sorted, printed["edges"])) == [["a1", "b2"], ["a1", "c2"], ["b2", "d2"]]
-    text = ok(capsys, "decide", "four-way", "a1", "b2", "c2", "d2")
+    for pairs in (printed["tied"], printed["edges"]):
+        assert sorted(map(sorted, pairs)) == [["a1", "b2"], ["a1", "c2"], ["b2", "d2"]]
+    text = ok(capsys, *arguments)
     assert text.count("tied") == 3
     assert "{a1 b2}  tied  ← right of way" in text
     assert printed["reason"] in text
@@ -366,14 +351,12 @@ def test_answers_are_drawn(capsys: Captured, tmp_path: Path, command: str) -> No
 def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None:
     morning = tmp_path / "morning.csv"
     morning.write_text("demand_time_s,lane,manoeuvre\n25205,a,2\n25207,b,1\n28900,c,3\n")
-    run = ("run", "four-way", "--arrivals", str(morning), "--no-safety", "--json")
-    late = fails(capsys, *run)
-    assert "nobody comes within the horizon of 3600 s: the first recorded arrival is at" in late
-    assert "25205 s (07:00:05)" in late
+    run = ("run", "four-way", "--arrivals", str(morning), "--no-safety")
+    assert "the first recorded arrival is at 25205 s (07:00:05)" in fails(capsys, *run)
     for start, trips in (("07:00", 2), ("25205", 2), ("8:00", 1), ("7:00:06", 1)):
-        assert json.loads(ok(capsys, *run, "--start", start))["trips"] == trips
+        assert answer(capsys, *run, "--start", start)["trips"] == trips
     assert "start must be a time of day" in fails(capsys, *run, "--start", "7h")
-    assert "nobody comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
+    assert "no vehicle comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
     film = ("-o", str(tmp_path / "film.gif"))
     for command in (("run", "four-way"), ("animate", "four-way", *film)):
         assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
@@ -381,15 +364,17 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
 
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
-    ok(capsys, "animate", "four-way", "-o", str(file), "--from", "60", "--seconds", "2",
-       "--fps", "5", "--density", "400")  # fmt: skip
+    what = "animate four-way --from 60 --seconds 2 --fps 5 --density 400 -o"
+    ok(capsys, *what.split(), str(file))
     with Image.open(file) as film:
         assert film.n_frames == 10
         assert film.info["duration"] == 200
     assert list(tmp_path.iterdir()) == [file]
 
 
-@pytest.mark.parametrize("more", [(), ("--arrivals", "{arrivals}"), ("--humans", "0.4")])
+@pytest.mark.parametrize(
+    "more", [("-d", "300"), ("--arrivals", "{arrivals}"), ("-d", "300", "--humans", "0.4")]
+)
 def test_a_film_shows_the_run_of_the_same_options(
     capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
 ) -> None:
@@ -401,7 +386,6 @@ def test_a_film_shows_the_run_of_the_same_options(
         "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
     )
     what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
-    what = (*what, *(() if "--arrivals" in what else ("-d", "300")))
     for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
         options = (*what, "-c", controller)
         ok(capsys, "animate", *options, "-o", str(tmp_path / "x.gif"), "--from", "140")
@@ -412,30 +396,22 @@ def test_a_film_shows_the_run_of_the_same_options(
         pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
 
 
-def test_a_film_lies_within_the_run(capsys: Captured, tmp_path: Path) -> None:
-    film = ("animate", "four-way", "-o", str(tmp_path / "film.gif"), "--from", "280")
-    assert "--seconds must be" in fails(capsys, *film, "--horizon", "300")
-    assert "--from [s] must be" in fails(capsys, *film, "--horizon", "200")
-
-
 def test_animate_checks_before_it_simulates(
     capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
-    monkeypatch.setenv("PATH", str(tmp_path))
-    here = str(tmp_path)
+    monkeypatch.setenv("PATH", here := str(tmp_path))
     for file, more, said in (
         ("film.avi", (), ".gif, .mp4, .html"), ("film.mp4", (), "ffmpeg"),
         ("no/film.gif", (), f"no folder {here}/no"), ("f.gif", ("--fps", "11"), "fps"),
-        ("f.gif", ("--from", "1e300"), "--from"), ("f.gif", ("--seconds", "1e300"), "seconds"),
+        ("f.gif", ("--from", "280", "--horizon", "300"), "--seconds must be"),
+        ("f.gif", ("--from", "280", "--horizon", "200"), "--from [s] must be"),
     ):  # fmt: skip
         assert said in fails(capsys, "animate", "four-way", "-o", f"{here}/{file}", *more)
     recorded = tmp_path / "f.gif"
     recorded.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
-    again = f"{here}/../{tmp_path.name}/f.gif"
-    same = fails(capsys, "animate", "four-way", "--arrivals", str(recorded), "-o", again)
-    assert "--arrivals and --out name the same file" in same
-    assert recorded.read_text().startswith("demand_time_s")
+    twice = ("--arrivals", str(recorded), "-o", f"{here}/../{tmp_path.name}/f.gif")
+    assert "--out name the same file" in fails(capsys, "animate", "four-way", *twice)
 
 
 def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
@@ -443,12 +419,12 @@ def test_demo_quick(capsys: Captured, tmp_path: Path) -> None:
     out = ok(capsys, "demo", "--quick", "--out", str(folder), "--jobs", "1")
     names = ["demo.csv", "demo.gif", "demo.md", "demo.png"]
     assert sorted(p.name for p in folder.iterdir()) == names
+    assert "DIM, paper's gate" in out
     points = pd.read_csv(folder / "demo.csv")
-    assert sorted(points["controller"].unique()) == ["dim", "dim:gate=harmonious", "fixed-time"]
-    assert set(points["density"]) == {150.0, 350.0}
+    assert {*points["controller"]} == {"dim", "dim:gate=harmonious", "fixed-time"}
+    assert {*points["density"]} == {150.0, 350.0}
     assert (points["waiting_time_s_ci95"] > 0).all()
     assert (points["collisions"] == 0).all()
-    assert "DIM, paper's gate" in out
     assert (folder / "demo.md").read_text().count("\n|") == 2 + len(points)
     with Image.open(folder / "demo.gif") as film:
         assert film.n_frames == 100
@@ -461,10 +437,8 @@ def test_demo_takes_the_seeds_it_is_given(
         raise InputError(f"{tour.seeds} seeds")
 
     monkeypatch.setattr(Tour, "film", stop)
-    here = str(tmp_path)
-    assert "7 seeds" in fails(capsys, "demo", "--quick", "--seeds", "7", "--out", here)
-    assert "2 seeds" in fails(capsys, "demo", "--quick", "--out", here)
-    assert "5 seeds" in fails(capsys, "demo", "--out", here)
+    for count, more in ((7, ("--quick", "--seeds", "7")), (2, ("--quick",)), (5, ())):
+        assert f"{count} seeds" in fails(capsys, "demo", *more, "--out", str(tmp_path))
 
 
 BAD = [
@@ -474,16 +448,11 @@ BAD = [
     (("run", "for-way"), "did you mean 'four-way'"),
     (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
-    (("run", "custom", "--bearings", "0,nan,90"), "'nan' is no finite number"),
-    (("run", "four-way", "--arrivals", ""), "--arrivals': '' is no file name"),
+    (("run", "custom", "--bearings", "0,nan,90"), "'nan' is not a finite number"),
+    (("run", "four-way", "--arrivals", ""), "--arrivals': '' is not a file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
     (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
     (("run", "four-way", "-d", "many"), "many"),
-    (("run", "four-way", "--split", "4;3"), "4;3"),
-    (("run", "four-way", "--side", "up"), "left, right"),
-    (("run", "four-way", "--horizon", "0"), "horizon"),
-    (("run", "four-way", "--on-collision", "ignore"), "stop, record"),
-    (("run", "four-way", "--arrivals", "missing.csv"), "missing.csv"),
     (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
     (("run", "four-way", "--trips", "t.xlsx"), ".csv, .parquet"),
@@ -491,14 +460,13 @@ BAD = [
     (("run", "four-way", "--trips", "trips.csv", "--fcd", "none/fcd.xml"), "no folder"),
     (("harmony", "four-way", "--clearance", "-1"), "-1"),
     (("harmony", "four-way", "--csv", "--json"), "--json"),
-    (("decide", "four-way"), "MOVEMENTS"),
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
     (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
     (
-        ("run", "four-way", "--metrics", "pets,min_ttc_s", "--no-safety"),
-        "--metrics asks for pets, min_ttc_s, which --no-safety leaves out",
+        ("run", "four-way", "--metrics", "pets,trips", "--no-safety"),
+        "asks for pets, which --no-saf",
     ),
     (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
@@ -509,8 +477,6 @@ BAD = [
     (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
-    (("protocol", "three-way", "--gate", "shut"), "unknown gate 'shut'"),
-    (("protocol", "three-way", "--priorities", "inflow"), "unknown priorities 'inflow'"),
     (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
     (("protocol", "three-way", "--counterexample", "x.csv"), "there is no counterexample"),
     (("sweep", "paper", "--jobs", "0"), "--jobs must be an integer 1"),
@@ -528,13 +494,15 @@ BAD = [
     (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
     (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
-    (("sweep", "missing.toml"), "cannot read experiments from missing.toml"),
-    (("sweep",), "Missing argument"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),
     (("figures", "webster", "--store", "runs.sqlite"), "there is no store"),
     (("reproduce", "--seeds", "1"), "seeds must be an integer"),
     (("reproduce", "--only", "fare"), "did you mean 'fair'"),
+    (("run", "four-way", "-c", "dim", "--controller=fixed-time"), "--controller is given twice"),
+    (("run", "four-way", "-d300", "-d", "350"), "-d is given twice"),
+    (("crossval", "-c", "dim", "-c", "fixed-time", "-c", "dim"), "--controller dim is given twice"),
+    (("reproduce", "--only", "text", "--only", "text"), "--only text is given twice"),
     (("crossval", "--seeds", "0"), "--seeds"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
@@ -548,12 +516,10 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a)[:50] for a, _ in BAD])
 def test_bad_input_is_one_line_and_writes_nothing(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...], named: str,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
+    capsys: Captured, here: Path, arguments: tuple[str, ...], named: str
+) -> None:
     assert named in fails(capsys, *arguments)
-    assert list(tmp_path.iterdir()) == []
+    assert list(here.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -561,12 +527,10 @@ def test_bad_input_is_one_line_and_writes_nothing(
     [("--trips", "--trajectories"), ("--trips", "--fcd"), ("--arrivals", "--trips")],
 )
 def test_no_file_is_written_twice_or_over_an_input(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    first: str, second: str,
-) -> None:  # fmt: skip
+    capsys: Captured, here: Path, monkeypatch: pytest.MonkeyPatch, first: str, second: str
+) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
-    monkeypatch.chdir(tmp_path)
-    file, link = tmp_path / "a.csv", tmp_path / "link.csv"
+    file, link = here / "a.csv", here / "link.csv"
     file.write_text("demand_time_s,lane,manoeuvre\n0,a,2\n")
     link.symlink_to(file)
     before = file.read_text()
@@ -585,15 +549,8 @@ def test_ctrl_c_is_130(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> Non
     assert capsys.readouterr().err == "minisim: interrupted\n"
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
-    command = "from scenarios.cli import main; raise SystemExit(main(['harmony', 'four-way']))"
-    with subprocess.Popen(
-        [sys.executable, "-c", command], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        process.stdout.close()
-        assert process.stderr.read() == b""
+def test_a_reader_that_goes_away_is_not_an_error() -> None:
+    assert shell("minisim harmony four-way | true").stderr == ""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
@@ -609,7 +566,7 @@ def test_a_full_disk_is_one_line(command: str) -> None:
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
-def test_closed_streams_are_no_error(closed: str) -> None:
+def test_closed_streams_are_not_an_error(closed: str) -> None:
     for command in ("harmony three-way --csv", "--help"):
         done = shell(f"minisim {command} {closed}")
         assert (done.returncode, done.stderr) == (0, "")
@@ -619,19 +576,18 @@ def test_closed_streams_are_no_error(closed: str) -> None:
 def test_a_terminal_without_unicode_gets_plain_characters() -> None:
     plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
     table = shell("minisim harmony three-way", **plain)
-    assert (table.returncode, table.stderr) == (0, "")
-    assert "x harmony, . conflict" in table.stdout
     decision = shell("minisim decide four-way a1 b2", PYTHONIOENCODING="ascii")
-    assert (decision.returncode, decision.stderr) == (0, "")
-    assert "a1-b2" in decision.stdout
+    for done, words in ((table, "x harmony, . conflict"), (decision, "a1-b2")):
+        assert (done.returncode, done.stderr) == (0, "")
+        assert words in done.stdout
 
 
 def test_verify_tells_what_all_cases_showed_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "verify", "four-way")
-    assert "four-way, 4 arms: all 255 cases, order size" in text
-    assert "130 (51%)" in text
-    assert "4 cliques tie (no graph of 4 nodes has more than 4)" in text
-    printed = json.loads(ok(capsys, "verify", "three-way", "--json"))
+    tie = "4 cliques tie (no graph of 4 nodes has more than 4)"
+    for words in ("four-way, 4 arms: all 255 cases, order size", "130 (51%)", tie):
+        assert words in text
+    printed = answer(capsys, "verify", "three-way")
     assert (printed["arms"], printed["cases"], printed["most_cliques_tied"]) == (3, 26, 3)
     assert all(claim["holds"] for claim in printed["claims"])
     assert printed["cases_by_cliques_tied"] == {"1": 16, "2": 9, "3": 1}
@@ -648,13 +604,12 @@ def test_verify_shows_a_false_claim_and_exits_1(capsys: Captured) -> None:
 
 def test_protocol_tells_what_it_visited_and_as_json(capsys: Captured) -> None:
     text = ok(capsys, "protocol", "three-way", "--order", "lanes")
-    assert "872, with 3259 transitions\n" in text
-    assert "safe         yes" in text
-    assert "live         yes" in text
-    assert "lane a       never starves" in text
-    assert "lane c       starves: arrive a1, arrive c2; then again and again commit a1," in text
+    cycle = "lane c       starves: arrive a1, arrive c2; then again and again commit a1,"
+    sizes = "872, with 3259 transitions\n"
+    for words in (sizes, "safe         yes", "live         yes", "a       never starves", cycle):
+        assert words in text
     rules = ("--order", "lanes", "--priorities", "waiting")
-    printed = json.loads(ok(capsys, "protocol", "three-way", *rules, "--json"))
+    printed = answer(capsys, "protocol", "three-way", *rules)
     assert printed["all_states"] is True
     assert (printed["unsafe"], printed["stuck"]) == ([], None)
     assert printed["starving"] == {"a": None, "b": None, "c": None}
@@ -676,8 +631,7 @@ def test_arrivals_of_a_smaller_junction_are_refused(capsys: Captured, tmp_path: 
     table = tmp_path / "three.csv"
     rows = [f"{k},{'abc'[k % 3]},{k % 2 + 1}" for k in range(40)]
     table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows, ""]))
-    message = fails(capsys, "run", "four-way", "--arrivals", str(table))
-    assert "junction with 3 arms" in message
+    assert "junction with 3 arms" in fails(capsys, "run", "four-way", "--arrivals", str(table))
     table.write_text("\n".join(["demand_time_s,lane,manoeuvre", *rows[:3], ""]))
     assert main(["run", "four-way", "--arrivals", str(table), "--horizon", "60"]) == 0
 
@@ -699,10 +653,8 @@ class Faulty:
 """
 
 
-def test_an_error_of_a_controller_is_one_line(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_a_faulty_controller_is_one_line(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("mine_faulty.py").write_text(FAULTY)
     run = ("run", "four-way", "--horizon", "10", "-c", "mine_faulty:Faulty")
     told = "controller 'faulty' at 3.0 s: mine_faulty.py, line 14: ZeroDivisionError: division by"
@@ -724,10 +676,7 @@ def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_
     for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
     (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "minisim", *command], cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = python("-m", "minisim", *command, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -750,10 +699,7 @@ runpy.run_module("minisim", run_name="__main__", alter_sys=True)
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
 @pytest.mark.parametrize("module", ["scenarios.cli", "typer", "figures.reproduction_report"])
 def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PRESSING, "reproduce", module], cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = python("-c", PRESSING, "reproduce", module, cwd=tmp_path)
     assert done.returncode in (130, -signal.SIGINT)
     assert done.stderr in ("", "minisim: interrupted\n")
 

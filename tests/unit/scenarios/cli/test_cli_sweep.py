@@ -20,6 +20,7 @@ from scenarios.studies.shared.effort import Effort
 from scenarios.sweep import keys
 from scenarios.sweep.store import Store
 from tests import ROOT
+from tests.builders import stored
 from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 SMALL = 'horizon = 60\nseeds = 2\ndensity = 300\ncontroller = ["dim", "fixed-time"]\n'
@@ -37,10 +38,10 @@ def test_a_sweep_and_the_same_again(
 ) -> None:
     store, table = tmp_path / "s.db", tmp_path / "rows.csv"
     arguments = ["sweep", str(file), "--jobs", "1", "--out", str(store), "--export", str(table)]
-    lines = ok(capsys, *arguments).splitlines()
+    said = ok(capsys, *arguments)
     for name in ("dim", "fixed-time"):
-        assert any(f" {name} " in line and "too short" in line for line in lines)
-    assert any("4 runs in" in line for line in lines)
+        assert any(f" {name} " in line and "too short" in line for line in said.splitlines())
+    assert "4 runs in" in said
     first = pd.read_csv(table)
     assert first["controller"].tolist() == ["dim", "dim", "fixed-time", "fixed-time"]
     assert first["seed"].tolist() == [1, 2, 1, 2]
@@ -49,52 +50,47 @@ def test_a_sweep_and_the_same_again(
     again = pd.read_csv(table)
     pd.testing.assert_frame_equal(first, again)  # processor times too: nothing was run
     monkeypatch.setattr(keys, "RESULTS", keys.RESULTS + 1)
-    few = [*arguments, "--seeds", "1"]
-    assert f"  {store} also keeps 2 rows of another version of minisim" in ok(capsys, *few)
+    few = ["--seeds", "1", "--horizon", "30", "--export", str(tmp_path / "rows.parquet")]
+    said = ok(capsys, *arguments[:-2], *few)
+    assert f"  {store} also keeps 4 rows of another version of minisim" in said
+    rows = pd.read_parquet(tmp_path / "rows.parquet")
+    assert (rows["seed"].tolist(), rows["horizon_s"].tolist()) == ([1, 1], [30.0, 30.0])
 
 
-def test_parquet_and_other_seeds(file: Path, tmp_path: Path) -> None:
-    table = tmp_path / "rows.parquet"
-    more = ["--seeds", "1", "--horizon", "30", "--jobs", "1", "--export", str(table)]
-    assert main(["sweep", str(file), "--out", str(tmp_path / "s.db"), *more]) == 0
-    rows = pd.read_parquet(table)
-    assert rows["horizon_s"].tolist() == [30.0, 30.0]
-    assert rows["error"].isna().all()
+def swept(folder: Path, capsys: Captured, text: str, code: int = 0) -> str:
+    """What a sweep of these lines prints."""
+    (folder / "e.toml").write_text(text)
+    store = str(folder / "s.db")
+    assert main(["sweep", str(folder / "e.toml"), "--jobs", "1", "--out", store]) == code
+    return capsys.readouterr().out
 
 
 def test_the_table_shows_what_was_asked_for_and_tells_cells_apart(
     tmp_path: Path, capsys: Captured
 ) -> None:
-    file, store = tmp_path / "e.toml", str(tmp_path / "s.db")
-    file.write_text(
-        'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n'
-        'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
-    )
-    lines = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", store).splitlines()
+    asked = 'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
+    text = f'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n{asked}'
+    lines = swept(tmp_path, capsys, text).splitlines()
     head = next(line for line in lines if "veh/h/lane" in line)
-    for word in ("turns", "time loss [s]", "p95", "trips", "hardest braking [m/s²]"):
+    for word in ("turns", "time loss [s]", "p95", "trips", "hardest braking [m/s²]", "collisions"):
         assert head.count(word) == 1
-    assert head.count("collisions") == 1
     assert "waiting" not in head
     cells = [line.split() for line in lines if " dim " in line]
     assert [cell[3] for cell in cells] == ["uniform", "1:2:1"]
 
 
 def test_failures_are_rows_and_exit_code_1(tmp_path: Path, capsys: Captured) -> None:
-    file, store = tmp_path / "e.toml", tmp_path / "s.db"
-    file.write_text('horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n')
-    assert main(["sweep", str(file), "--jobs", "1", "--out", str(store)]) == 1
-    out = capsys.readouterr().out
+    text = 'horizon = 300\nseeds = 2\ncontroller = ["dim", "unregulated"]\n'
+    out = swept(tmp_path, capsys, text, code=1)
     assert "2 of 4 runs failed; the first (unregulated, four-way, 350 veh/h/lane, seed 1)" in out
     assert "(+2 failed)" in out
-    with Store(store) as kept:
+    with Store(tmp_path / "s.db") as kept:
         assert len(kept) == 4
 
 
 def test_a_capped_signal_is_told(tmp_path: Path, capsys: Captured) -> None:
-    file = tmp_path / "e.toml"
-    file.write_text('horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n')
-    said = ok(capsys, "sweep", str(file), "--jobs", "1", "--out", str(tmp_path / "s.db"))
+    text = 'horizon = 30\nseeds = 1\nscenario = "five-way"\ncontroller = "fixed-time"\n'
+    said = swept(tmp_path, capsys, text)
     assert "over Webster's capacity; the cycle is capped at 180 s" in said
 
 
@@ -110,7 +106,7 @@ def test_the_papers_grid(tmp_path: Path, capsys: Captured, monkeypatch: pytest.M
         assert len(kept) == 28
         assert set(kept.frame()["profile"]) == {"paper"}
         effort = Effort(seeds=2, horizon=5.0, densities=(300.0,))
-        assert some.collect(effort, find_in(kept)).missing == ()
+        assert all(n.made for n in some.collect(effort, find_in(kept)).runs.values())
 
 
 def test_results_do_not_go_over_the_experiments(file: Path, capsys: Captured) -> None:
@@ -140,27 +136,20 @@ def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
     file, path = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text("horizon = 600\nseeds = 5000\n")
     process = subprocess.Popen(
-        [sys.executable, "-c", "import sys; from scenarios.cli import main; sys.exit(main())",
-         "sweep", str(file), "--out", str(path), "--jobs", "1"],
+        [sys.executable, "-m", "minisim", "sweep", file, "--out", path, "--jobs", "1"],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + 60
-    kept = 0
-    while not kept:
+    while not stored(path):
         assert time.monotonic() < deadline
         time.sleep(0.05)
-        if path.exists() and path.stat().st_size:
-            with Store(path) as store:
-                kept = len(store)
     process.send_signal(number)
     out, error = process.communicate(timeout=30)
-    assert process.returncode == code
-    assert out == ""
-    said, last = error.splitlines()
-    assert last == f"minisim: {word}"
+    assert (process.returncode, out) == (code, "")
     with Store(path) as store:
         assert 0 < len(store) < 5000
-        assert said == (
-            f"minisim: {len(store)} of 5000 runs are in {path}; the same command goes on from there"
-        )
+        kept = f"minisim: {len(store)} of 5000 runs are in {path}"
+    assert error.splitlines() == [
+        f"{kept}; the same command goes on from there", f"minisim: {word}",
+    ]  # fmt: skip

@@ -21,7 +21,8 @@ from scipy import stats
 from baselines import FixedTime, V2ICAsRun
 from dim import AsRunDim, Dim
 from figures import save
-from figures.crossval import DODGE, crossval_figures
+from figures.crossval import crossval_figures
+from figures.plots import DODGE
 from minisim.errors import SumoError
 from minisim.junction.paths import Floats
 from minisim.results.metrics import MEANS
@@ -31,16 +32,8 @@ from minisim.results.trips import Trips
 from minisim.simulation import simulate
 from scenarios import four_way
 from scenarios.crossval import Case, Result, crossvalidate, film, replayed_cases, runs, write_report
-from scenarios.crossval.comparison import (
-    CLOSE,
-    Pair,
-    Tolerance,
-    agreement,
-    compare,
-    first_divergence,
-    first_parting,
-    times,
-)
+from scenarios.crossval import comparison as hosts
+from scenarios.crossval.comparison import CLOSE, Pair, Tolerance
 from scenarios.crossval.report import markdown, summary, table
 from scenarios.paper import GREENS, GRID, PHASES, Cell, replay
 from scenarios.profiles import AS_RUN, AS_RUN_SIGNALS
@@ -67,11 +60,14 @@ def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[b
     )  # fmt: skip
 
 
-def pair(seed: int = 1, waiting_sumo: Sequence[float] = (0, 1, 2, 3.5)) -> Pair:
+ALL = [True] * 4
+OURS = trips([0, 1, 2, 3], [50, 51, 52, 53], ALL)
+SAME = Pair(1, OURS, OURS)
+
+
+def pair(seed: int = 1) -> Pair:
     """The last trip waits longer in SUMO; the third never ends there."""
-    ours = trips([0, 1, 2, 3], [50, 51, 52, 53], [True, True, True, True])
-    theirs = trips(waiting_sumo, [50, 51.05, 70, 54], [True, True, False, True])
-    return Pair(seed, ours, theirs)
+    return Pair(seed, OURS, trips([0, 1, 2, 3.5], [50, 51.05, 70, 54], [True, True, False, True]))
 
 
 @given(
@@ -88,7 +84,7 @@ def test_ks_distance_is_the_largest_gap_of_scipys_ecdfs(
 
 
 def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
-    rows = {(row.lane, row.metric): row for row in compare([pair()], 3)}
+    rows = {(row.lane, row.metric): row for row in hosts.compare([pair()], 3)}
     assert set(rows) == {(lane, metric) for lane in ("all", "a", "b", "c") for metric in MEANS}
     overall = rows["all", "waiting_time_s"]
     assert overall.trips == (4, 3)
@@ -108,39 +104,37 @@ def test_means_are_over_the_trips_that_ended_in_each_host() -> None:
 
 def test_differences_are_paired_by_seed() -> None:
     """Seeds spread widely and the hosts hardly: the interval of the difference is narrow."""
-    pairs = []
-    for seed, level in enumerate((0.0, 10.0, 30.0)):
-        waiting = np.full(4, level)
-        ended = [True] * 4
-        ours = trips(waiting.tolist(), [50.0] * 4, ended)
-        theirs = trips((waiting + 0.1 * (seed + 1)).tolist(), [50.0] * 4, ended)
-        pairs.append(Pair(seed, ours, theirs))
-    row = compare(pairs, 2)[MEANS.index("waiting_time_s")]
+    waits = [(0.0, 0.1), (10.0, 10.2), (30.0, 30.3)]
+    pairs = [
+        Pair(seed, *(trips([wait] * 4, [50.0] * 4, ALL) for wait in both))
+        for seed, both in enumerate(waits)
+    ]
+    row = hosts.compare(pairs, 2)[MEANS.index("waiting_time_s")]
     assert row.difference == pytest.approx(mean_interval([0.1, 0.2, 0.3]))
     assert row.difference.half_width < 0.3 < row.minisim.half_width
 
 
 def test_same_trips_need_both_times() -> None:
-    assert agreement([pair()]) == pytest.approx(2 / 4)
-    assert agreement([Pair(1, pair().minisim, pair().minisim)]) == 1.0
+    assert hosts.agreement([pair()]) == pytest.approx(2 / 4)
+    assert hosts.agreement([SAME]) == 1.0
 
 
 def test_rounding_makes_no_difference() -> None:
-    ours = trips([0.1 + 0.2] * 4, [50.0] * 4, [True] * 4)
-    theirs = trips([0.3] * 4, [50.0 + CLOSE] * 4, [True] * 4)
-    row = compare([Pair(1, ours, theirs)], 2)[0]
+    ours = trips([0.1 + 0.2] * 4, [50.0] * 4, ALL)
+    theirs = trips([0.3] * 4, [50.0 + CLOSE] * 4, ALL)
+    row = hosts.compare([Pair(1, ours, theirs)], 2)[0]
     assert (row.ks, row.within) == (0.0, 1.0)
-    assert times(ours, "waiting_time_s").tolist() == [0.3] * 4
-    assert agreement([Pair(1, ours, theirs)]) == 1.0
+    assert hosts.times(ours, "waiting_time_s").tolist() == [0.3] * 4
+    assert hosts.agreement([Pair(1, ours, theirs)]) == 1.0
 
 
 def test_the_first_divergence_is_the_first_in_demand() -> None:
-    found = first_divergence(pair(seed=7))
+    found = hosts.first_divergence(pair(seed=7))
     assert found is not None
     assert (found.seed, found.vehicle, found.movement, found.depart) == (7, 2, "a3", 30.0)
     assert found.travel == (52.0, 70.0)
     assert found.end == END, "it never arrives in SUMO"
-    assert first_divergence(Pair(1, pair().minisim, pair().minisim)) is None
+    assert hosts.first_divergence(SAME) is None
 
 
 def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
@@ -155,8 +149,8 @@ def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
         )
 
     same = frame({})
-    assert first_parting(same, frame({(4, 1.0): 0.4})) is None
-    found = first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
+    assert hosts.first_parting(same, frame({(4, 1.0): 0.4})) is None
+    found = hosts.first_parting(same, frame({(4, 2.0): 0.6, (6, 2.0): -2.0, (5, 3.0): 9.0}))
     assert found is not None
     assert (found.time, found.vehicle, found.positions) == (2.0, 6, (20.0, 18.0))
     assert found.movement == "a2"
@@ -230,20 +224,19 @@ def result(case: Case, *pairs: Pair) -> Result:
 def test_own_laws_are_judged_by_means_and_the_same_law_trip_by_trip() -> None:
     fair = Case(four_way(profile="fair"), "dim")
     assert result(fair, pair()).hosts_agree
-    waits = Pair(1, pair().minisim, trips([9, 9, 9, 9], [50, 51, 52, 53], [True] * 4))
-    assert not result(fair, waits).hosts_agree
+    assert not result(fair, Pair(1, OURS, trips([9] * 4, [50, 51, 52, 53], ALL))).hosts_agree
     none = trips([0.0] * 4, [50.0] * 4, [False] * 4)
     assert result(fair, Pair(1, none, none)).hosts_agree is None, "no trip ended"
     same = Case(four_way(profile="as_run"), "dim")
     assert not result(same, pair()).hosts_agree, "means agree, half of the trips do not"
-    assert result(same, Pair(1, pair().minisim, pair().minisim)).hosts_agree
+    assert result(same, SAME).hosts_agree
 
 
 def test_replays_are_judged_by_the_papers_means() -> None:
     cell = Cell("balanced", 150, 4)  # published: waiting 0.7084, travel 65.94
     case = Case(replay(*cell), "dim", cell)
-    good = trips([0.75] * 4, [66.4] * 4, [True] * 4)
-    bad = trips([0.75] * 4, [66.6] * 4, [True] * 4)
+    good = trips([0.75] * 4, [66.4] * 4, ALL)
+    bad = trips([0.75] * 4, [66.6] * 4, ALL)
     judged = result(case, Pair(0, good, bad))
     assert judged.meets_paper("minisim") is True
     assert judged.meets_paper("sumo") is False

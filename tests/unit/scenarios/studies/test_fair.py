@@ -38,12 +38,10 @@ def test_crossing_finds_the_root_of_a_line(root: float, slope: float, points: in
 
 def test_crossing_at_the_ends() -> None:
     always = crossing({100.0: (1.0, 1.1), 200.0: (2.0, 2.1)})
-    assert always.density == -math.inf
-    assert always.point == "all"
+    assert (always.density, always.point) == (-math.inf, "all")
     assert crossing({100.0: (1.0, 1.0), 200.0: (-1.0, -1.0)}).point == "up to 150"
     never = crossing({100.0: (-1.0, -1.1), 200.0: (0.0, 0.0)})
-    assert never.density == math.inf
-    assert str(never) == "never"
+    assert (never.density, str(never)) == (math.inf, "never")
     again = crossing({0.0: (-1.0, -1.0), 100.0: (1.0, 1.0), 200.0: (1.0, 1.0), 400.0: (-1.0, -1.0)})
     assert (again.density, again.until) == (50.0, 300.0)
     assert str(again) == "50 to 300 (50 to 50)"
@@ -53,9 +51,8 @@ def test_crossing_at_the_ends() -> None:
 def test_an_open_interval_says_which_end_it_has() -> None:
     """Both means are positive, 1 ± 12.7 and 20 ± 12.7: sure from 100 + 100·11.7/19 on."""
     assert str(crossing({100.0: (0.0, 2.0), 200.0: (19.0, 21.0)})) == "all (162 at the latest)"
-    assert (
-        str(crossing({100.0: (-21.0, -19.0), 200.0: (-2.0, 0.0)})) == "never (138 at the earliest)"
-    )
+    never = crossing({100.0: (-21.0, -19.0), 200.0: (-2.0, 0.0)})
+    assert str(never) == "never (138 at the earliest)"
 
 
 def test_crossing_interval_covers_the_root() -> None:
@@ -82,7 +79,7 @@ def test_differences_are_paired_by_seed() -> None:
         "m": [1.0, 2.0, 3.0, 30.0, 20.0, 40.0], "arrivals": "same", "error": None,
     })  # fmt: skip
     assert paired_differences(rows, "dim", "x", "m") == {150.0: [-18.0, -27.0]}
-    assert paired_differences(rows, "dim", "nobody", "m") == {}
+    assert paired_differences(rows, "dim", "y", "m") == {}
 
 
 def test_total_delay_is_loss_and_departure_delay() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,14 +19,9 @@ from minisim.control import Plan
 from minisim.errors import InputError
 from minisim.results.metrics import MEANS, Metric
 from minisim.results.run import Run
-from minisim.simulation import simulate
 from scenarios import Scenario, five_way, four_way, from_bearings, three_way
-from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
-from scenarios.statistics import (
-    GROWTH_SCORE,
-    mean_interval,
-)
+from scenarios.statistics import GROWTH_SCORE, mean_interval
 from scenarios.sweep import sweep
 from scenarios.sweep.cells import CELL, cells, differences, pairs, saturated
 from scenarios.sweep.keys import RESULTS, canonical, key_of
@@ -41,34 +35,25 @@ Floats = npt.NDArray[np.float64]
 @pytest.mark.parametrize(
     ("scenario", "controller", "expected"),
     [
-        (five_way(350), "dim", True),  # the paper's own: lane e keeps queueing
-        (five_way(350, profile="fair"), "dim:gate=harmonious", False),
-        (four_way(150), "dim", False),
-        (four_way(350), "fixed-time", False),  # x = 0.96, with swings of 25 vehicles a cycle
-        (four_way(500), "fixed-time", True),
+        (five_way(350), "dim", "growing"),  # the paper's own: lane e keeps queueing
+        (five_way(350, profile="fair"), "dim:gate=harmonious", ""),
+        (four_way(150), "dim", ""),
+        (four_way(350), "fixed-time", ""),  # x = 0.96, with swings of 25 vehicles per cycle
+        (four_way(500), "fixed-time", "growing"),
+        (four_way(350, horizon=100), "dim", "too_short"),  # the road still fills
     ],
 )
-def test_real_runs(scenario: Scenario, controller: str, expected: bool) -> None:
-    rows = [outcome_of(Recipe(scenario, controller_named(controller), seed)).row for seed in (1, 2)]
+def test_real_runs(scenario: Scenario, controller: str, expected: str) -> None:
+    rows = [outcome_of(Recipe(scenario, controller, seed)).row for seed in (1, 2)]
     (cell,) = cells(pd.DataFrame(rows)).to_dict("records")
-    assert cell["growing"] is expected
-
-
-def test_a_road_that_still_fills_says_nothing_of_queues() -> None:
-    row = outcome_of(Recipe(four_way(350, horizon=100), Dim(), 1)).row
-    (cell,) = cells(pd.DataFrame([row])).to_dict("records")
-    assert row["queue_growth"] > 0.0
-    assert cell["too_short"]
-    assert not cell["growing"]
-
-
-# --- cells -----------------------------------------------------------------------------------
+    for word in ("growing", "too_short"):
+        assert cell[word] is (word == expected)
 
 
 @pytest.fixture(scope="module")
 def rows() -> pd.DataFrame:
     todo = [
-        Recipe(four_way(density, horizon=300), controller_named(name), seed)
+        Recipe(four_way(density, horizon=300), name, seed)
         for density in (150, 300)
         for name in ("dim", "dim:gate=harmonious", "unregulated")
         for seed in (1, 2, 3)
@@ -78,26 +63,20 @@ def rows() -> pd.DataFrame:
 
 def test_cells_average_both_forms(rows: pd.DataFrame) -> None:
     found = cells(rows)
-    assert list(zip(found["density"], found["controller"], strict=True))[:2] == [
-        (150, "dim"), (150, "dim:gate=harmonious"),
-    ]  # fmt: skip
+    names = ["dim", "dim:gate=harmonious", "unregulated"]
+    assert found["density"].tolist() == [150] * 3 + [300] * 3
+    assert found["controller"].tolist() == names * 2
     first = found.iloc[0]
-    group = rows[:3]
     assert (first["runs"], first["failed"]) == (3, 0)
     for metric in (*MEANS, *(f"complete_{name}" for name in MEANS)):
-        interval = mean_interval(group[metric].tolist())
+        interval = mean_interval(rows[:3][metric].tolist())
         assert first[metric] == interval.mean
         assert first[f"{metric}_ci95"] == interval.half_width
         assert first[f"{metric}_pi95"] == pytest.approx(2 * interval.half_width)  # √(n+1), n = 3
-    assert first["trips"] == group["trips"].sum()
+    assert first["trips"] == rows[:3]["trips"].sum()
     assert set(CELL) < set(found.columns)
-
-
-def test_a_cell_of_failures_has_no_means(rows: pd.DataFrame) -> None:
-    last = cells(rows).iloc[-1]
-    assert last["controller"] == "unregulated"
-    assert last["failed"] > 0
-    assert last["runs"] == 3 - last["failed"]
+    last = found.iloc[-1]
+    assert last["runs"] == 3 - last["failed"] < 3
     assert math.isnan(last["waiting_time_s"]) == (last["runs"] == 0)
 
 
@@ -105,10 +84,8 @@ def test_differences_are_of_pairs(rows: pd.DataFrame) -> None:
     found = differences(rows, "complete_waiting_time_s", "dim", "dim:gate=harmonious")
     assert found["density"].tolist() == [150, 300]
     assert found["pairs"].tolist() == [3, 3]
-    values = rows[rows["density"] == 300].set_index(["controller", "seed"])[
-        "complete_waiting_time_s"
-    ]
-    expected = (values["dim"] - values["dim:gate=harmonious"]).mean()
+    means = rows[rows["density"] == 300].groupby("controller")["complete_waiting_time_s"].mean()
+    expected = means["dim"] - means["dim:gate=harmonious"]
     assert found["difference"][1] == pytest.approx(expected)
     assert found["difference"][1] > 0, "the harmonious gate lets more in"
 
@@ -140,21 +117,17 @@ def crossings_of(run: Run) -> int:
 
 
 def slowness(run: Run) -> Floats:
-    """Another one: seconds a trip has lost over those that it drove."""
-    return np.where(
-        run.columns.travel_time > 0.0, run.columns.time_loss / run.columns.travel_time, np.nan
-    )
+    """Another one: the share of each trip's time that is lost."""
+    trips = run.columns
+    return np.where(trips.travel_time > 0.0, trips.time_loss / trips.travel_time, np.nan)
 
 
 OWN = (Metric("departures", crossings_of), Metric("slowness", slowness, per="trip"))
 
 
 def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
-    todo = [
-        Recipe(four_way(300, horizon=180), controller_named(name), seed)
-        for name in ("dim", "fixed-time")
-        for seed in (1, 2)
-    ]
+    what = four_way(300, horizon=180)
+    todo = [Recipe(what, name, seed) for name in ("dim", "fixed-time") for seed in (1, 2)]
     with Store(tmp_path / "runs.db") as store:
         first = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
         again = sweep(todo, jobs=1, store=store, metrics=["waiting_time_s", *OWN])
@@ -162,8 +135,7 @@ def test_an_own_metric_is_stored_averaged_and_compared(tmp_path: Path) -> None:
         sweep(todo, jobs=1, store=store)
         assert len(store) == 8, "runs that measure less are others"
     pd.testing.assert_frame_equal(first, again)
-    run = simulate(todo[0].scenario, todo[0].controller, 1)
-    summary = run.summary(["waiting_time_s", *OWN])
+    summary = todo[0].run().summary(["waiting_time_s", *OWN])
     for name in ("departures", "slowness", "slowness_p95", "waiting_time_s_max"):
         assert first[name][0] == summary[name]
     assert first["lanes_a_slowness"][0] == summary["lanes"]["a"]["slowness"]
@@ -213,20 +185,14 @@ def test_a_global_that_an_own_metric_reads_is_part_of_the_key(
 @pytest.mark.parametrize(
     ("of", "message"),
     [
-        (lambda run: "many", r"metric 'mine' must give one finite number or None, got 'many'"),
-        (
-            lambda run: run.trips["wait"],
-            r"metric 'mine' raised KeyError: 'wait' \(test_cells.py, .*",
-        ),
+        (lambda run: "many", "metric 'mine' must give one finite number or None, got 'many'"),
+        (lambda run: run.trips["wait"], "metric 'mine' raised KeyError: 'wait' (test_cells.py, "),
     ],
 )
 def test_a_metric_that_fails_is_a_failed_run(of: Callable[[Run], Any], message: str) -> None:
     todo = [Recipe(four_way(50, horizon=20), Dim(), 1)]
     (error,) = sweep(todo, jobs=1, metrics=[Metric("mine", of)])["error"]
-    assert re.fullmatch(message, error)
-
-
-# --- experiments -----------------------------------------------------------------------------
+    assert error.startswith(message)
 
 
 def test_equal_numbers_are_one_experiment() -> None:
@@ -244,37 +210,35 @@ def test_what_has_no_canonical_form(odd: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "controller", "expected"),
+    ("make", "density", "horizon", "profile", "controller", "expected"),
     [
-        (four_way(300, horizon=900), "dim", (275, 31, 5.91, 99.77, 6.88)),
-        (
-            three_way(350, horizon=900, profile="fair"),
-            "dim:gate=harmonious",
-            (243, 29, 0.96, 75.65, -0.74),
-        ),
-        (
-            four_way(250, horizon=900, profile="fair"),
-            "fixed-time",
-            (229, 30, 19.51, 95.20, 5.74),
-        ),
-        (four_way(250, horizon=300, profile="as_run"), "dim", (72, 25, 1.25, 53.52, 9.29)),
+        (four_way, 300, 900, "paper", "dim", (275, 31, 5.91, 99.77, 6.88)),
+        (three_way, 350, 900, "fair", "dim:gate=harmonious", (243, 29, 0.96, 75.65, -0.74)),
+        (four_way, 250, 900, "fair", "fixed-time", (229, 30, 19.51, 95.20, 5.74)),
+        (four_way, 250, 300, "as_run", "dim", (72, 25, 1.25, 53.52, 9.29)),
     ],
 )
 def test_changed_results_need_another_version(
-    scenario: Scenario, controller: str, expected: tuple[float, ...]
+    make: Any,
+    density: int,
+    horizon: int,
+    profile: str,
+    controller: str,
+    expected: tuple[float, ...],
 ) -> None:
     """Stores keep rows by version. When rows change, raise `RESULTS` and update these numbers."""
-    recipe = controller_named(controller, scenario.profile)
-    row = outcome_of(Recipe(scenario, recipe, 1, on_collision="record")).row
-    columns = (
-        "trips", "unfinished", "waiting_time_s", "complete_travel_time_s", "queue_growth",
-    )  # fmt: skip
-    found = [row[column] for column in columns]
+    scenario = make(density, horizon=horizon, profile=profile)
+    row = outcome_of(Recipe(scenario, controller, 1, on_collision="record")).row
+    times = ("waiting_time_s", "complete_travel_time_s", "queue_growth")
+    found = [row[column] for column in ("trips", "unfinished", *times)]
     assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
     assert RESULTS == 5
 
 
-# --- growing queues -------------------------------------------------------------------------
+def quiet(trips: int) -> dict[str, int]:
+    """Columns of three lanes with so many trips each, and no queue."""
+    lanes = {f"lanes_{k}_{key}": 0 for k in "abc" for key in ("trips", "queue_growth")}
+    return {"arms": 3, **lanes, **{f"lanes_{k}_trips": trips for k in "abc"}}
 
 
 @pytest.mark.parametrize(
@@ -288,25 +252,18 @@ def test_changed_results_need_another_version(
     ],
 )
 def test_roads_that_fill_are_no_growing_queue(run: Mapping[str, Any], expected: bool) -> None:
-    quiet = {f"lanes_{k}_{key}": 0 for k in "abc" for key in ("trips", "queue_growth")}
-    row = {"arms": 3, "trips": 100, "queue_growth": 100.0, **quiet, **free_flow(60.0), **run}
+    row = {"trips": 100, "queue_growth": 100.0, **quiet(0), **free_flow(60.0), **run}
     assert saturated(pd.DataFrame([row])) is expected
 
 
 def test_saturated_sums_over_runs_and_lanes() -> None:
     """`GROWTH_SCORE` standard deviations √(5/12 · trips); two runs have √2 times that."""
     limit = GROWTH_SCORE * math.sqrt(5.0 / 12.0 * 120)
-    quiet = {
-        f"lanes_{k}_{key}": v for k in "abc" for key, v in (("trips", 40), ("queue_growth", 0))
-    }
-    one = {"arms": 3, "trips": 120, "queue_growth": 0.9 * limit, **quiet, **free_flow(60.0)}
+    one = {"trips": 120, "queue_growth": 0.9 * limit, **quiet(40), **free_flow(60.0)}
     assert not saturated(pd.DataFrame([one]))
     assert saturated(pd.DataFrame([one, one]))
     lane = {**one, "queue_growth": 0.0, "lanes_c_queue_growth": 0.9 * limit}
     assert saturated(pd.DataFrame([lane])), "1/√3 of the junction's limit is a lane's"
-
-
-# --- what must not be pooled -----------------------------------------------------------------
 
 
 def refused(todo: Sequence[Recipe], first: str, second: str, told: str) -> None:
@@ -325,7 +282,7 @@ def test_two_controllers_of_one_name_are_not_one_cell(shift: int) -> None:
         for k in (1, 2)
         for seed in (1, 2, 3)
     ]
-    told = r"different controllers or scenarios are called fixed on four-way at 100 veh/h/lane"
+    told = "different controllers or scenarios are called fixed on four-way at 100 veh/h/lane"
     refused([*todo, Recipe(scenario, Dim(), 1)], "fixed", "dim", told)
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from collections.abc import Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,32 +13,18 @@ import pytest
 
 import minisim
 from dim import Dim
-from minisim.control import Command, Plan, Site, Unregulated, View
+from minisim.control import Command, Unregulated, View
 from minisim.errors import InputError
 from minisim.results.metrics import Metric
 from scenarios import four_way, three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
 from scenarios.sweep.pool import workers
-from tests import ROOT
-from tests.builders import repeatable
+from tests.builders import Scripted, python, repeatable
 
 
-@dataclass(frozen=True)
-class Broken:
-    """A controller with a bug."""
-
-    name: str = "broken"
-
-    def start(self, site: Site) -> BrokenSession:
-        return BrokenSession()
-
-
-class BrokenSession:
-    plan = Plan()
-
-    def decide(self, view: View) -> Iterable[Command]:
-        raise ZeroDivisionError("a bug")
+def broken(view: View) -> Iterable[Command]:
+    raise ZeroDivisionError("a bug")
 
 
 class Backwards(Executor):
@@ -67,7 +51,9 @@ def recipes() -> list[Recipe]:
 
 
 def test_rows_are_the_flat_summaries_in_order() -> None:
-    rows = sweep(recipes(), ThreadPoolExecutor(1))
+    calls: list[tuple[int, int]] = []
+    rows = sweep(recipes(), ThreadPoolExecutor(1), lambda *counts: calls.append(counts))
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert list(rows["scenario"]) == ["three-way", "three-way", "four-way", "four-way"]
     assert list(rows["seed"]) == [1, 2, 1, 2]
     summary = minisim.simulate(four_way(300, horizon=120), Dim(), seed=2).summary()
@@ -88,37 +74,26 @@ def test_rows_do_not_depend_on_the_executor() -> None:
 
 def test_default_is_a_pool_of_processes() -> None:
     script = (
+        "from scenarios import three_way\n"
         "from scenarios.recipe import Recipe\n"
         "from scenarios.sweep import sweep\n"
-        "from scenarios import three_way\n"
-        "from dim import Dim\n"
         "if __name__ == '__main__':\n"
-        "    rows = sweep([Recipe(three_way(0, horizon=1), Dim())])\n"
+        "    rows = sweep([Recipe(three_way(0, horizon=1), 'dim')])\n"
         "    print(len(rows), rows['trips'].sum())\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["1", "0"]
+    assert python("-c", script).stdout.split() == ["1", "0"]
 
 
 def test_a_failed_run_is_a_row() -> None:
-    crash = Recipe(four_way(300, horizon=600), Unregulated(), 1)
-    bug = Recipe(four_way(300, horizon=60), Broken(), 1)
-    good = Recipe(four_way(300, horizon=60), Dim(), 1)
-    rows = sweep([crash, bug, good], workers(1))
+    who = Unregulated(), Scripted(broken, name="broken"), Dim()
+    rows = sweep([Recipe(four_way(300, horizon=600), it, 1) for it in who], workers(1))
     assert list(rows["controller"]) == ["unregulated", "broken", "dim"]
     assert "touched" in rows["error"][0]
-    assert rows["error"][1] == "ZeroDivisionError: a bug"
+    assert rows["error"][1].startswith("controller 'broken' at 0.0 s: test_sweep.py, line ")
+    assert rows["error"][1].endswith("ZeroDivisionError: a bug")
     assert rows["error"].isna().tolist() == [False, False, True]
     assert rows["density"].tolist() == [300.0] * 3
     assert math.isnan(rows["trips"][0])
-
-
-def test_progress_counts_every_run() -> None:
-    calls: list[tuple[int, int]] = []
-    sweep(recipes(), ThreadPoolExecutor(1), lambda done, total: calls.append((done, total)))
-    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_interrupt_cancels_what_has_not_begun() -> None:
@@ -150,7 +125,7 @@ def test_bad_input(wrong: Any, message: str) -> None:
 
 def test_what_other_processes_cannot_have_is_said_before_anything_runs() -> None:
     @dataclass(frozen=True)
-    class Local(Broken):
+    class Local(Unregulated):
         pass
 
     two = [Recipe(three_way(0, horizon=1), Dim(), seed) for seed in (1, 2)]

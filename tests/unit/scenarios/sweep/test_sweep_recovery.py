@@ -15,7 +15,6 @@ import pandas as pd
 import pytest
 
 from dim import Dim
-from minisim.errors import FileError
 from scenarios import three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
@@ -24,7 +23,7 @@ from scenarios.sweep.keys import key_of
 from scenarios.sweep.pool import pooled, processes
 from scenarios.sweep.store import Store
 from tests import ROOT
-from tests.builders import Deadly, killing, repeatable
+from tests.builders import Deadly, killing, python, repeatable, stored
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX's")
 
@@ -35,35 +34,31 @@ def quick(count: int) -> list[Recipe]:
     return [Recipe(three_way(200, horizon=30), Dim(), seed) for seed in range(count)]
 
 
-def test_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
-    once = Recipe(EMPTY, Deadly(str(tmp_path / "killed")))
-    todo = [*quick(3), once, *quick(6)[3:]]
-    rows = sweep(todo, jobs=2)
-    assert (tmp_path / "killed").exists()
-    assert rows["error"].isna().all()
-    pd.testing.assert_frame_equal(repeatable(rows), repeatable(sweep(todo, jobs=1)))
-
-
-def test_only_the_run_that_kills_every_time_fails(tmp_path: Path) -> None:
-    todo = [*quick(6)[:2], Recipe(EMPTY, Deadly()), *quick(6)[2:]]
+def test_only_the_run_that_kills_its_worker_every_time_fails(tmp_path: Path) -> None:
+    once, always = (Recipe(EMPTY, Deadly(name)) for name in (str(tmp_path / "killed"), ""))
+    good = [*quick(3), once, *quick(6)[3:]]
     with Store(tmp_path / "s.db") as store:
-        rows = sweep(todo, jobs=2, store=store)
-        assert len(store) == 7
-    assert rows["error"].isna().tolist() == [True, True, False, True, True, True, True]
-    assert rows["error"][2].startswith("BrokenProcessPool: ")
-    assert rows["controller"][2] == "deadly"
+        rows = sweep([*good, always], jobs=2, store=store)
+        assert len(store) == 8
+    assert (tmp_path / "killed").exists()
+    assert rows["error"].isna().tolist() == [True] * 7 + [False]
+    assert rows["error"][7].startswith("BrokenProcessPool: ")
+    assert rows["controller"][7] == "deadly"
+    survivors, alone = (
+        repeatable(them).dropna(axis="columns", how="all")
+        for them in (rows[:7], sweep(good, jobs=1))
+    )
+    pd.testing.assert_frame_equal(survivors, alone, check_dtype=False)
 
 
 def test_a_killed_worker_costs_a_comparison_nothing(tmp_path: Path) -> None:
     """A task whose process dies is tried again alone; only one that dies every time is lost."""
-    once = {k: str(tmp_path / "killed") if k == 1 else "" for k in range(3)}
-    answers = dict(pooled(killing, once, 2, pool_of=processes))
-    assert answers == {0: 7, 1: 7, 2: 7}
+    once = {0: "", 1: str(tmp_path / "killed"), 2: ""}
+    assert dict(pooled(killing, once, 2, pool_of=processes)) == {0: 7, 1: 7, 2: 7}
     assert (tmp_path / "killed").exists()
-    always = {0: "", 1: "always", 2: ""}
-    answers = dict(pooled(killing, always, 2, pool_of=processes))
-    assert (answers[0], answers[2]) == (7, 7)
-    assert isinstance(answers[1], BrokenExecutor)
+    answers = dict(pooled(killing, once | {1: "always"}, 2, pool_of=processes))
+    assert isinstance(answers.pop(1), BrokenExecutor)
+    assert answers == {0: 7, 2: 7}
 
 
 def test_giving_up_ends_what_runs() -> None:
@@ -90,17 +85,13 @@ if __name__ == "__main__":
 def test_workers_end_with_a_killed_parent(tmp_path: Path) -> None:
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
-    parent = subprocess.Popen(
-        [sys.executable, script], env=ENVIRONMENT,
-        stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    assert parent.stdout is not None
-    with parent.stdout:
+    command = [sys.executable, script]
+    with subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
         pids = parent.stdout.readline().split()
         assert pids
         assert all(map(alive, pids))
         parent.kill()
-        parent.wait(timeout=20)
     deadline = time.monotonic() + 20
     while any(map(alive, pids)) and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -115,44 +106,28 @@ def alive(pid: str) -> bool:
         return False
 
 
-SWEEP = """
-seeds = {seeds}
-scenario = ["three-way", "four-way"]
-density = [150, 300]
-controller = ["dim", "fixed-time"]
-horizon = {horizon}
-"""
-
-
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
-def command_of(file: Path, store: Path, jobs: int) -> list[str]:
-    return [
-        sys.executable, "-m", "minisim", "sweep", str(file), "--out", str(store),
-        "--jobs", str(jobs),
-    ]  # fmt: skip
-
-
-def stored(path: Path) -> int:
-    try:
-        with Store(path, create=False) as store:
-            return len(store)
-    except FileError:
-        assert not path.exists() or not path.stat().st_size, "never a broken store"
-        return 0
+def sweep_of(folder: Path, jobs: int, seeds: int, horizon: int) -> tuple[list[str], Path, Path]:
+    """A command, its file of 8 runs per seed, and its store."""
+    file, store = folder / "sweep.toml", folder / "s.db"
+    file.write_text(
+        'scenario = ["three-way", "four-way"]\ncontroller = ["dim", "fixed-time"]\n'
+        f"density = [150, 300]\nseeds = {seeds}\nhorizon = {horizon}\n"
+    )
+    run = [sys.executable, "-m", "minisim", "sweep", str(file), "--out", str(store)]
+    return [*run, "--jobs", str(jobs)], file, store
 
 
 def killed_and_restarted(tmp_path: Path, kills: int, jobs: int, seeds: int, horizon: int) -> None:
     """Kill a sweep at random moments: in the end its rows are those of an undisturbed one.
 
-    Every second kill comes up to 0.3 s after something was stored, when the sweep certainly is at
-    work, the others at any moment from the start of the process on.
+    Every second kill comes up to 0.3 s after a row was stored, when the sweep is surely at work;
+    the others come at any moment after the start of the process.
     """
     chance = random.Random(4)
-    file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
-    file.write_text(SWEEP.format(seeds=seeds, horizon=horizon))
-    command = command_of(file, path, jobs)
+    command, file, path = sweep_of(tmp_path, jobs, seeds, horizon)
     total = 8 * seeds
     counts = []
     for kill in range(kills):
@@ -190,9 +165,7 @@ def test_a_sweep_killed_twenty_times_ends_as_an_undisturbed_one(tmp_path: Path) 
 
 
 def test_two_sweeps_may_share_a_store(tmp_path: Path) -> None:
-    file, path = tmp_path / "sweep.toml", tmp_path / "s.db"
-    file.write_text(SWEEP.format(seeds=3, horizon=60))
-    command = command_of(file, path, jobs=1)
+    command, _, path = sweep_of(tmp_path, jobs=1, seeds=3, horizon=60)
     both = [
         subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
         for _ in range(2)
@@ -222,8 +195,5 @@ def test_giving_up_leaves_no_traceback_of_a_thread(tmp_path: Path) -> None:
     """A pool of Python's fails over a run that is cancelled while others are under way."""
     script = tmp_path / "script.py"
     script.write_text(INTERRUPTED)
-    done = subprocess.run(
-        [sys.executable, script], env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = python(str(script))
     assert (done.stdout, done.stderr) == ("interrupted\n", "")
