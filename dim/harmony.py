@@ -33,8 +33,7 @@ PAPER_ARMS = (3, 4, 5)  #: arm counts for which the authors published a matrix
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
-    Raises `InputError`, with the entry, unless it is square, symmetric, and made of 0 and 1 (0
-    within a lane).
+    Raises `InputError`, with the entry, unless it is symmetric and all 0 or 1 (0 within a lane).
     """
 
     n: int  #: number of arms, 3 … 12
