@@ -223,7 +223,7 @@ def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
 
 def _arms(columns: int, where: str) -> int:
     for n in range(3, len(ARM_NAMES) + 1):
-        if n * (n - 1) == columns:
+        if len(movements_of(n)) == columns:
             return n
     raise InputError(
         f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"
