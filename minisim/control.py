@@ -105,9 +105,10 @@ def can_stop(vehicle: Observed, deceleration: float) -> bool:
 
     Only position and speed count, so every observer comes to the same answer.
     """
-    stands = vehicle.speed == 0.0 and vehicle.distance >= 0.0
-    needed = stopping_distance(vehicle.speed, deceleration) + COMMIT_MARGIN
-    return stands or needed <= vehicle.distance
+    speed, distance = vehicle.speed, vehicle.distance
+    if speed == 0.0:
+        return distance >= 0.0
+    return speed * speed / (2.0 * deceleration) + COMMIT_MARGIN <= distance
 
 
 class View(NamedTuple):
