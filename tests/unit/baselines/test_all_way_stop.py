@@ -114,12 +114,11 @@ def test_a_later_vehicle_without_conflicts_overtakes() -> None:
     assert show(session, 11.0, seen(1, 0, 2, 0.1, 0.4), b, d) == ["Go 3"]
 
 
-def test_a_younger_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
+def test_a_later_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
     # The reaction time of each starts with its own standstill, but the order is that of standing.
     a, b = standing(1, 0), standing(2, 1)
     session = AllWayStop().start(SITE)
-    assert show(session, 9.0, a) == []
-    assert show(session, 9.5, a, b) == []
+    assert show(session, 9.0, a) == show(session, 9.5, a, b) == []
     assert show(session, 10.0, a, b) == ["Go 1"]
     assert show(session, 10.5, seen(1, 0, 2, -0.5, 1.0), b) == []
 
@@ -149,9 +148,8 @@ class EveryStep:
         return session
 
 
-@pytest.mark.parametrize("density", [150.0, 350.0])
-def test_to_look_in_every_step_would_change_nothing(density: float) -> None:
-    scenario = four_way(density, profile="fair", horizon=600.0)
+def test_to_look_in_every_step_would_change_nothing() -> None:
+    scenario = four_way(350, profile="fair", horizon=600.0)
     some, all_ = (
         minisim.simulate(scenario, controller, seed=3) for controller in (AllWayStop(), EveryStep())
     )
@@ -170,11 +168,8 @@ def test_it_carries_what_was_measured_in_the_field() -> None:
 
 
 def test_every_vehicle_gets_its_turn() -> None:
-    run = minisim.simulate(
-        drained(four_way(350, split=(8, 8, 8, 1), profile="fair", horizon=600.0), 1, 2000.0),
-        AllWayStop(),
-    )
-    trips = run.columns
+    busy = four_way(350, split=(8, 8, 8, 1), profile="fair", horizon=600.0)
+    trips = minisim.simulate(drained(busy, 1, 2000.0), AllWayStop()).columns
     assert trips.arrived.all()
     # Lane d has hardly a queue of its own, so no vehicle there waits for long.
     assert trips.waiting_time[trips.lane == 3].max() < 40.0

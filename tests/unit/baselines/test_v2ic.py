@@ -109,14 +109,12 @@ def test_a_waiting_vehicle_blocks_those_in_conflict_behind_it() -> None:
     a2, b2 = car(1, 0, 2, 20.0), car(2, 1, 2, 60.0)
     assert conflicts[index(a2.movement), index(b2.movement)]
     run = session()
-    commands = list(run.decide(view(0.0, a2, b2)))
-    assert [c for c in commands if isinstance(c, Go)] == [Go(1)]
+    assert [c for c in run.decide(view(0.0, a2, b2)) if isinstance(c, Go)] == [Go(1)]
     c1 = car(4, 2, 1, 150.0)
     assert conflicts[index(c1.movement), index(b2.movement)]
     assert not conflicts[index(c1.movement), index(a2.movement)]
-    commands = list(
-        run.decide(view(1.0, car(1, 0, 2, 6.0, speed=2.0), car(2, 1, 2, 50.0, speed=2.0), c1))
-    )
+    a2, b2 = car(1, 0, 2, 6.0, speed=2.0), car(2, 1, 2, 50.0, speed=2.0)
+    commands = list(run.decide(view(1.0, a2, b2, c1)))
     assert Go(4) not in commands
     assert any(isinstance(c, Advise) and c.vehicle == 4 and c.speed < 14.0 for c in commands)
 
@@ -134,9 +132,8 @@ def test_the_right_of_way_comes_when_the_other_has_left_and_not_before() -> None
 
 
 def test_a_vehicle_alone_is_not_delayed() -> None:
-    trip = (0.0, 0, 2)
-    run = minisim.simulate(replayed(FAIR_FOUR, trip, horizon=120.0), V2IC())
-    free = minisim.simulate(replayed(FAIR_FOUR, trip, horizon=120.0), minisim.control.Unregulated())
+    scenario = replayed(FAIR_FOUR, (0.0, 0, 2), horizon=120.0)
+    run, free = (minisim.simulate(scenario, it) for it in (V2IC(), minisim.control.Unregulated()))
     assert run.columns.travel_time == pytest.approx(free.columns.travel_time)
 
 
