@@ -46,11 +46,9 @@ class Traffic(RuleBasedStateMachine):
     commit = "stoppable"
 
     @initialize(
-        n=st.sampled_from([3, 4, 5]),
-        gate=st.sampled_from(GATES),
-        order=st.sampled_from(ORDERS),
+        n=st.sampled_from([3, 4, 5]), gate=st.sampled_from(GATES), order=st.sampled_from(ORDERS),
         profile=st.sampled_from(["paper", "fair"]),
-    )
+    )  # fmt: skip
     def begin(self, n: int, gate: str, order: str, profile: str) -> None:
         self.n = n
         self.road: Scenario = regular(n, arm_length=ARM_LENGTH, profile=profile)
@@ -93,10 +91,12 @@ class Traffic(RuleBasedStateMachine):
     def _add(self, time: float, lane: int, manoeuvre: int) -> None:
         before = self._view()
         self.trips.append((round(time, 1), lane % self.n, 1 + manoeuvre % (self.n - 1)))
-        # Ids follow the order of demand: those of earlier vehicles stay.
-        assert [v[1:] for v in self._view().vehicles if v.distance < ARM_LENGTH - 15] == [
-            v[1:] for v in before.vehicles if v.distance < ARM_LENGTH - 15
-        ]
+        # Earlier vehicles stay what they are, but for ids, which follow the order of demand.
+        old, new = (
+            [v[1:] for v in view.vehicles if v.distance < ARM_LENGTH - 15]
+            for view in (before, self._view())
+        )
+        assert new == old
 
     def _run_to(self, time: float) -> None:
         self.time = round(time, 1)
@@ -251,11 +251,8 @@ class CarelessTraffic(Traffic):
 
 def test_the_machine_finds_what_the_papers_commit_rule_does() -> None:
     wanted = settings(
-        max_examples=60,
-        stateful_step_count=15,
-        phases=[Phase.generate],
-        report_multiple_bugs=False,
-        print_blob=False,
-    )
+        max_examples=60, stateful_step_count=15, phases=[Phase.generate],
+        report_multiple_bugs=False, print_blob=False,
+    )  # fmt: skip
     with pytest.raises(CollisionError):
         run_state_machine_as_test(CarelessTraffic, settings=wanted)
