@@ -22,7 +22,8 @@ TICK = 1e-6
 def check_greens(shortest: float, longest: float) -> None:
     """Raise `InputError` if the longest green is below the shortest [s]."""
     if longest < shortest:
-        raise InputError(f"max_green must be at least min_green, {shortest:g} s, got {longest:g} s")
+        low, got = float(shortest), float(longest)  # a Fraction has no format
+        raise InputError(f"max_green must be at least min_green, {low:g} s, got {got:g} s")
 
 
 def shortest_detector(site: Site) -> float:

@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -27,6 +26,7 @@ from scenarios.cli import main
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import description_of, key_of
 from tests import ROOT
+from tests.builders import python
 
 GUIDE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
@@ -56,11 +56,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def output(tree: Path, *arguments: str) -> str:
-    environment = {**os.environ, "MINISIM_JIT": "0", "PYTHONPATH": f"{tree}{os.pathsep}{ROOT}"}
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=tree, env=environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    places = f"{tree}{os.pathsep}{ROOT}"
+    done = python(*arguments, cwd=tree, MINISIM_JIT="0", PYTHONPATH=places)
     assert not done.returncode, done.stderr
     return done.stdout
 

@@ -42,7 +42,7 @@ SHORT = Scenario(name="short", intersection=FOUR, demand=DEMAND, profile=FAIR, h
 
 GEOMETRY = {"side": "left", "lane_width": 3.2, "junction_radius": 8.0, "arm_length": 200.0}
 TRAFFIC = {
-    "density": 100.0, "split": None, "turns": (1, 1, 1), "model": "poisson", "min_headway": 1.0,
+    "density": 100.0, "split": None, "turns": (1, 1, 1), "model": "shifted", "min_headway": 1.0,
 }  # fmt: skip
 RUN = {"profile": "fair", "horizon": 60.0, "recorded": None}
 

@@ -75,8 +75,7 @@ class Traffic(RuleBasedStateMachine):
 
     @rule(first=st.tuples(LANES, TURNS), second=st.tuples(LANES, TURNS), tenths=st.integers(0, 15))
     def a_pair_comes(self, first: tuple[int, int], second: tuple[int, int], tenths: int) -> None:
-        """On an empty road, so close together that the second may revoke the right of way of the
-        first when that one can no longer stop."""
+        """On an empty road: the second may revoke the first's right of way when it cannot stop."""
         self._run_to(self.time + EMPTIED)
         self._add(self.time, *first)
         self._add(self.time + tenths / 10, *second)
@@ -85,8 +84,7 @@ class Traffic(RuleBasedStateMachine):
     def teardown(self) -> None:
         """In the end every vehicle has been served."""
         if self.trips:
-            run = self._simulation().run()
-            assert run.columns.arrived.all()
+            assert self._simulation().run().columns.arrived.all()
 
     def _add(self, time: float, lane: int, manoeuvre: int) -> None:
         before = self._view()
@@ -99,15 +97,12 @@ class Traffic(RuleBasedStateMachine):
         assert new == old
 
     def _run_to(self, time: float) -> None:
+        """Vehicles that can no longer stop before the junction have the right of way there."""
         self.time = round(time, 1)
-        for vehicle in self._view().vehicles:
-            self._obeys(vehicle)
-
-    def _obeys(self, vehicle: Observed) -> None:
-        """A vehicle that can no longer stop before the junction has the right of way."""
         b = self.road.profile.vehicle.deceleration
-        if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
-            assert vehicle.id in self.going
+        for vehicle in self._view().vehicles:
+            if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
+                assert vehicle.id in self.going
 
     def _view(self) -> View:
         simulation = self._simulation()

@@ -35,7 +35,8 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
     intersection = replace(draw(intersections(3, 5)), arm_length=roads)
     demand = draw(demands(intersection.n, max_density=250.0))
     scenario = Scenario(
-        "random", intersection, demand, draw(st.sampled_from([PAPER, FAIR])),
+        name="random", intersection=intersection, demand=demand,
+        profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=DEMANDED + DRAINED,
         recorded=demand.draw(intersection.n, DEMANDED, seed=draw(st.integers(0, 1000))),
     )  # fmt: skip

@@ -16,8 +16,6 @@ from tests.builders import replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")
 SITE = FAIR_FOUR.site(1)
-
-
 car = partial(seen, speed=14.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -152,6 +153,6 @@ def test_it_waits_longer_than_the_adaptive_signal_where_one_lane_has_most() -> N
 
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(InputError, match="max_green must be at least min_green, 20 s, got 10 s"):
-        Actuated(min_green=20.0, max_green=10.0)
+        Actuated(min_green=20.0, max_green=Fraction(10))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="order must be the lanes a … d"):
         Actuated(order=(0, 1, 1, 3)).start(SITE)
