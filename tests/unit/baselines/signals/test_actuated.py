@@ -143,7 +143,7 @@ def test_no_green_ends_while_its_queue_stands_with_the_loop_in_a_gap() -> None:
 
 def test_it_waits_longer_than_the_adaptive_signal_where_one_lane_has_most() -> None:
     """The claim "ATS declines" at 4:3:2:1 depends on it (as published: 5.9 to 7.9 s)."""
-    scenario = four_way(350, profile=AS_RUN_SIGNALS, split=(4, 3, 2, 1))
+    scenario = four_way(350, profile=AS_RUN_SIGNALS, split=(4, 3, 2, 1), horizon=1800.0)
     actuated, adaptive = (
         minisim.simulate(scenario, signal, seed=1).summary()["waiting_time_s"]
         for signal in (Actuated(presence=False), Adaptive())
