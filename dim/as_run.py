@@ -63,7 +63,6 @@ HELD_SPEED = 0.0  #: desired in the yellow zone without right of way [m/s]
 GO_SPEED = 10.0  #: desired with right of way [m/s]
 GREEN_SPEED = 50.0  #: desired in the green zone [m/s]
 EXIT_SPEED = 20.0  #: desired beyond the bound, if nothing else is asked for [m/s]
-
 INSERTION = 0.1  #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m]
 ROUNDING = 1e-9  #: tolerance when a mark and a distance are compared [m]
 

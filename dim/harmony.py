@@ -33,8 +33,7 @@ PAPER_ARMS = (3, 4, 5)  #: arm counts for which the authors published a matrix
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
-    Raises `InputError`, with the entry, unless it is square, symmetric, and made of 0 and 1 (0
-    within a lane).
+    Raises `InputError`, with the entry, unless it is symmetric and all 0 or 1 (0 within a lane).
     """
 
     n: int  #: number of arms, 3 … 12
@@ -224,7 +223,7 @@ def _table(data: bytes, where: str) -> list[tuple[int, list[str]]]:
 
 def _arms(columns: int, where: str) -> int:
     for n in range(3, len(ARM_NAMES) + 1):
-        if n * (n - 1) == columns:
+        if len(movements_of(n)) == columns:
             return n
     raise InputError(
         f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"

@@ -195,7 +195,7 @@ def within(v: float, acc: float, limit: float, law: Law) -> float:
 
     Where a·dt is large the IDM would overshoot: it takes a step for short.
     """
-    return min(acc, (limit - v) / law.dt) if v < limit else acc
+    return (limit - v) / law.dt if v < limit < v + acc * law.dt else acc
 
 
 @njit

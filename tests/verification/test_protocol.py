@@ -231,7 +231,7 @@ def test_a_run_that_leaves_the_model_is_found(monkeypatch: pytest.MonkeyPatch) -
 
         with monkeypatch.context() as patch:
             patch.setattr(Checked, "start", other)
-            minisim.simulate(scenario, Checked(dim), seed=1, on_collision="record")
+            minisim.simulate(scenario, Checked(dim), seed=2, on_collision="record")
 
     run(Dim())
     for dim, model in [
