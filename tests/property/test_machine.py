@@ -112,7 +112,7 @@ class Traffic(RuleBasedStateMachine):
         return simulation.view()
 
     def _simulation(self) -> Simulation:
-        trips = self.trips or [(HORIZON, 0, 1)]
+        trips = self.trips or [(HORIZON - 1.0, 0, 1)]  # none comes before the end
         scenario = replayed(self.road, *trips, horizon=HORIZON)
         return Simulation(scenario, self._controller())
 
