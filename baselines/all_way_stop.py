@@ -49,9 +49,8 @@ class AllWayStop:
 class AllWayStopSession:
     """When each vehicle came to a stand, and which vehicles have been let go.
 
-    It is called when a vehicle comes to the line, when the junction clears, and at the earliest
-    time at which a vehicle at the line can be standing, has stood long enough, or can have a clear
-    way.
+    It is called when a vehicle comes to the line, when the junction clears, and when a vehicle at
+    the line can first be standing, has stood long enough, or can first have a clear way.
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
@@ -60,7 +59,6 @@ class AllWayStopSession:
         self._dt = site.dt
         self._vehicle = site.vehicle
         self._rows = site.intersection.movements.rows
-        # A list is quicker to look up than an array.
         self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
         self._standing: dict[int, float] = {}  # vehicle: since [s]
         self._gone: set[int] = set()
@@ -73,11 +71,8 @@ class AllWayStopSession:
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
         # A moving head can stand as soon as comfortable braking has stopped it.
-        looks = [
-            view.time + (v.speed - HALTING) / self._vehicle.deceleration
-            for v in heads
-            if v.id not in self._standing
-        ]
+        moving = [v.speed for v in heads if v.id not in self._standing]
+        looks = [view.time + (speed - HALTING) / self._vehicle.deceleration for speed in moving]
         queue = [v for v in heads if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))
         waiting: list[Observed] = []
@@ -107,10 +102,9 @@ class AllWayStopSession:
     def _free_time(
         self, vehicle: Observed, waiting: list[Observed], crossing: list[Observed], now: float
     ) -> float:
-        """The earliest time at which a vehicle may go; infinite if another wake-up decides it [s].
+        """The earliest time at which a vehicle may go [s]; infinite if one has stood for longer.
 
-        It may go now if no conflicting vehicle has stood for longer or is in the way. A vehicle in
-        the way can clear it no sooner than full acceleration allows.
+        A vehicle in the way can clear it no sooner than full acceleration allows.
         """
         clearing = self._clearing[self._index(vehicle)]
         if any(clearing[self._index(other)] > 0.0 for other in waiting):

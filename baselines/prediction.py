@@ -55,13 +55,11 @@ def courses(site: Site) -> tuple[Course, ...]:
     """The courses of all movements of a site."""
     junction, margin = site.intersection, law_of(site).margin
     turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
+    limit = site.speed_limit
     return tuple(
-        Course(
-            path.crossing, min(site.speed_limit, turn), site.speed_limit,
-            path.length - margin - path.entry, path.exit_arm,
-        )
-        for path, turn in zip(junction.paths, turns, strict=True)
-    )  # fmt: skip
+        Course(p.crossing, min(limit, turn), limit, p.length - margin - p.entry, p.exit_arm)
+        for p, turn in zip(junction.paths, turns, strict=True)
+    )
 
 
 class Leader(NamedTuple):
@@ -90,29 +88,21 @@ class Motion(NamedTuple):
 
 
 def predict(
-    law: Law,
-    course: Course,
-    position: float,
-    speed: float,
-    *,
-    lane: Sequence[Leader] = (),
-    exit_lane: Sequence[Leader] = (),
-) -> Motion | None:
+    law: Law, course: Course, position: float, speed: float,
+    *, lane: Sequence[Leader] = (), exit_lane: Sequence[Leader] = (),
+) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    Args:
-        lane: the vehicles ahead in its lane, nearest first.
-        exit_lane: those that enter its exit lane before it, in this order.
+    `lane` holds the vehicles ahead in its lane, nearest first; `exit_lane` those that enter its
+    exit lane before it, in this order.
     """
-    stacked = (
-        _stacked(lane, [leader.until for leader in lane]),
-        _stacked(exit_lane, [leader.shift for leader in exit_lane]),
-    )
+    ahead = _stacked(lane, [leader.until for leader in lane])
+    entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])
     steps, count = 512, UNFINISHED
     while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
         steps *= 2
         s, v = np.empty(steps), np.empty(steps)
-        count, hard = _drive(law, course, position, speed, *stacked, s, v)
+        count, hard = _drive(law, course, position, speed, ahead, entering, s, v)
     return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
 
 
@@ -126,15 +116,9 @@ def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
 
 @njit
 def _drive(
-    law: Law,
-    course: Course,
-    position: float,
-    speed: float,
-    lane: Leaders,
-    exit_lane: Leaders,
-    s_out: Floats,
-    v_out: Floats,
-) -> tuple[int, bool]:
+    law: Law, course: Course, position: float, speed: float,
+    lane: Leaders, exit_lane: Leaders, s_out: Floats, v_out: Floats,
+) -> tuple[int, bool]:  # fmt: skip
     """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
 
     Returns the number of steps, 0 if it hits a leader or `UNFINISHED`, and whether it brakes hard.
@@ -146,7 +130,7 @@ def _drive(
         s_out[k], v_out[k] = s, v
         first = True  # no vehicle is between it and the junction
         z, room = 0.0, math.inf
-        # Who cannot stop before the junction sees past a leader that may turn off.
+        # A vehicle that cannot stop before the junction sees past a leader that may turn off.
         near = s < course.crossing and v * v > -2.0 * law.b_max * s
         behind = False
         for j in range(len(lane.s)):
@@ -164,10 +148,10 @@ def _drive(
             if not near and (behind or s >= course.crossing):
                 break
         z_exit = 0.0
-        if first or near or s >= 0.0:
+        if (first or near or s >= 0.0) and k < exit_lane.s.shape[1]:
             for j in range(len(exit_lane.s) - 1, -1, -1):
-                if k >= exit_lane.s.shape[1] or exit_lane.s[j, k] >= 0.0:  # the last to enter it
-                    if k < exit_lane.s.shape[1] and exit_lane.s[j, k] < math.inf:
+                if exit_lane.s[j, k] >= 0.0:  # the last to enter it
+                    if exit_lane.s[j, k] < math.inf:
                         rear = exit_lane.s[j, k] + exit_lane.bound[j] - law.length
                         if first or s >= 0.0:
                             z_exit = closeness(v, rear - s, exit_lane.v[j, k], law)

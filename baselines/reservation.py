@@ -7,9 +7,8 @@ movements (`minisim.junction.conflicts`): only pairs matter, and each pair's str
 
 The protocol:
 - From `reach` before the junction on, the first vehicle of a lane asks, and so does any vehicle
-  directly behind a holder. Its passage is predicted by the vehicles' own law up to the limits
-  (`baselines.prediction`), behind the vehicles ahead in its lane and those that enter its exit lane
-  before it.
+  directly behind a holder. Its passage is predicted by the vehicles' own law
+  (`baselines.prediction`), behind those ahead in its lane and in its exit lane.
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
   their grants, so a later grant never slows down an earlier one. The law lets a vehicle in the
@@ -20,11 +19,11 @@ The protocol:
 
 Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
 their predictions, and predicts anew where they differ. A holder whose new passage no longer fits
-loses its reservation if it can still stop, and so does a vehicle that follows it. So when a vehicle
-can no longer stop, its passage fits the passages of all others that cannot, and the rest yield.
-What remains is the error of a prediction over the last few seconds before the zones, from a state
-at most one period old. `buffer` covers it. In minisim predictions come true, because vehicles that
-are alike and follow a known law have nothing left to differ in; so others are refused.
+loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
+that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
+the error of a prediction over the last seconds before the zones, from a state at most one period
+old; `buffer` covers it. Predictions come true in minisim for vehicles that are alike and follow a
+known law; all others are refused.
 """
 
 from __future__ import annotations
@@ -130,9 +129,9 @@ class Manager:
         self.slots: dict[int, Slot] = {}  #: by vehicle, in the order of their grants
         self._law = law_of(site)
         self._ways = courses(site)
-        self._zones: list[dict[int, tuple[float, float]]] = [
-            {q: (first, last) for q, (first, last) in enumerate(row) if first == first}
-            for row in conflict_zones(site.intersection, site.vehicle).tolist()
+        zones = conflict_zones(site.intersection, site.vehicle).tolist()
+        self._zones = [
+            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
         ]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
@@ -140,53 +139,34 @@ class Manager:
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int) -> Slot | None:
-        """The passage of a vehicle behind the holders in its lane; None if it hits one.
-
-        It also drives behind the other holders that enter the same exit lane before it.
-        """
+        """A vehicle's passage behind the holders before it in both lanes; None if it hits one."""
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]
-        in_lane = [
-            slot for slot in others if slot.lane == seen.lane and slot.at(now) > -seen.distance
-        ]
-        lane = [
-            slot.leader(now, until=float(self._branch[slot.movement, p]))
-            for slot in sorted(in_lane, key=lambda slot: slot.at(now))
-        ]
+        ahead = [s for s in others if s.lane == seen.lane and s.at(now) > -seen.distance]
+        ahead.sort(key=lambda slot: slot.at(now))
+        lane = [slot.leader(now, until=float(self._branch[slot.movement, p])) for slot in ahead]
         own = self.slots.get(seen.id)
         latest = math.inf if own is None else own.enters
-        rivals = [
-            slot
-            for slot in others
-            if slot.enters < latest and self._ways[slot.movement].exit_arm == way.exit_arm
-        ]
-        rivals.sort(key=lambda slot: slot.enters)
+        rivals = sorted((s for s in others if s.enters < latest), key=lambda slot: slot.enters)
         exit_lane = [
             slot.leader(now, shift=way.crossing - self._ways[slot.movement].crossing)
             for slot in rivals
+            if self._ways[slot.movement].exit_arm == way.exit_arm
         ]
         motion = predict(self._law, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane)
         if motion is None:
             return None
         s, v, hard = motion
-        return Slot(
-            seen.id, seen.lane, p, now, s, v, hard=hard,
-            enters=now + int(s.searchsorted(0.0)),
-            zones={
-                q: (
-                    now + int(s.searchsorted(first, side="right")) - 1,
-                    now + int(s.searchsorted(last)),
-                )
-                for q, (first, last) in self._zones[p].items()
-            },
-        )  # fmt: skip
+        enters = now + int(s.searchsorted(0.0))
+        zones = {
+            q: (now + int(s.searchsorted(first, "right")) - 1, now + int(s.searchsorted(last)))
+            for q, (first, last) in self._zones[p].items()
+        }
+        return Slot(seen.id, seen.lane, p, now, s, v, enters, zones, hard)
 
     def fits(self, slot: Slot, *, last: bool) -> bool:
-        """Whether a passage is compatible with every other reservation.
-
-        If it must be the `last`, it comes after all others that share its exit lane.
-        """
+        """Whether a passage fits every other; the `last` comes after all in its exit lane."""
         if slot.hard:
             return False
         exit_arm = self._ways[slot.movement].exit_arm
@@ -227,11 +207,7 @@ class ReservationSession:
         manager = self.manager
         seen = {vehicle.id: vehicle for vehicle in view.vehicles}
         manager.slots = {v: slot for v, slot in manager.slots.items() if slot.ends >= now}
-        ahead = {
-            vehicle.id: before.id if before is not None and before.lane == vehicle.lane else None
-            for before, vehicle in pairwise((None, *view.vehicles))
-            if vehicle is not None
-        }
+        ahead = {v.id: before.id for before, v in pairwise(view.vehicles) if before.lane == v.lane}
         commands: list[Command] = [Hold(v) for v in self._revoke(seen, ahead, now)]
         for vehicle in seen:
             if vehicle not in manager.slots:
@@ -242,20 +218,18 @@ class ReservationSession:
             commands.append(Wake(view.time + self._period))
         return commands
 
-    def _revoke(
-        self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
-    ) -> Iterator[int]:
+    def _revoke(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
         """Renew outdated reservations; return the ids of vehicles that lose theirs.
 
-        Vehicles that cannot stop come first and keep their reservation in any case. If one of them
-        no longer fits, every reservation of a vehicle that can stop is checked again.
+        Vehicles that cannot stop come first and always keep theirs. If one of them no longer fits,
+        every reservation of a vehicle that can stop is checked again.
         """
         slots = self.manager.slots
         stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}
         changed: set[int] = set()
         misfit = False
         for vehicle in sorted(stops, key=stops.__getitem__):
-            leader = ahead[vehicle]
+            leader = ahead.get(vehicle)
             slot: Slot | None = slots[vehicle]
             if not slots[vehicle].expects(seen[vehicle], now) or leader in changed:
                 changed.add(vehicle)
@@ -278,13 +252,11 @@ class ReservationSession:
             return None
         return self.manager.predict(me, now)
 
-    def _grant(
-        self, seen: dict[int, Observed], ahead: dict[int, int | None], now: int
-    ) -> Iterator[int]:
+    def _grant(self, seen: dict[int, Observed], ahead: dict[int, int], now: int) -> Iterator[int]:
         """Grant what is possible; return the ids of the new holders."""
         slots = self.manager.slots
         for vehicle in list(self._requests):
-            slot = self._predict(seen[vehicle], now, ahead[vehicle])
+            slot = self._predict(seen[vehicle], now, ahead.get(vehicle))
             if slot is not None and self.manager.fits(slot, last=True):
                 slots[vehicle] = slot
                 del self._requests[vehicle]

@@ -10,8 +10,7 @@ leaves. We differ from the source for safety:
 - a speed is advice: the vehicle accelerates and brakes by its car-following law, never exceeds the
   limit, and stops at its line unless the unit has let it go;
 - a vehicle gets the right of way only when every conflicting vehicle ahead in the list *has* left,
-  even if the estimated time until then is 0, and then keeps it. Later vehicles wait in the same
-  way, so two vehicles in conflict never hold it at once;
+  and then keeps it, so two vehicles in conflict never hold it at once;
 - leaving times are capped (`leaving_time`): distance over speed explodes at low speed, and a
   crawling vehicle would stop those behind it in the list far from the junction.
 """
@@ -81,10 +80,7 @@ def advised_speed(distance: float, speed: float, time: float, limit: float) -> f
 
 
 class V2ICSession:
-    """One run: the serving list, and what follows from it.
-
-    It is called where vehicles register or have left; in between, only while any vehicle waits.
-    """
+    """One run: the serving list; called as vehicles register and leave, and while any waits."""
 
     def __init__(self, controller: V2IC, site: Site) -> None:
         reach = min(controller.reach, site.intersection.approach_length)
@@ -110,11 +106,9 @@ class V2ICSession:
     def _register(self, seen: dict[int, Observed]) -> None:
         """Drop vehicles that have left, and append new ones, nearest first."""
         self.order = [vehicle for vehicle in self.order if vehicle in seen]
-        known = set(self.order)
-        self.granted &= known
-        new = [vehicle for vehicle in seen.values() if vehicle.id not in known]
-        new.sort(key=lambda vehicle: (vehicle.distance, vehicle.lane))
-        self.order += [vehicle.id for vehicle in new]
+        self.granted.intersection_update(self.order)
+        new = seen.keys() - self.order
+        self.order += sorted(new, key=lambda v: (seen[v].distance, seen[v].lane))
 
     def _serve(self, seen: dict[int, Observed]) -> Iterable[Command]:
         """Go through the list once: right of way if the way is free, advice for the rest."""
@@ -139,8 +133,8 @@ class V2ICSession:
     def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
         """Time that a vehicle needs to leave, `distance` ahead, at its present speed [s].
 
-        It is at most `blocked`, the time until the vehicle can be let go, plus the time from rest
-        at its present place. It is never 0, since a listed vehicle has not left.
+        It is never 0, since a listed vehicle has not left, and at most `blocked`, the time until
+        it can be let go, plus the time from rest at its present place.
         """
         from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)

@@ -1,11 +1,11 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
-`baselines.v2ic` is the intended controller. This module holds what was run for the paper's
-comparison instead, quirk by quirk. No other module knows these quirks:
+`baselines.v2ic` is the intended controller. This is what was run for the paper's comparison; no
+other module knows its quirks:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
    junction begins at 488.7 m. So the "stop line" is 108.7 m before the junction, and vehicles
-   leave the list 64.7 m before they enter it. Inside the junction nothing is regulated at all;
+   leave the list 64.7 m before they enter it; inside nothing is regulated;
 2. *right-hand conflicts*: the conflicts are for right-hand traffic, but the network is left-hand:
    of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
 3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
@@ -45,14 +45,11 @@ ACCELERATION = 2.6  #: of the release formula [m/s²]
 TOP_SPEED = 20.0  #: advice is cut to this [m/s]
 NEVER_BLOCKED = 1e-5  #: a leaving time up to this blocks no vehicle [s]
 
-#: Distance driven at which a vehicle leaves the list [m].
-LEFT = REFERENCE + PLATOON + STOP_LINE
-#: Distances driven between which a vehicle registers [m].
+#: Distances driven between which a vehicle registers, and at which it leaves the list [m].
 FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
-#: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m].
-INSERTION = 0.1
-#: Rounding tolerance when a mark and a distance are compared [m].
-ROUNDING = 1e-9
+LEFT = REFERENCE + PLATOON + STOP_LINE
+INSERTION = 0.1  #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m]
+ROUNDING = 1e-9  #: tolerance when a mark and a distance are compared [m]
 #: A junction radius at which opposite far turns do not meet, as at the multi-lane junction that
 #: the conflicts were written for [m].
 WIDE = 20.0
@@ -84,13 +81,11 @@ def right_hand_conflicts() -> tuple[frozenset[int], ...]:
     """
     junction = Intersection((0.0, 90.0, 180.0, 270.0), side="right", junction_radius=WIDE)
     ways = [shapely.LineString(path.points) for path in junction.paths]
+    arms = [movement.origin for movement in junction.movements]
+    every = range(len(ways))
     return tuple(
-        frozenset(
-            q
-            for q, other in enumerate(junction.movements)
-            if other.origin != movement.origin and ways[p].intersects(ways[q])
-        )
-        for p, movement in enumerate(junction.movements)
+        frozenset(q for q in every if arms[q] != arms[p] and ways[p].intersects(ways[q]))
+        for p in every
     )
 
 
@@ -137,24 +132,18 @@ class AsRunList:
         return speeds
 
     def _register(self, platoons: dict[int, Platoon]) -> None:
-        """Append vehicles that have come, remove those that have left; most steps have neither."""
-        if any(v not in platoons or platoons[v].driven >= LEFT for v in self.order):
-            self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
-            self.granted.intersection_update(self.order)
-        if len(self.order) < len(platoons):
-            new = [
-                (platoon.order, vehicle)
-                for vehicle, platoon in platoons.items()
-                if FIRST <= platoon.driven < LAST and vehicle not in self.order
-            ]
-            self.order += [vehicle for _, vehicle in sorted(new)]
+        """Remove vehicles that have left, and append those that have come."""
+        self.order = [v for v in self.order if v in platoons and platoons[v].driven < LEFT]
+        self.granted.intersection_update(self.order)
+        coming = [v for v, platoon in platoons.items() if FIRST <= platoon.driven < LAST]
+        new = set(coming).difference(self.order)
+        self.order += sorted(new, key=lambda v: platoons[v].order)
 
 
 class V2ICAsRunSession:
-    """One run: reads the host's views, and commands what changes.
+    """One run; it is called where vehicles are inserted, register and leave the list.
 
-    It is called at insertion, where vehicles register, and where they leave the list; in between,
-    at every step while any vehicle waits.
+    While any vehicle waits, it is called in every step. It commands what changes.
     """
 
     def __init__(self, controller: V2ICAsRun, site: Site) -> None:
@@ -170,11 +159,8 @@ class V2ICAsRunSession:
             )
         insertion = self._origin + INSERTION
         self.rules = AsRunList()
-        self.plan = Plan(
-            marks=(insertion, self._origin - REFERENCE + RANGE, self._origin - LEFT),
-            sight=insertion,
-            lanes_open=True,
-        )
+        marks = insertion, self._origin - FIRST, self._origin - LEFT
+        self.plan = Plan(marks=marks, sight=insertion, lanes_open=True)
         self._dt = site.dt
         self._approach_speed = controller.approach_speed
         self._desired: dict[int, float] = {}
@@ -184,14 +170,10 @@ class V2ICAsRunSession:
         rules, desired = self.rules, self._desired
         speeds = {v.id: self._approach_speed for v in view.vehicles if v.id not in desired}
         speeds.update(rules.step(self._platoons(view)))
-        commands: list[Command] = [
-            Advise(vehicle, speed)
-            for vehicle, speed in speeds.items()
-            if desired.get(vehicle) != speed
-        ]
+        changed = [(v, speed) for v, speed in speeds.items() if desired.get(v) != speed]
+        commands: list[Command] = [Advise(vehicle, speed) for vehicle, speed in changed]
         desired.update(speeds)
-        if len(desired) > len(view.vehicles):
-            self._desired = {v.id: desired[v.id] for v in view.vehicles}
+        self._desired = {v.id: desired[v.id] for v in view.vehicles}
         if len(rules.granted) < len(rules.order):
             commands.append(Wake(view.time + self._dt))
         return commands

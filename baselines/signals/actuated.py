@@ -1,10 +1,9 @@
 """The actuated signal: a green lasts until there is a gap in the traffic over a detector.
 
-It follows SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) where every phase
-has one successor; all constants are SUMO's defaults. SUMO's only loop has no length, so that a
-standing queue can have a gap there. A second detector mends that, which senses presence from the
-loop to the line: the Signal Timing Manual (FHWA-HOP-08-024, 2008, ch. 4) has one of some 40 ft at
-the stop line, which holds the green until the queue is served.
+It follows SUMO's traffic light type `actuated` (`MSActuatedTrafficLightLogic`) for phases with one
+successor; all constants are SUMO's defaults. SUMO's only loop has no length, so a standing queue
+can have a gap there. So a second detector senses presence from the loop to the line, as in the
+Signal Timing Manual (FHWA-HOP-08-024, 2008, ch. 4): some 40 ft, until the queue is served.
 """
 
 from __future__ import annotations
@@ -33,9 +32,6 @@ class Actuated:
     second and never exceeds `max_green`. A vehicle that stands on the loop leaves no gap. Between
     loop and line, a vehicle prolongs the green too; without `presence`, `min_green` has to serve
     those already there when a green starts.
-
-    A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
-    its way.
     """
 
     name = Name("actuated")
@@ -90,15 +86,14 @@ class GapSession(PhaseSession):
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
 
     def see(self, view: View) -> None:
-        """Note vehicles between loop and line, and any that left a loop at most a step ago."""
+        """Note vehicles between loop and line, and when each left the loop."""
         free = self._detector + ROUNDING
         passed = [v for v in view.vehicles if v.distance + v.length <= free]
         for v in passed:
             if v.id not in self._passed:
                 past = free - v.distance - v.length
-                self._left[v.lane] = view.time - (
-                    past / v.speed if self._exact and v.speed > 0.0 else 0.0
-                )
+                since = past / v.speed if self._exact and v.speed > 0.0 else 0.0
+                self._left[v.lane] = view.time - since
             elif self._signal.presence and v.distance >= 0.0:
                 self._left[v.lane] = max(self._left[v.lane], view.time - self._ago)
         self._passed = {v.id for v in passed}
@@ -114,9 +109,6 @@ class GapSession(PhaseSession):
 
     def _gap(self, view: View, lane: int) -> float:
         """How long the lane's loop has been free [s]."""
-        if any(
-            v.lane == lane and v.distance <= self._detector and v.id not in self._passed
-            for v in view.vehicles
-        ):
-            return 0.0
-        return view.time - self._left[lane]
+        there = (v for v in view.vehicles if v.lane == lane and v.distance <= self._detector)
+        occupied = any(v.id not in self._passed for v in there)
+        return 0.0 if occupied else view.time - self._left[lane]

@@ -6,14 +6,9 @@ documentation cites Oertel & Wagner, TRB 2011).
 
 from __future__ import annotations
 
+from baselines.signals import phases
 from baselines.signals.heads import lane_order
-from baselines.signals.phases import (
-    PhaseSession,
-    Verdict,
-    check_detector,
-    check_greens,
-    on_detector,
-)
+from baselines.signals.phases import PhaseSession, Verdict
 from minisim.control import Site, View
 from minisim.names import Name
 from minisim.parameters import declared, real, switch
@@ -29,11 +24,9 @@ class Adaptive:
     One phase per approach, in a fixed order; none is left out. A vehicle that has lost more
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
     it needs to reach the stop line at the speed limit, if that is before `max_green`. A green also
-    goes on while the other lanes are empty.
-
-    A phase is timed from when its green is actually shown: a head waits until no vehicle crosses
-    its way. Time loss is relative to the speed that the driver would like (`MSE2Collector`).
-    Defaults are SUMO's, except for greens and amber, which are from the authors' network.
+    goes on while the other lanes are empty. Time loss is relative to the speed that the driver
+    would like (`MSE2Collector`). Defaults are SUMO's, except for greens and amber, which are from
+    the authors' network.
     """
 
     name = Name("adaptive")
@@ -56,11 +49,11 @@ class Adaptive:
     order: tuple[int, ...] | None = lane_order()
 
     def __post_init__(self) -> None:
-        check_greens(self.min_green, self.max_green)
+        phases.check_greens(self.min_green, self.max_green)
 
     def start(self, site: Site) -> DelaySession:
         """Begin a run; raises `InputError` for a bad `order` or a detector that is too short."""
-        check_detector(self.detector_range, site)
+        phases.check_detector(self.detector_range, site)
         return DelaySession(self, site)
 
 
@@ -76,8 +69,8 @@ class DelaySession(PhaseSession):
 
     def see(self, view: View) -> None:
         """Note when and where a vehicle comes onto a detector."""
+        reach = self._signal.detector_range
         for v in view.vehicles:
-            reach = self._signal.detector_range
             if v.id not in self._entered and 0.0 < v.distance <= reach:
                 # SUMO also counts the part of the step after the entry.
                 past = (reach - v.distance) if self._exact and v.speed > 0.0 else 0.0
@@ -87,17 +80,15 @@ class DelaySession(PhaseSession):
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:
         """Prolong the phase of `lane`, which is `elapsed` s old, or go on to the next lane."""
         signal = self._signal
-        present = on_detector(view, signal.detector_range)
+        present = phases.on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
         self._entered = {v.id: self._entered[v.id] for v in approaching}
         limit, now = self._speed_limit, view.time
-        times = [
-            self.duration(v.distance / limit)
-            for v in approaching
-            if v.lane == lane
-            and time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
-            > signal.min_time_loss
-        ]
+        times = []
+        for v in approaching:
+            lost = time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
+            if v.lane == lane and lost > signal.min_time_loss:
+                times.append(self.duration(v.distance / limit))
         in_time = [time for time in times if elapsed + time <= signal.max_green]
         prolongation = max(0.0, signal.min_green - elapsed, *in_time)
         idle = all(v.lane == lane for v in present)
@@ -111,7 +102,6 @@ class DelaySession(PhaseSession):
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector at `entered`, `start` m away [s].
 
-    That is the time since then, less the time that the distance since then takes at the limit
-    [m/s]. So the vehicle need not be watched in between.
+    That is the time since then, less what the way since then takes at the limit [m/s].
     """
     return now - entered - (start - distance) / limit

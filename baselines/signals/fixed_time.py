@@ -18,9 +18,6 @@ from minisim.parameters import checked, declared, real, refuse_idle, switch
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
 
-#: Parameters of Webster's formula that given greens replace.
-_WEBSTERS = ("lost_time", "equal_greens", "max_cycle")
-
 
 def _greens(title: str, value: Any) -> tuple[float, ...] | float:
     if isinstance(value, Real):
@@ -67,7 +64,8 @@ class FixedTime:
 
     def __post_init__(self) -> None:
         if self.greens is not None:
-            refuse_idle(self, "Webster's greens (greens=none)", *_WEBSTERS)
+            websters = "lost_time", "equal_greens", "max_cycle"
+            refuse_idle(self, "Webster's greens (greens=none)", *websters)
 
     def timing(self, site: Site) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
@@ -77,26 +75,21 @@ class FixedTime:
         """
         n, change = site.intersection.n, self.amber + self.all_red
         lost = change if self.lost_time is None else self.lost_time
-        longer = change - lost
+        longer, flow = change - lost, self.saturation_flow
+        capped = False
         if self.greens is None:
             optimum = webster(
-                site.demand,
-                saturation_flow=self.saturation_flow,
-                lost_time_per_phase=lost,
-                equal_greens=self.equal_greens,
-                min_green=MIN_GREEN + max(longer, 0.0),
+                site.demand, saturation_flow=flow, lost_time_per_phase=lost,
+                equal_greens=self.equal_greens, min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
-            )
+            )  # fmt: skip
             greens, capped = tuple(green - longer for green in optimum.greens), optimum.capped
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
-            capped = False
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens).cycle
-        return timing_of(
-            greens, cycle, site.demand, self.saturation_flow, longer=longer, capped=capped
-        )
+        return timing_of(greens, cycle, site.demand, flow, longer=longer, capped=capped)
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
@@ -109,8 +102,8 @@ class FixedTime:
 class Program:
     """Lanes that are green in turn, over and over; the first turns green at time 0.
 
-    A program remembers nothing: what it shows follows from the time alone. `order` holds the lanes
-    in the order of their greens; times are in seconds.
+    What it shows follows from the time alone. `order` holds the lanes in the order of their greens;
+    times are in seconds.
     """
 
     def __init__(
@@ -138,8 +131,7 @@ class Program:
         return next(stage for stage in count(before) if self._start(stage + 1) > time)
 
     def _start(self, stage: int) -> float:
-        # Computed from the cycle number, so that rounding errors do not add up.
-        cycle, k = divmod(stage, len(self._starts))
+        cycle, k = divmod(stage, len(self._starts))  # so that rounding errors do not add up
         return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
 
 
@@ -155,10 +147,7 @@ class FixedTimeSession:
         self._half_step = site.dt / 2.0
 
     def decide(self, view: View) -> Iterable[Command]:
-        """Turn the heads to what the program shows now.
-
-        Timers ring on whole steps: a switch less than half a step away is due.
-        """
+        """Turn the heads to what the program shows; a switch less than half a step away is due."""
         now = view.time + self._half_step + self._early
         wanted = self._program.colours(now)
         return [*self._heads.show(view, wanted), Wake(self._program.next_switch(now) - self._early)]

@@ -1,7 +1,7 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. Where vehicles look out for those that cross (`VehicleType`), it
+depend on the length of an amber. If vehicles look out for those that cross (`VehicleType`), it
 turns green at once, as the published signals did. At the end of a green, vehicles that can no
 longer stop comfortably keep their right of way; all others stop.
 """
@@ -54,10 +54,8 @@ class Heads:
     """
 
     def __init__(self, site: Site) -> None:
-        n = site.intersection.n
-        movements = site.intersection.movements
-        ways = [list(row[1:]) for row in movements.rows]
-        self._rows = movements.rows
+        self._rows = site.intersection.movements.rows
+        ways = [list(row[1:]) for row in self._rows]
         # Nested lists: a plain lookup is much faster than one in a small array.
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
         self._crossed = crossed.tolist()  # lane, then movement
@@ -72,7 +70,7 @@ class Heads:
             self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
         self._at_once = site.vehicle.looks_out
         self._let_go: set[int] = set()
-        self.colours = [Colour.RED] * n
+        self.colours = [Colour.RED] * len(ways)
 
     def show(self, view: View, wanted: Sequence[Colour]) -> list[Command]:
         """Turn the heads to `wanted` as far as that is safe now; return the commands for it.
@@ -99,16 +97,12 @@ class Heads:
 
     def _may_open(self, lane: int, view: View) -> bool:
         """Whether no vehicle crosses the lane's way, and no head is green for one that might."""
-        if any(
-            colour is Colour.GREEN and self._exclusive[lane][other]
-            for other, colour in enumerate(self.colours)
-        ):
+        green = [other for other, colour in enumerate(self.colours) if colour is Colour.GREEN]
+        if any(self._exclusive[lane][other] for other in green):
             return False
-        return self._at_once or not any(
-            (v.distance < 0.0 or v.id in self._let_go)
-            and self._crossed[lane][self._rows[v.lane][v.manoeuvre]]
-            for v in view.vehicles
-        )
+        crossing = (v for v in view.vehicles if v.distance < 0.0 or v.id in self._let_go)
+        crossed = self._crossed[lane]
+        return self._at_once or not any(crossed[self._rows[v.lane][v.manoeuvre]] for v in crossing)
 
 
 def lane_order() -> Any:
@@ -144,8 +138,7 @@ def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
 def committed(lane: Iterable[Observed], stops: Callable[[Observed], bool]) -> list[Observed]:
     """The vehicles before the junction that keep their right of way when their lane is closed.
 
-    They, or a vehicle behind them, can no longer stop before the junction. `lane` holds the
-    vehicles of one lane, front to back.
+    They, or a vehicle behind them, can no longer stop. `lane` is one lane's, front to back.
     """
     approaching = [v for v in lane if v.distance >= 0.0]
     last = max((i for i, v in enumerate(approaching) if not stops(v)), default=-1)

@@ -8,6 +8,7 @@ junction whose exits flow freely there is no queue beyond it, so the longest que
 from __future__ import annotations
 
 import math
+from collections import Counter
 
 from baselines.signals.phases import PhaseSession, Verdict, check_detector, on_detector
 from minisim.control import Site, View
@@ -19,10 +20,10 @@ from minisim.parameters import declared, real
 class LongestQueue:
     """A signal that turns to the approach with the most vehicles, every few seconds.
 
-    One phase per approach: since one lane carries all turns, any two approaches have movements that
-    conflict, and cannot be green together. Of equal queues, the one whose last green was longest
-    ago goes first; further ties go in the order a, b, c…. An empty junction keeps its green. A lane
-    may wait a long time while others always have more vehicles.
+    One phase per approach: one lane carries all turns, so any two approaches have movements that
+    conflict. Of equal queues, the one whose last green was longest ago goes first; further ties go
+    in the order a, b, c…. An empty junction keeps its green. A lane may wait long while others
+    always have more vehicles.
     """
 
     name = Name("longest-queue")
@@ -57,9 +58,8 @@ class QueueSession(PhaseSession):
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:  # noqa: ARG002  (PhaseSession's)
         """Choose the lane with the longest queue; look again after another interval."""
         self._last_green[lane] = view.time
-        queues = [0] * len(self._last_green)
-        for vehicle in on_detector(view, self._signal.detector_range):
-            queues[vehicle.lane] += vehicle.distance >= 0.0
-        if any(queues):
-            lane = min(range(len(queues)), key=lambda k: (-queues[k], self._last_green[k], k))
+        present = on_detector(view, self._signal.detector_range)
+        queues = Counter(v.lane for v in present if v.distance >= 0.0)
+        if queues:
+            lane = min(queues, key=lambda k: (-queues[k], self._last_green[k], k))
         return Verdict(lane, self._signal.interval)

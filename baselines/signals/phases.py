@@ -1,8 +1,8 @@
 """What is common to signals that end their phases by a rule: one phase per approach.
 
 Between two phases the old lane shows amber. The new one turns green once no vehicle crosses its
-way any more (`Heads`). A phase is timed from when its green is actually shown, so the shortest and
-longest greens are what drivers see.
+way any more (`Heads`). A phase is timed from when its green is shown, so the shortest and longest
+greens are what drivers see.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ TICK = 1e-6
 def check_greens(shortest: float, longest: float) -> None:
     """Raise `InputError` if the longest green is below the shortest [s]."""
     if longest < shortest:
-        raise InputError(f"max_green must be at least min_green, {shortest:g} s, got {longest:g} s")
+        low, got = float(shortest), float(longest)  # a Fraction has no format
+        raise InputError(f"max_green must be at least min_green, {low:g} s, got {got:g} s")
 
 
 def shortest_detector(site: Site) -> float:
-    """Length before the junction in which a standing queue always has a front bumper [m].
-
-    It holds a vehicle and a half with their gaps: when one has just left, the next is inside.
-    """
-    place = site.vehicle.length + site.vehicle.min_gap
+    """Length before the junction in which a standing queue always has a front bumper [m]."""
+    place = (
+        site.vehicle.length + site.vehicle.min_gap
+    )  # 1.5: when one has just left, the next is inside
     return min(1.5 * place, site.intersection.approach_length)
 
 
@@ -114,11 +114,11 @@ class PhaseSession:
             self._lane, self._colour, self._due = self._next, Colour.GREEN, math.inf
             return
         # Times in views are exact to a microsecond.
-        verdict = self.judge(view, self._lane, round(view.time - self._began, 6))
-        if verdict.lane == self._lane:
-            self._due = self._since(view) + max(verdict.after, 0.0 if self._exact else self._dt)
+        lane, after = self.judge(view, self._lane, round(view.time - self._began, 6))
+        if lane == self._lane:
+            self._due = self._since(view) + max(after, 0.0 if self._exact else self._dt)
             return
-        self._next, self._began = verdict.lane, None
+        self._next, self._began = lane, None
         if self._amber > 0.0:
             self._colour = Colour.AMBER
             self._due = self._since(view) + max(self._amber, self._dt)

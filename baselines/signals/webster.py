@@ -45,11 +45,10 @@ def webster(
 ) -> SignalTiming:
     """Cycle and effective greens, one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
 
-    If Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1).
-    Webster's optimum for lower Y is never cut. A lane whose share is below `min_green` gets
-    `min_green`. That lengthens the cycle; in a capped cycle the other lanes share the rest.
-    `rates` are the inflows of the lanes [veh/h]; L is `lost_time_per_phase` [s] times their number.
-    `equal_greens` divides the greens equally instead of in proportion to the inflows.
+    Only if Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1). A lane
+    whose share is below `min_green` gets `min_green`. That lengthens the cycle; in a capped cycle
+    the other lanes share the rest. `rates` are the inflows of the lanes [veh/h]; L is
+    `lost_time_per_phase` [s] times their number. `equal_greens` divides the greens equally.
 
     Raises `InputError` if a value is out of range or `max_cycle` too short for the minimal greens.
     """
@@ -82,34 +81,19 @@ def optimal_cycle(flow_ratio: float, lost_time: float) -> float:
 
 
 def timing_of(
-    greens: Iterable[float],
-    cycle: float,
-    rates: Iterable[float],
-    saturation_flow: float = 1500.0,
-    *,
-    longer: float = 0.0,
-    capped: bool = False,
-) -> SignalTiming:
-    """Describe greens and cycle [s] under the inflows `rates` [veh/h].
-
-    The effective greens are `longer` [s] than those given.
-    """
+    greens: Iterable[float], cycle: float, rates: Iterable[float], saturation_flow: float,
+    *, longer: float = 0.0, capped: bool = False,
+) -> SignalTiming:  # fmt: skip
+    """Greens and cycle [s] under the inflows `rates` [veh/h]; effective greens are `longer` [s]."""
     greens, rates = tuple(greens), tuple(rates)
-    return SignalTiming(
-        cycle=cycle,
-        greens=greens,
-        flow_ratio=sum(rates) / saturation_flow,
-        saturation=tuple(
-            rate * cycle / (saturation_flow * (green + longer))
-            for rate, green in zip(rates, greens, strict=True)
-        ),
-        capped=capped,
+    saturation = tuple(
+        rate * cycle / (saturation_flow * (green + longer))
+        for rate, green in zip(rates, greens, strict=True)
     )
+    return SignalTiming(cycle, greens, sum(rates) / saturation_flow, saturation, capped)
 
 
-def webster_delay(
-    rate: float, green: float, cycle: float, saturation_flow: float = 1500.0
-) -> float:
+def webster_delay(rate: float, green: float, cycle: float, saturation_flow: float = 1500) -> float:
     """Mean delay of a vehicle on one lane in the long run [s].
 
     d = C(1−λ)²/(2(1−λx)) + x²/(2q(1−x)) − 0.65 (C/q²)^(1/3) x^(2+5λ), with cycle C [s],
@@ -130,8 +114,7 @@ def webster_delay(
     if q == 0.0:  # the limit: no vehicle waits for another
         return uniform
     random = x * x / (2.0 * q * (1.0 - x))
-    scale = math.cbrt(cycle) / math.cbrt(q) ** 2
-    correction = 0.65 * scale * math.pow(x, 2.0 + 5.0 * share)
+    correction = 0.65 * (math.cbrt(cycle) / math.cbrt(q) ** 2) * math.pow(x, 2.0 + 5.0 * share)
     return uniform + random - correction
 
 

@@ -39,7 +39,7 @@ from minisim.testing import ContractError, check_commands, check_controller, dra
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
-from tests.builders import as_run
+from tests.builders import ScriptedSession, as_run
 
 #: Variants beside those of the table: parameters at their edges, and some together.
 MORE: tuple[Controller, ...] = (
@@ -157,6 +157,7 @@ class Leaking(Broken):
 
 
 COUNTER = itertools.count()
+LATEST = [0.0]
 
 
 def globally_leaking(site: Site) -> Session:
@@ -164,28 +165,17 @@ def globally_leaking(site: Site) -> Session:
     return FixedTime(greens=5.0 + next(COUNTER)).start(site)
 
 
-class SharedSession:
-    """One signal for all runs, which remembers the time of another run."""
+def interfering(site: Site) -> Session:
+    """Only two runs at once disturb each other: one signal remembers the time of another run."""
+    LATEST[0] = 0.0
 
-    plan = Plan(wake_on_clear=True)
-
-    def __init__(self) -> None:
-        self.latest = 0.0
-
-    def decide(self, view: View) -> Iterable[Command]:
-        self.latest = max(self.latest, view.time)
-        green = int(self.latest // 10.0) % 4
+    def decide(view: View) -> Iterable[Command]:
+        LATEST[0] = max(LATEST[0], view.time)
+        green = int(LATEST[0] // 10.0) % 4
         yield from (Open(lane) if lane == green else Close(lane) for lane in range(4))
         yield Wake(view.time + 1.0)
 
-
-SHARED = SharedSession()
-
-
-def interfering(site: Site) -> Session:
-    """Only two runs at once disturb each other."""
-    SHARED.latest = 0.0
-    return SHARED
+    return ScriptedSession(Plan(wake_on_clear=True), decide)
 
 
 @dataclass(frozen=True)
@@ -196,7 +186,7 @@ class SelfChanging(Broken):
 
     def start(self, site: Site) -> Session:
         object.__setattr__(self, "last_seed", site.seed)
-        return FixedTime().start(site)
+        return super().start(site)
 
 
 @dataclass(frozen=True)
@@ -234,15 +224,7 @@ class NoValue:
     start = Broken.start  # type: ignore[assignment]
 
 
-class Answering:
-    """A session that gives the same answer to every view."""
-
-    def __init__(self, answer: Any) -> None:
-        self.plan = Plan(period=1.0)
-        self.answer = answer
-
-    def decide(self, view: View) -> Any:
-        return self.answer
+EVERY_SECOND = Plan(period=1.0)
 
 
 @dataclass(frozen=True)
@@ -250,20 +232,18 @@ class Says(Broken):
     """It gives the same answer to every view."""
 
     answer: Any = ()
+    plan: Any = EVERY_SECOND
 
     def start(self, site: Site) -> Session:
-        return Answering(self.answer)
+        return ScriptedSession(self.plan, lambda view: self.answer)
 
 
-class NeverD:
+def never_d(site: Site) -> Session:
     """A signal whose last head stays red."""
-
-    def __init__(self, site: Site) -> None:
-        self.signal = FixedTime().start(site)
-        self.plan = self.signal.plan
-
-    def decide(self, view: View) -> Iterable[Command]:
-        return [c for c in self.signal.decide(view) if not isinstance(c, Open) or c.lane != 3]
+    signal = FixedTime().start(site)
+    return ScriptedSession(
+        signal.plan, lambda view: [c for c in signal.decide(view) if c != Open(3)]
+    )
 
 
 @dataclass(frozen=True)
@@ -274,12 +254,6 @@ class Starting(Broken):
 
     def start(self, site: Site) -> Any:
         return self.make(site)
-
-
-def without_plan(site: Site) -> Session:
-    session: Any = Answering(())
-    session.plan = "none"
-    return session
 
 
 BROKEN = {
@@ -293,14 +267,14 @@ BROKEN = {
     "no value": (NoValue(), "copy of it is not equal"),
     "collides": (Unregulated(), "vehicles collided: at .* s vehicle"),
     "never releases": (Says(), r"(\d+) of \1 vehicles were never served on 4 arms \(lanes a, b"),
-    "starves a lane": (Starting(make=NeverD), r"vehicles were never served on 4 arms \(lanes d\)"),
+    "starves a lane": (Starting(make=never_d), r"vehicles were never served on 4 arms \(lanes d\)"),
     "unknown vehicle": (Says(answer=(Go(10**6),)), "this vehicle is not in the view"),
     "unknown lane": (Says(answer=(Open(4),)), "there is no such lane"),
     "past wake-up": (Says(answer=(Wake(0.0),)), "must be in the future"),
     "no command": (Says(answer=("go",)), "this is not a command"),
     "no answer": (Says(answer=None), "must return commands, .* got None"),
     "no session": (Starting(make=str), "must return a Session with a Plan"),
-    "no plan": (Starting(make=without_plan), "must return a Session with a Plan"),
+    "no plan": (Says(plan="none"), "must return a Session with a Plan"),
     "no name": (Broken(name=""), "the name of .* must be a text"),
     "no controller": (5, "is not a controller"),
     "a class": (FixedTime, "is not a controller"),

@@ -23,17 +23,11 @@ N = 4
 
 @st.composite
 def tables(draw: st.DrawFn) -> Arrivals:
-    rows = draw(
-        st.lists(
-            st.tuples(floats(0.0, 1e7), st.integers(0, N - 1), st.integers(1, N - 1)), max_size=30
-        )
-    )
-    time, lane, manoeuvre = (
-        (list(column) for column in zip(*rows, strict=True)) if rows else ([],) * 3
-    )
-    return Arrivals(
-        np.array(time, dtype=float), np.array(lane, dtype=int), np.array(manoeuvre, dtype=int)
-    )
+    row = st.tuples(floats(0.0, 1e7), st.integers(0, N - 1), st.integers(1, N - 1))
+    drawn = draw(st.lists(row, max_size=30))
+    columns = ([one[k] for one in drawn] for k in range(3))
+    time, lane, manoeuvre = map(np.array, columns, (float, int, int))
+    return Arrivals(time, lane, manoeuvre)
 
 
 @given(tables())
@@ -100,9 +94,9 @@ def test_the_rate_of_a_lane_changes_no_other(
 def test_more_inflow_only_adds_poisson_arrivals(demand: Demand, seed: int, factor: float) -> None:
     fewer = replace(demand, model="poisson")
     more = replace(fewer, density=demand.density * factor)
-    at = [Counter(zip(d.time, d.lane, strict=True)) for d in
-          (it.draw(N, 600.0, seed) for it in (fewer, more))]  # fmt: skip
-    assert at[0] <= at[1]
+    tables = (demand.draw(N, 600.0, seed) for demand in (fewer, more))
+    few, many = (Counter(zip(table.time, table.lane, strict=True)) for table in tables)
+    assert few <= many
 
 
 @given(tables())

@@ -1,4 +1,4 @@
-"""All baselines on any junction, with any parameters: no collision, and every vehicle is served."""
+"""Baselines on any junction, with any parameters: no collision, and every vehicle is served."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from scenarios import four_way
 from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, Profile
 from scenarios.strategies import demands, emptying, floats, intersections, vehicles
-from tests.builders import replayed, share
+from tests.builders import Greens, queues, replayed, share
 
 #: None at all, less than a step, and no whole number of steps among them [s].
 AMBERS = st.sampled_from([0.0, 0.04, 2.0, 3.03])
@@ -31,25 +31,16 @@ GREENS = {"min_green": floats(0.5, 10.0), "max_green": floats(10.0, 50.0), "ambe
 #: From detectors just before the line to ones beyond short roads, from short to long greens.
 RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     "fixed-time": st.builds(
-        FixedTime,
-        greens=st.none() | floats(2.0, 20.0),
-        amber=AMBERS,
+        FixedTime, greens=st.none() | floats(2.0, 20.0), amber=AMBERS,
         all_red=st.sampled_from([0.0, 1.0]),
     ),
     "adaptive": st.builds(
-        Adaptive,
-        detector_range=floats(15.0, 200.0),
-        min_time_loss=floats(0.0, 5.0),
-        extend_max_green=st.booleans(),
-        **GREENS,
+        Adaptive, detector_range=floats(15.0, 200.0), min_time_loss=floats(0.0, 5.0),
+        extend_max_green=st.booleans(), **GREENS,
     ),
     "actuated": st.builds(
-        Actuated,
-        max_gap=floats(0.0, 10.0),
-        detector_gap=floats(0.1, 20.0),
-        passing_time=floats(0.1, 5.0),
-        presence=st.booleans(),
-        **GREENS,
+        Actuated, max_gap=floats(0.0, 10.0), detector_gap=floats(0.1, 20.0),
+        passing_time=floats(0.1, 5.0), presence=st.booleans(), **GREENS,
     ),
     "longest-queue": st.builds(
         LongestQueue, interval=floats(0.5, 15.0), detector_range=floats(15.0, 200.0), amber=AMBERS
@@ -57,7 +48,7 @@ RIVALS: dict[str, st.SearchStrategy[Controller]] = {
     "all-way-stop": st.builds(AllWayStop, reaction=st.just(0.0) | floats(0.0, 3.0)),
     "v2ic": st.sampled_from([V2IC(), V2IC(reach=60.0, period=0.2)]),
     "reservation": st.sampled_from([Reservation(), Reservation(reach=100.0, period=0.2)]),
-}
+}  # fmt: skip
 
 #: These keep bodies apart in time, by their predictions; the others never share a conflict area.
 PREDICTING = ("v2ic", "reservation")
@@ -87,49 +78,46 @@ def test_no_vehicle_collides_and_each_is_served(name: str, data: st.DataObject) 
 
 #: One body each, since the geometry of conflicts is what takes long.
 BODIES = [{}, {"length": 3.0, "min_gap": 1.0}, {"length": 6.0}]
-EDGE_CASE = {"bodies": {}, "model": "idm", "limit": 14.0, "dt": 0.1, "b": 4.5, "headway": 1.0}
+EDGE_CASE = {
+    "vehicle": VehicleType(deceleration=4.5, headway=1.0), "trips": [(0.0, 0, 2)],
+    "name": "reservation", "dt": 0.1,
+}  # fmt: skip
+
+
+@st.composite
+def any_law(draw: st.DrawFn) -> VehicleType:
+    return VehicleType(
+        **draw(st.sampled_from(BODIES)),
+        model=draw(st.sampled_from(["idm", "iidm", "krauss"])),
+        deceleration=draw(floats(1.5, 5.0)),
+        headway=draw(floats(0.8, 3.0)),
+        speed_deviation=draw(st.sampled_from([0.0, 0.1, 0.5])),
+    )
 
 
 @share(0.3)
 @given(
     name=st.sampled_from(SAFE),
-    bodies=st.sampled_from(BODIES),
-    model=st.sampled_from(["idm", "iidm", "krauss"]),
+    vehicle=any_law(),
     limit=st.sampled_from([0.5, 1.0, 100.0]) | floats(0.5, 100.0),
     dt=st.sampled_from([0.05, 0.1, 0.25, 0.5]),
-    b=floats(1.5, 5.0),
-    headway=floats(0.8, 3.0),
-    deviation=st.sampled_from([0.0, 0.1, 0.5]),
     trips=st.lists(
         st.tuples(floats(0.0, 20.0), st.integers(0, 3), st.integers(1, 3)), min_size=1, max_size=9
     ),
 )
-@example(**EDGE_CASE | {"limit": 0.5}, name="reservation", deviation=0.0, trips=[(0.0, 0, 2)])
+@example(**EDGE_CASE, limit=0.5)
+@example(**EDGE_CASE | {"dt": 0.5}, limit=0.5)
 @example(
-    **EDGE_CASE | {"limit": 0.5, "dt": 0.5}, name="reservation", deviation=0.0, trips=[(0.0, 0, 2)]
+    **EDGE_CASE
+    | {"name": "v2ic", "dt": 0.5, "trips": [(0.0, a, m) for a in range(4) for m in (1, 2, 3)]},
+    limit=1.0,
 )
-@example(
-    **EDGE_CASE | {"limit": 1.0, "dt": 0.5},
-    name="v2ic", deviation=0.0, trips=[(0.0, a, m) for a in range(4) for m in (1, 2, 3)],
-)  # fmt: skip
 def test_at_any_limit_step_and_law_each_is_served_or_all_are_refused(
-    name: str,
-    bodies: dict[str, float],
-    model: str,
-    limit: float,
-    dt: float,
-    b: float,
-    headway: float,
-    deviation: float,
-    trips: list[tuple[float, int, int]],
+    name: str, vehicle: VehicleType, limit: float, dt: float, trips: list[tuple[float, int, int]]
 ) -> None:
-    vehicle = VehicleType(
-        **bodies, model=model, deceleration=b, headway=headway, speed_deviation=deviation
-    )
     profile = Profile(name="random", vehicle=vehicle, speed_limit=limit, dt=dt)
-    scenario = replayed(
-        four_way(100, profile=profile, arm_length=80.0), *sorted(trips), horizon=50_000.0
-    )
+    road = four_way(100, profile=profile, arm_length=80.0)
+    scenario = replayed(road, *sorted(trips), horizon=50_000.0)
     controller = controller_named(name)
     if vehicle not in cover_of(controller):
         with pytest.raises(InputError, match="speed_deviation"):
@@ -148,9 +136,7 @@ def test_out_of_their_zones_no_two_bodies_touch(
     """Brute force: bodies of two movements in conflict, anywhere while not both are in zones."""
     if entry_room(intersection, vehicle) <= 0.0:
         vehicle = FAIR.vehicle
-    site = Site(
-        intersection=intersection, vehicle=vehicle, speed_limit=14.0, demand=(0.0,) * intersection.n
-    )
+    site = Site(intersection, vehicle, speed_limit=14.0, demand=(0.0,) * intersection.n)
     zones = conflict_zones(intersection, vehicle)
     conflicts = np.argwhere(site.conflicts)
     assert np.array_equal(np.isfinite(zones[..., 0]), site.conflicts)
@@ -164,3 +150,33 @@ def test_out_of_their_zones_no_two_bodies_touch(
         ]
         near = shapely.dwithin(bodies[0][outside][:, None], bodies[1][None, :], CLEARANCE * 0.9)
         assert not near.any()
+
+
+# Signals that detect vehicles: a vehicle that stood in a green leaves in it.
+
+SIGNALS = {"actuated": Actuated, "adaptive": Adaptive}
+
+
+@st.composite
+def queueing_vehicles(draw: st.DrawFn) -> VehicleType:
+    """Of any length that fits four arms, with any usual gap."""
+    return VehicleType(
+        length=draw(floats(0.5, 8.0)),
+        min_gap=draw(floats(0.5, 5.0)),
+        headway=draw(floats(0.5, 1.5)),
+        acceleration=draw(floats(1.0, 4.0)),
+        model=draw(st.sampled_from(["idm", "iidm", "krauss"])),
+    )
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@share(0.3)
+@given(vehicle=queueing_vehicles(), limit=floats(3.0, 20.0), shortest=floats(0.5, 10.0))
+def test_a_standing_queue_is_served_in_one_green(
+    name: str, vehicle: VehicleType, limit: float, shortest: float
+) -> None:
+    watched = Greens(SIGNALS[name](min_green=shortest, max_green=600.0))
+    run = minisim.simulate(queues(vehicle, limit), watched)
+    assert run.summary()["unfinished"] == 0
+    assert watched.left
+    assert not any(watched.left)

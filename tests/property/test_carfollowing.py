@@ -37,18 +37,16 @@ def equilibrium_gap(driver: VehicleType, v: float, v0: float) -> float:
     return gap / math.sqrt(1.0 - (v / v0) ** driver.exponent) if driver.model == "idm" else gap
 
 
-def smallest_gap(driver: VehicleType, v0: float, v: float, gap: float, dt: float) -> float:
-    """Behind a leader that brakes from v to a stop at b, until the follower stands, too."""
-    leader, leader_v, s = gap, v, 0.0
-    smallest = gap
+def check_no_collision(
+    driver: VehicleType, v0: float, v: float, leader_v: float, leader: float, dt: float
+) -> None:
+    """Behind a leader that brakes to a stop at b, until the follower stands, too."""
+    s = 0.0
     while v > 1e-3 or leader_v > 0.0:
         acc = acceleration(driver, v, v0, leader - s, leader_v)
         leader, leader_v = ballistic(leader, leader_v, -driver.deceleration, dt)
         s, v = ballistic(s, v, acc, dt)
-        smallest = min(smallest, leader - s)
-        if smallest <= 0.0:
-            break
-    return smallest
+        assert leader - s > 0.0
 
 
 @given(vehicles(), SPEEDS, floats(0.05, 0.98), STEPS)
@@ -56,7 +54,7 @@ def test_no_collision_behind_a_leader_that_brakes_to_a_stop(
     driver: VehicleType, v0: float, share: float, dt: float
 ) -> None:
     v = share * v0
-    assert smallest_gap(driver, v0, v, equilibrium_gap(driver, v, v0), dt) > 0.0
+    check_no_collision(driver, v0, v, v, equilibrium_gap(driver, v, v0), dt)
 
 
 @given(vehicles(), SPEEDS, floats(0.0, 1.0), floats(0.0, 60.0), STEPS)
@@ -64,20 +62,10 @@ def test_no_collision_after_an_insertion_with_the_safe_speed(
     driver: VehicleType, v0: float, share: float, spare: float, dt: float
 ) -> None:
     """The leader brakes to a stop as soon as the follower has been inserted."""
-    leader_v = share * v0
-    gap = driver.min_gap + spare
-    v = min(
-        v0,
-        insertion_speed(
-            gap, leader_v, driver.acceleration, driver.deceleration, driver.headway, driver.min_gap
-        ),
-    )
-    leader, s = gap, 0.0
-    while v > 1e-3 or leader_v > 0.0:
-        acc = acceleration(driver, v, v0, leader - s, leader_v)
-        leader, leader_v = ballistic(leader, leader_v, -driver.deceleration, dt)
-        s, v = ballistic(s, v, acc, dt)
-        assert leader - s > 0.0
+    leader_v, gap = share * v0, driver.min_gap + spare
+    a, b = driver.acceleration, driver.deceleration
+    v = min(v0, insertion_speed(gap, leader_v, a, b, driver.headway, driver.min_gap))
+    check_no_collision(driver, v0, v, leader_v, gap, dt)
 
 
 @given(vehicles(), floats(0.0, 20.0), SPEEDS, floats(0.01, 200.0), floats(0.0, 20.0))
@@ -102,8 +90,7 @@ def test_ballistic_is_exact_and_never_reverses(v: float, s: float, acc: float, d
 def test_following_speed_towards_reaches_the_target_speed_in_time(
     v: float, share: float, b: float, dt: float, room: float
 ) -> None:
-    """From anywhere that b can make it: braking never exceeds b, and the line is not crossed
-    faster than allowed."""
+    """Braking never exceeds b, and the line is not crossed faster than allowed."""
     v_target = share * v
     distance = room * (v * v - v_target * v_target) / (2.0 * b) + 1e-6
     assume(distance > 1e-3)

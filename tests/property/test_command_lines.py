@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import os
 import tempfile
 from collections.abc import Iterator
@@ -99,7 +100,7 @@ def typed(draw: st.DrawFn) -> list[str]:
     subject = draw(st.just(usual) | values)
     pairs = draw(st.lists(st.tuples(flags, values), max_size=3))
     stray = draw(st.lists(flags | values, max_size=1))
-    return [command, subject, *(word for pair in pairs for word in pair), *stray, *short]
+    return [command, subject, *itertools.chain(*pairs), *stray, *short]
 
 
 @given(typed())

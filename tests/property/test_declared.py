@@ -67,9 +67,7 @@ def refused(it: Parameter) -> list[Any]:
     if said is None:
         return [object()]
     bad: list[Any] = [math.nan, math.inf, 1j, "1", True]
-    for text, side in (
-        (said["low"] or said["from"], -1), (said["high"] or said["to"], 1),
-    ):  # fmt: skip
+    for text, side in ((said["low"] or said["from"], -1), (said["high"] or said["to"], 1)):
         if text:
             # The words have six digits, so a little further than the next number.
             beyond = float(text) + side * max(1.0, abs(float(text)) * 1e-4)

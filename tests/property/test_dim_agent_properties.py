@@ -126,9 +126,9 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
         near = [v for v in view.vehicles if v.distance <= 8.0]
         for v in near:
             if v.id not in minds:
-                own_matrix = HarmonyMatrix.paper(n)
-                own_rules = Rules(DecisionTable(own_matrix, dim.order, ranks), dim.gate, dim.commit)
-                minds[v.id] = Agent(v.id, v.lane, own_rules), Reader(n, dim.zones, b, dim.commit)
+                own = DecisionTable(HarmonyMatrix.paper(n), dim.order, ranks)
+                agent = Agent(v.id, v.lane, Rules(own, dim.gate, dim.commit))
+                minds[v.id] = agent, Reader(n, dim.zones, b, dim.commit)
         percepts = {v.id: minds[v.id][1].read(view) for v in near}
         assert len(set(percepts.values())) <= 1
         going = {v.id for v in near if minds[v.id][0].decide(percepts[v.id])}

@@ -24,8 +24,11 @@ def matrices(draw: st.DrawFn) -> HarmonyMatrix:
     return HarmonyMatrix(n, (upper | upper.T) & (lane[:, None] != lane[None, :]))
 
 
+Case = tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]]
+
+
 @st.composite
-def cases(draw: st.DrawFn) -> tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]]:
+def cases(draw: st.DrawFn) -> Case:
     """A matrix, participants in random order, an order and priorities."""
     matrix = draw(matrices())
     wishes = draw(st.lists(st.integers(0, matrix.n - 1), min_size=matrix.n, max_size=matrix.n))
@@ -36,9 +39,7 @@ def cases(draw: st.DrawFn) -> tuple[HarmonyMatrix, list[Movement], str, tuple[in
 
 
 @given(cases())
-def test_the_right_of_way_is_a_best_maximal_clique(
-    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]],
-) -> None:
+def test_the_right_of_way_is_a_best_maximal_clique(case: Case) -> None:
     matrix, participants, order, ranks = case
     chosen = decide(participants, matrix, order, ranks)
     assert set(chosen) <= set(participants)
@@ -50,15 +51,16 @@ def test_the_right_of_way_is_a_best_maximal_clique(
         first = min(participants, key=lambda m: ranks[m.origin])
         assert first in chosen
     if participants:
-        assert len(chosen) <= len(explain(participants, matrix, order, ranks).tied[0])
-        assert explain(participants, matrix, order, ranks).right_of_way == chosen
+        explained = explain(participants, matrix, order, ranks)
+        assert len(chosen) <= len(explained.tied[0])
+        assert explained.right_of_way == chosen
     assert DecisionTable(matrix, order, ranks).decide(participants) == chosen
     assert decide(sorted(participants), matrix, order, ranks) == chosen
 
 
 @given(cases(), st.randoms(use_true_random=False))
 def test_the_vehicle_that_goes_first_does_not_change_which_go_with_it(
-    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]], random: Random
+    case: Case, random: Random
 ) -> None:
     """Why the gate "harmonious" needs no wake-up when a vehicle commits (dim.controller).
 
@@ -81,9 +83,7 @@ def test_the_vehicle_that_goes_first_does_not_change_which_go_with_it(
 
 @given(cases(), st.integers(min_value=0), st.data())
 def test_with_unknown_intents_those_go_that_go_in_every_case_that_may_be_meant(
-    case: tuple[HarmonyMatrix, list[Movement], str, tuple[int, ...]],
-    hidden: int,
-    data: st.DataObject,
+    case: Case, hidden: int, data: st.DataObject
 ) -> None:
     """Also beside up to three crossing vehicles."""
     matrix, movements, order, ranks = case

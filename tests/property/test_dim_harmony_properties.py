@@ -19,11 +19,8 @@ def mirrored(intersection: Intersection) -> tuple[Intersection, list[Movement]]:
     """The mirror image (east for west), and for each movement the one that it becomes."""
     images = [(360.0 - b) % 360.0 for b in intersection.bearings]
     bearings = sorted(images)
-    image = dataclasses.replace(
-        intersection,
-        bearings=tuple(bearings),
-        side="right" if intersection.side == "left" else "left",
-    )
+    side = "right" if intersection.side == "left" else "left"
+    image = dataclasses.replace(intersection, bearings=tuple(bearings), side=side)
     # The j-th arm clockwise is the (n−j)-th clockwise in the mirror.
     return image, [
         Movement(bearings.index(images[m.origin]), intersection.n - m.manoeuvre)

@@ -68,13 +68,12 @@ def test_no_vehicle_touches_one_held_at_another_entry(
     """
     room = entry_room(intersection, vehicle)
     fronts = intersection.approach_length - np.array([0.0, 3.0])
-    held = [
-        shapely.polygons(intersection.path(Movement(arm, 1)).bodies(fronts, vehicle))
-        for arm in range(intersection.n)
-    ]
+    arms = range(intersection.n)
+    paths = [intersection.path(Movement(arm, 1)) for arm in arms]
+    held = [shapely.polygons(path.bodies(fronts, vehicle)) for path in paths]
     for path in intersection.paths:
         swept = corridor(path, vehicle)
-        for arm in set(range(intersection.n)) - {path.movement.origin}:
+        for arm in set(arms) - {path.movement.origin}:
             assert shapely.distance(swept, held[arm]).min() >= room - 1e-9
     tightest = min(path.radius for path in intersection.paths)
     cut = 2.0 / 27.0 * vehicle.length**2 / tightest
@@ -89,11 +88,9 @@ def test_a_vehicle_that_does_not_fit_the_lanes_is_refused(
     angles: tuple[float, ...], lane_width: float, shrink: float, length: float, width: float
 ) -> None:
     """`Site` accepts a vehicle only when no other touches it while it is held."""
-    smallest = Intersection(angles, lane_width=lane_width).junction_radius
+    radius = Intersection(angles, lane_width=lane_width).junction_radius * (0.75 + 0.25 * shrink)
     try:
-        intersection = Intersection(
-            angles, lane_width=lane_width, junction_radius=smallest * (0.75 + 0.25 * shrink)
-        )
+        intersection = Intersection(angles, lane_width=lane_width, junction_radius=radius)
     except InputError:  # tighter than a car can turn
         return
     vehicle = VehicleType(length=length, width=width)
@@ -115,9 +112,8 @@ def test_past_the_branch_no_vehicle_on_the_other_path_is_in_the_way(
     path, other = intersection.path(first), intersection.path(second)
     rear = leaves + np.linspace(0.0, 15.0, 20)
     ahead = shapely.polygons(path.bodies(rear + vehicle.length, vehicle))
-    behind = shapely.polygons(
-        other.bodies(np.linspace(other.entry, other.exit + 30.0, 90), vehicle)
-    )
+    fronts = np.linspace(other.entry, other.exit + 30.0, 90)
+    behind = shapely.polygons(other.bodies(fronts, vehicle))
     assert shapely.distance(np.array(ahead)[:, None], np.array(behind)[None, :]).min() > 0.25
 
 

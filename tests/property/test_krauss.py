@@ -36,16 +36,12 @@ SPEEDS = floats(0.0, 30.0)
 @st.composite
 def drivers(draw: st.DrawFn) -> VehicleType:
     """Passenger cars under Krauß's law, and the abrupt ones of the published runs."""
-    deceleration = draw(floats(1.5, 5.0) | st.just(1000.0))
+    b = draw(floats(1.5, 5.0) | st.just(1000.0))
     return VehicleType(
-        length=draw(floats(3.0, 6.0)),
-        acceleration=draw(floats(0.8, 4.0) | st.just(50.0)),
-        deceleration=deceleration,
-        max_deceleration=min(1000.0, 1.25 * deceleration),
-        headway=draw(HEADWAYS),
-        min_gap=draw(floats(1.0, 4.0)),
-        model="krauss",
-    )
+        length=draw(floats(3.0, 6.0)), acceleration=draw(floats(0.8, 4.0) | st.just(50.0)),
+        deceleration=b, max_deceleration=min(1000.0, 1.25 * b),
+        headway=draw(HEADWAYS), min_gap=draw(floats(1.0, 4.0)), model="krauss",
+    )  # fmt: skip
 
 
 @given(floats(0.01, 200.0), SPEEDS, BRAKING, HEADWAYS, STEPS)

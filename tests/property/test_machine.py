@@ -46,11 +46,9 @@ class Traffic(RuleBasedStateMachine):
     commit = "stoppable"
 
     @initialize(
-        n=st.sampled_from([3, 4, 5]),
-        gate=st.sampled_from(GATES),
-        order=st.sampled_from(ORDERS),
+        n=st.sampled_from([3, 4, 5]), gate=st.sampled_from(GATES), order=st.sampled_from(ORDERS),
         profile=st.sampled_from(["paper", "fair"]),
-    )
+    )  # fmt: skip
     def begin(self, n: int, gate: str, order: str, profile: str) -> None:
         self.n = n
         self.road: Scenario = regular(n, arm_length=ARM_LENGTH, profile=profile)
@@ -77,8 +75,7 @@ class Traffic(RuleBasedStateMachine):
 
     @rule(first=st.tuples(LANES, TURNS), second=st.tuples(LANES, TURNS), tenths=st.integers(0, 15))
     def a_pair_comes(self, first: tuple[int, int], second: tuple[int, int], tenths: int) -> None:
-        """On an empty road, so close together that the second may revoke the right of way of the
-        first when that one can no longer stop."""
+        """On an empty road: the second may revoke the first's right of way when it cannot stop."""
         self._run_to(self.time + EMPTIED)
         self._add(self.time, *first)
         self._add(self.time + tenths / 10, *second)
@@ -87,27 +84,25 @@ class Traffic(RuleBasedStateMachine):
     def teardown(self) -> None:
         """In the end every vehicle has been served."""
         if self.trips:
-            run = self._simulation().run()
-            assert run.columns.arrived.all()
+            assert self._simulation().run().columns.arrived.all()
 
     def _add(self, time: float, lane: int, manoeuvre: int) -> None:
         before = self._view()
         self.trips.append((round(time, 1), lane % self.n, 1 + manoeuvre % (self.n - 1)))
-        # Ids follow the order of demand: those of earlier vehicles stay.
-        assert [v[1:] for v in self._view().vehicles if v.distance < ARM_LENGTH - 15] == [
-            v[1:] for v in before.vehicles if v.distance < ARM_LENGTH - 15
-        ]
+        # Earlier vehicles stay what they are, but for ids, which follow the order of demand.
+        old, new = (
+            [v[1:] for v in view.vehicles if v.distance < ARM_LENGTH - 15]
+            for view in (before, self._view())
+        )
+        assert new == old
 
     def _run_to(self, time: float) -> None:
+        """Vehicles that can no longer stop before the junction have the right of way there."""
         self.time = round(time, 1)
-        for vehicle in self._view().vehicles:
-            self._obeys(vehicle)
-
-    def _obeys(self, vehicle: Observed) -> None:
-        """A vehicle that can no longer stop before the junction has the right of way."""
         b = self.road.profile.vehicle.deceleration
-        if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
-            assert vehicle.id in self.going
+        for vehicle in self._view().vehicles:
+            if self.commit == "stoppable" and vehicle.distance >= 0.0 and not can_stop(vehicle, b):
+                assert vehicle.id in self.going
 
     def _view(self) -> View:
         simulation = self._simulation()
@@ -117,7 +112,7 @@ class Traffic(RuleBasedStateMachine):
         return simulation.view()
 
     def _simulation(self) -> Simulation:
-        trips = self.trips or [(HORIZON, 0, 1)]
+        trips = self.trips or [(HORIZON - 1.0, 0, 1)]  # none comes before the end
         scenario = replayed(self.road, *trips, horizon=HORIZON)
         return Simulation(scenario, self._controller())
 
@@ -251,11 +246,8 @@ class CarelessTraffic(Traffic):
 
 def test_the_machine_finds_what_the_papers_commit_rule_does() -> None:
     wanted = settings(
-        max_examples=60,
-        stateful_step_count=15,
-        phases=[Phase.generate],
-        report_multiple_bugs=False,
-        print_blob=False,
-    )
+        max_examples=60, stateful_step_count=15, phases=[Phase.generate],
+        report_multiple_bugs=False, print_blob=False,
+    )  # fmt: skip
     with pytest.raises(CollisionError):
         run_state_machine_as_test(CarelessTraffic, settings=wanted)

@@ -35,13 +35,11 @@ def traffic(draw: st.DrawFn) -> tuple[Scenario, Mixed]:
     intersection = replace(draw(intersections(3, 5)), arm_length=roads)
     demand = draw(demands(intersection.n, max_density=250.0))
     scenario = Scenario(
-        name="random",
-        intersection=intersection,
-        demand=demand,
+        name="random", intersection=intersection, demand=demand,
         profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=DEMANDED + DRAINED,
         recorded=demand.draw(intersection.n, DEMANDED, seed=draw(st.integers(0, 1000))),
-    )
+    )  # fmt: skip
     humans = Humans(
         critical_gaps=draw(st.sampled_from([(6.2, 6.5, 7.1), (0.0, 0.0, 0.0)])),
         deviation=draw(st.sampled_from([0.0, 0.3])),
@@ -71,9 +69,8 @@ def seed_of(lanes: tuple[int, ...], kinds: tuple[bool, ...], quiet: bool) -> int
     for seed in itertools.count():
         drivers = Drivers(Humans(), 0.5, seed)
         found = [drivers[lane, 0] for lane in lanes]
-        if tuple(d.human for d in found) == kinds and all(
-            not d.human or (d.careless < 0.25) == quiet for d in found
-        ):
+        fitting = all(not d.human or (d.careless < 0.25) == quiet for d in found)
+        if fitting and tuple(d.human for d in found) == kinds:
             return seed
     raise AssertionError("seeds do not end")
 
@@ -97,7 +94,7 @@ def test_every_pair_passes_without_waiting_for_ever(gate: str, kinds: tuple[bool
 
 @pytest.mark.parametrize("gate", GATES)
 def test_no_vehicles_wait_in_a_circle(gate: str) -> None:
-    """Four at once, one a lane, straight or to the far side, humans and others in every mixture."""
+    """One per lane at once, straight or to the far side, humans and others in every mixture."""
     road = four_way(profile="fair", arm_length=120.0)
     mixed = Mixed(Dim(gate=gate), 0.5)
     for kinds in itertools.product((True, False), repeat=4):

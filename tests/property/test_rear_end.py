@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -33,8 +35,7 @@ def any_vehicle(draw: st.DrawFn) -> VehicleType:
     return VehicleType(max_deceleration=min(most, 1000.0), **parts)
 
 
-def car(**parts: float) -> VehicleType:
-    return VehicleType(max_deceleration=parts.pop("max_deceleration", 1000.0), **parts)
+car = partial(VehicleType, max_deceleration=1000.0)
 
 
 @given(
@@ -62,7 +63,7 @@ def car(**parts: float) -> VehicleType:
     0.25, 0.5, "fixed-time", 3000.0, 5,
 )  # fmt: skip
 @settings(max_examples=12)
-def test_nobody_runs_into_the_one_ahead(
+def test_no_vehicle_runs_into_the_one_ahead(
     vehicle: VehicleType, dt: float, limit: float, controller: str, density: float, arms: int
 ) -> None:
     scenario = small_scenario(
@@ -84,7 +85,9 @@ def test_the_cruise_control_of_the_published_runs_does_not_either() -> None:
 
 
 @given(floats(0.0, 100.0), floats(0.0, 200.0), floats(0.5, 1000.0), STEPS)
-def test_who_can_stop_still_can_after_the_step(v: float, more: float, b: float, dt: float) -> None:
+def test_a_vehicle_that_can_stop_still_can_after_the_step(
+    v: float, more: float, b: float, dt: float
+) -> None:
     """And never has to brake harder than the brakes can."""
     distance = v * v / (2.0 * b) + more
     a = stop_within(v, distance, b, dt)

@@ -66,26 +66,19 @@ def recipes(draw: st.DrawFn, make: Any) -> Any:
 @pytest.mark.parametrize("name", CONTROLLERS)
 @given(data=st.data())
 def test_reading_a_spelling_gives_the_same_recipe(name: str, data: st.DataObject) -> None:
-    recipe: Controller = data.draw(recipes(CONTROLLERS[name].make))
+    make = CONTROLLERS[name].make
+    recipe: Controller = data.draw(recipes(make))
     again = controller_named(recipe.name)
     assert again == recipe
     assert again.name == recipe.name
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-@given(data=st.data())
-def test_python_takes_what_command_lines_do(name: str, data: st.DataObject) -> None:
-    make = CONTROLLERS[name].make
-    recipe: Any = data.draw(recipes(make))
+    # Python takes what command lines do.
+    values = {field: getattr(recipe, field) for field, _, _ in parameters(make)}
     written = {
-        name: spelled_value(getattr(recipe, name), it.kinds)
-        for name, it, default in parameters(make)
-        if getattr(recipe, name) != default and (it.kinds or it.words)
+        field: spelled_value(values[field], it.kinds)
+        for field, it, default in parameters(make)
+        if values[field] != default and (it.kinds or it.words)
     }
-    others = {
-        name: getattr(recipe, name) for name, it, _ in parameters(make) if name not in written
-    }
-    assert make(**written, **others) == recipe
+    assert make(**values | written) == recipe
 
 
 @given(first=recipes(CONTROLLERS["dim"].make), second=recipes(CONTROLLERS["dim"].make))

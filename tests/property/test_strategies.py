@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 from hypothesis import given
 
 from minisim import simulate
 from minisim.control import Controller
 from scenarios import Scenario
 from scenarios.strategies import controllers, scenarios
-from tests.builders import share
+from tests.builders import python, share
 
 
 @share(0.5)
 @given(scenarios(horizon=90.0), controllers())
 def test_nothing_collides(scenario: Scenario, controller: Controller) -> None:
-    run = simulate(scenario, controller)
-    assert not run.collisions
+    assert not simulate(scenario, controller).collisions
 
 
 def test_without_hypothesis_the_error_says_what_to_install() -> None:
@@ -30,5 +26,6 @@ def test_without_hypothesis_the_error_says_what_to_install() -> None:
         "except MissingExtraError as error:\n"
         "    print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "strategies need hypothesis: pip install 'minisim[testing]'\n"
+    assert (
+        python("-c", code).stdout == "strategies need hypothesis: pip install 'minisim[testing]'\n"
+    )

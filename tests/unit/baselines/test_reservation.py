@@ -26,8 +26,6 @@ from tests.builders import ScriptedSession, replayed, seen
 FAIR_FOUR = four_way(100, profile="fair")
 SITE = FAIR_FOUR.site(1)
 ENTRY = SITE.intersection.approach_length
-
-
 car = partial(seen, speed=14.0)
 
 
@@ -39,10 +37,6 @@ def decide(run: ReservationSession, time: float, *cars: Observed) -> list[object
     return [c for c in run.decide(View(time, cars)) if not isinstance(c, Wake)]
 
 
-def index(lane: int, manoeuvre: int) -> int:
-    return lane * 3 + manoeuvre - 1
-
-
 # --- predictions are what the host does -------------------------------------------------------
 
 
@@ -51,27 +45,22 @@ def index(lane: int, manoeuvre: int) -> int:
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
 def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuvre: int) -> None:
     """Two vehicles of one lane: the second follows, and turns where the first goes straight."""
-    vehicle = VehicleType(
-        length=profile.vehicle.length, deceleration=profile.vehicle.deceleration, model=model
-    )
-    profile = Profile(name="test", vehicle=vehicle, speed_limit=profile.speed_limit)
-    scenario = replayed(
-        four_way(100, profile=profile), (0.0, 0, 2), (0.0, 0, manoeuvre), horizon=100.0
-    )
+    length, b = profile.vehicle.length, profile.vehicle.deceleration
+    vehicle = VehicleType(length=length, deceleration=b, model=model)
+    road = four_way(profile=Profile(name="test", vehicle=vehicle, speed_limit=profile.speed_limit))
+    scenario = replayed(road, (0.0, 0, 2), (0.0, 0, manoeuvre), horizon=100.0)
     run = minisim.simulate(scenario, Unregulated(), record="all")
     site = run.site
     tracks = [run.trace[run.trace["row"] == row] for row in (0, 1)]
     now = int(tracks[1]["tick"][0]) + 300
     first, second = (track[track["tick"] >= now] for track in tracks)
-    law, lane_ways = law_of(site), courses(site)
-    leader = predict(law, lane_ways[1], first["s"][0] - ENTRY, first["v"][0])
+    law, ways = law_of(site), courses(site)
+    leader = predict(law, ways[1], first["s"][0] - ENTRY, first["v"][0])
     assert leader is not None
     assert np.allclose(leader.s, first["s"] - ENTRY, atol=1e-6)
     until = float(branch(site.intersection, site.vehicle)[1, manoeuvre - 1]) - ENTRY
-    follower = predict(
-        law, lane_ways[manoeuvre - 1], second["s"][0] - ENTRY, second["v"][0],
-        lane=[Leader(leader.s, leader.v, until)],
-    )  # fmt: skip
+    lane, start = [Leader(leader.s, leader.v, until)], second["s"][0] - ENTRY
+    follower = predict(law, ways[manoeuvre - 1], start, second["v"][0], lane=lane)
     assert follower is not None
     assert np.allclose(follower.s, second["s"] - ENTRY, atol=1e-6)
     assert np.allclose(follower.v, second["v"], atol=1e-6)
@@ -86,14 +75,14 @@ def test_a_whole_queue_and_what_merges_with_it_are_predicted_to_the_last_step() 
         name: str = "kept"
 
         def start(self, site: Site) -> Session:
-            self_session = Reservation().start(site)
+            session = Reservation().start(site)
 
             def decide(view: View) -> Iterable[Command]:
-                commands = list(self_session.decide(view))
-                kept.update(self_session.manager.slots)
+                commands = list(session.decide(view))
+                kept.update(session.manager.slots)
                 return commands
 
-            return ScriptedSession(self_session.plan, decide)
+            return ScriptedSession(session.plan, decide)
 
     run = minisim.simulate(four_way(350, profile="fair", horizon=300.0), Kept(), 3, record="all")
     assert len(kept) > 80
@@ -154,12 +143,10 @@ def test_the_buffer_is_kept() -> None:
 
 def test_into_one_exit_lane_no_vehicle_goes_before_an_earlier_holder() -> None:
     """b1 could turn south long before a2, which is far away, gets there: it may not overtake."""
-    run = session(reach=150.0)
-    assert decide(run, 0.0, car(1, 0, 2, 140.0)) == [Go(1)]
-    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 1, 5.0, speed=5.0)) == []
-    run = session(reach=150.0)  # into another exit it goes
-    decide(run, 0.0, car(1, 0, 2, 140.0))
-    assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, 2, 5.0, speed=5.0)) == [Go(2)]
+    for turn, granted in ((1, []), (2, [Go(2)])):  # into another exit it goes
+        run = session(reach=150.0)
+        assert decide(run, 0.0, car(1, 0, 2, 140.0)) == [Go(1)]
+        assert decide(run, 0.0, car(1, 0, 2, 140.0), car(2, 1, turn, 5.0, speed=5.0)) == granted
 
 
 def test_a_follower_asks_only_behind_a_holder() -> None:
@@ -222,7 +209,7 @@ def test_with_its_leader_a_follower_loses_its_reservation() -> None:
     first, follower = car(1, 0, 2, 40.0), car(3, 0, 1, 65.0)
     run, other = just_behind(first, follower)
     on_time = car(9, 1, 2, other.distance - 7.0)
-    assert not SITE.conflicts[index(0, 1), index(1, 2)]
+    assert not SITE.conflicts[0, 4]  # a1 and b2
     assert decide(run, 0.5, first, car(3, 0, 1, 58.0), on_time) == [Hold(1), Hold(3)]
     assert set(run.manager.slots) == {9}
 
@@ -259,22 +246,19 @@ def test_vehicles_that_could_pass_the_limit_within_a_step_do_not_collide() -> No
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)
 def test_no_vehicle_brakes_harder_than_its_law_does(profile: Profile) -> None:
     """In 7-9 % of the trips the brakes did all they can; the law needs a quarter more than b."""
-    run = minisim.simulate(
-        four_way(350, profile=profile, horizon=900.0), Reservation(), 1, record="all"
-    )
+    scenario = four_way(350, profile=profile, horizon=900.0)
+    run = minisim.simulate(scenario, Reservation(), 1, record="all")
     assert run.trace["a"].min() >= -1.3 * profile.vehicle.deceleration
 
 
 def test_no_delay_at_low_demand_and_less_than_the_all_way_stop_at_350() -> None:
     """SUMO's all-way stop with 1 s of hold loses 7.6 s at 350 veh/h/lane; a lone turn 1–2 s."""
-    run = minisim.simulate(four_way(10, profile="fair"), Reservation(), seed=1)
-    free = minisim.simulate(
-        four_way(10, profile="fair"), Unregulated(), seed=1, on_collision="record"
-    )
-    loss = [r.summary()["time_loss_s"] for r in (run, free)]
-    assert loss[0] - loss[1] < 0.3
+    quiet, rush = four_way(10, profile="fair"), four_way(350, profile="fair", horizon=1800.0)
+    run = minisim.simulate(quiet, Reservation(), seed=1)
+    free = minisim.simulate(quiet, Unregulated(), seed=1, on_collision="record")
+    assert run.summary()["time_loss_s"] - free.summary()["time_loss_s"] < 0.3
     assert run.summary()["waiting_time_s"] < 0.05
-    busy = minisim.simulate(four_way(350, profile="fair", horizon=1800.0), Reservation(), seed=1)
+    busy = minisim.simulate(rush, Reservation(), seed=1)
     assert busy.summary()["time_loss_s"] < 5.9  # the all-way stop without any hold
 
 

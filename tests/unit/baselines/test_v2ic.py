@@ -10,29 +10,21 @@ import pytest
 import minisim
 from baselines import V2IC
 from baselines.v2ic import V2ICSession, advised_speed, time_to_cover
-from minisim.control import Advise, Go, Observed, View, Wake
+from minisim.control import Advise, Command, Go, Observed, View, Wake
 from scenarios import four_way
 from tests.builders import replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")
 SITE = FAIR_FOUR.site(1)
-
-
 car = partial(seen, speed=14.0)
-
-
-def view(time: float, *cars: Observed) -> View:
-    return View(time, cars)
 
 
 def session() -> V2ICSession:
     return V2IC().start(SITE)
 
 
-def to_leave(one: Observed) -> float:
-    """From the front's place to where the rear has left the junction [m]."""
-    path = SITE.intersection.path(one.movement)
-    return one.distance + path.exit - path.entry + one.length
+def decided(run: V2ICSession, time: float, *cars: Observed) -> list[Command]:
+    return list(run.decide(View(time, cars)))
 
 
 # --- closed forms -----------------------------------------------------------------------------
@@ -78,27 +70,24 @@ def test_leaving_times_are_distance_by_speed_up_to_a_cap() -> None:
 
 def test_the_first_goes_and_a_later_one_in_conflict_is_advised() -> None:
     first, second = car(5, 0, 2, 180.0), car(6, 1, 2, 185.0)
-    commands = list(session().decide(view(10.0, first, second)))
-    assert Go(5) in commands
-    assert Advise(5, math.inf) in commands
-    assert Go(6) not in commands
-    # The first drives at the limit, so it is expected to leave after distance over speed.
-    leaving = to_leave(first) / 14.0
-    advice = next(c.speed for c in commands if isinstance(c, Advise) and c.vehicle == 6)
-    assert advice == pytest.approx(2.0 * 185.0 / leaving - 14.0)
-    assert Wake(11.0) in commands
+    go, free, advice, wake = decided(session(), 10.0, first, second)
+    assert (go, free, wake) == (Go(5), Advise(5, math.inf), Wake(11.0))
+    # The first drives at the limit; its rear is expected to leave after distance over speed.
+    leaving = (180.0 + SITE.intersection.path(first.movement).crossing + first.length) / 14.0
+    assert isinstance(advice, Advise)
+    assert advice.vehicle == 6
+    assert advice.speed == pytest.approx(2.0 * 185.0 / leaving - 14.0)
 
 
 def test_vehicles_in_harmony_go_at_once_and_no_further_call_is_needed() -> None:
-    commands = list(session().decide(view(0.0, car(1, 0, 2, 190.0), car(2, 2, 2, 195.0))))
-    assert [c for c in commands if isinstance(c, Go)] == [Go(1), Go(2)]
-    assert not any(isinstance(c, Wake) for c in commands)
+    commands = decided(session(), 0.0, car(1, 0, 2, 190.0), car(2, 2, 2, 195.0))
+    assert [c for c in commands if not isinstance(c, Advise)] == [Go(1), Go(2)]
 
 
 def test_the_list_is_in_order_of_registration_not_of_distance() -> None:
     run = session()
-    list(run.decide(view(0.0, car(1, 0, 2, 199.0, speed=3.0))))
-    commands = list(run.decide(view(5.0, car(1, 0, 2, 184.0, speed=3.0), car(2, 1, 2, 150.0))))
+    decided(run, 0.0, car(1, 0, 2, 199.0, speed=3.0))
+    commands = decided(run, 5.0, car(1, 0, 2, 184.0, speed=3.0), car(2, 1, 2, 150.0))
     assert run.order == [1, 2]
     assert Go(2) not in commands
 
@@ -109,34 +98,29 @@ def test_a_waiting_vehicle_blocks_those_in_conflict_behind_it() -> None:
     a2, b2 = car(1, 0, 2, 20.0), car(2, 1, 2, 60.0)
     assert conflicts[index(a2.movement), index(b2.movement)]
     run = session()
-    commands = list(run.decide(view(0.0, a2, b2)))
-    assert [c for c in commands if isinstance(c, Go)] == [Go(1)]
+    assert [c for c in decided(run, 0.0, a2, b2) if isinstance(c, Go)] == [Go(1)]
     c1 = car(4, 2, 1, 150.0)
     assert conflicts[index(c1.movement), index(b2.movement)]
     assert not conflicts[index(c1.movement), index(a2.movement)]
-    commands = list(
-        run.decide(view(1.0, car(1, 0, 2, 6.0, speed=2.0), car(2, 1, 2, 50.0, speed=2.0), c1))
-    )
+    a2, b2 = car(1, 0, 2, 6.0, speed=2.0), car(2, 1, 2, 50.0, speed=2.0)
+    commands = decided(run, 1.0, a2, b2, c1)
     assert Go(4) not in commands
     assert any(isinstance(c, Advise) and c.vehicle == 4 and c.speed < 14.0 for c in commands)
 
 
 def test_the_right_of_way_comes_when_the_other_has_left_and_not_before() -> None:
     run = session()
-    list(run.decide(view(0.0, car(1, 0, 2, 20.0), car(2, 1, 2, 60.0))))
+    decided(run, 0.0, car(1, 0, 2, 20.0), car(2, 1, 2, 60.0))
     leaving = car(1, 0, 2, -18.9)  # its rear is still in the junction
     waiting = car(2, 1, 2, 15.0, speed=5.0)
-    assert Go(2) not in list(run.decide(view(3.0, leaving, waiting)))
-    commands = list(run.decide(view(3.1, waiting)))
-    assert Go(2) in commands
-    assert Advise(2, math.inf) in commands
+    assert Go(2) not in decided(run, 3.0, leaving, waiting)
+    assert decided(run, 3.1, waiting) == [Go(2), Advise(2, math.inf)]
     assert run.order == [2]
 
 
 def test_a_vehicle_alone_is_not_delayed() -> None:
-    trip = (0.0, 0, 2)
-    run = minisim.simulate(replayed(FAIR_FOUR, trip, horizon=120.0), V2IC())
-    free = minisim.simulate(replayed(FAIR_FOUR, trip, horizon=120.0), minisim.control.Unregulated())
+    scenario = replayed(FAIR_FOUR, (0.0, 0, 2), horizon=120.0)
+    run, free = (minisim.simulate(scenario, it) for it in (V2IC(), minisim.control.Unregulated()))
     assert run.columns.travel_time == pytest.approx(free.columns.travel_time)
 
 

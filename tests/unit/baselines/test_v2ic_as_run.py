@@ -65,14 +65,9 @@ def test_of_60_foes_28_are_missing_and_24_are_spurious() -> None:
 
 def test_vehicles_register_200_m_before_the_reference_and_leave_24_m_behind_it() -> None:
     rules = AsRunList()
-    step(rules, platoon(1, "a2", 199.99))
-    assert rules.order == []
-    step(rules, platoon(1, "a2", 200.0))
-    assert rules.order == [1]
-    step(rules, platoon(1, "a2", 423.9))
-    assert rules.order == [1]
-    step(rules, platoon(1, "a2", 424.0))
-    assert rules.order == []
+    for driven, listed in ((199.99, []), (200.0, [1]), (423.9, [1]), (424.0, [])):
+        step(rules, platoon(1, "a2", driven))
+        assert rules.order == listed
     step(rules, platoon(2, "a2", 300.0))  # too late to register
     assert rules.order == []
 
@@ -84,11 +79,10 @@ def test_vehicles_that_register_in_one_step_come_in_the_order_of_lanes() -> None
 
 
 def test_a_release_asks_for_20_m_s_at_most() -> None:
-    assert step(AsRunList(), platoon(1, "a2", 200.0)) == {1: 20.0}
-    slow = platoon(1, "a2", 200.0, 5.0)
-    rules = AsRunList()
-    assert step(rules, slow) == {1: 20.0}
-    assert step(rules, platoon(1, "a2", 300.0)) == {}  # for good
+    for speed in (16.6, 5.0):
+        rules = AsRunList()
+        assert step(rules, platoon(1, "a2", 200.0, speed)) == {1: 20.0}
+        assert step(rules, platoon(1, "a2", 300.0)) == {}  # for good
 
 
 def test_for_one_step_a_released_vehicle_is_expected_to_leave_too_soon() -> None:

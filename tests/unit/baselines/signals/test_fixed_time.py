@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 import minisim
 from baselines import FixedTime
 from baselines.signals.webster import MIN_GREEN, webster
-from minisim.control import Site, View
+from minisim.control import View
 from minisim.errors import InputError
 from minisim.results.safety import safety_summary
 from minisim.testing import drained, small_scenario
@@ -20,38 +21,33 @@ from minisim.vehicle import VehicleType
 from scenarios.library import four_way
 from tests.builders import drive, replayed, said, seen
 
+SITE = four_way(density=250).site()
+
 # Timing.
 
 
 def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
-    site = four_way(density=250).site()
-    timing = FixedTime().timing(site)
-    assert timing == webster([250.0] * 4)
-    assert timing.cycle == pytest.approx(51.0)
-    assert timing.greens == pytest.approx((10.75,) * 4)
+    assert FixedTime().timing(SITE) == webster([250.0] * 4)
 
 
 def test_webster_knows_the_amber_and_the_all_red() -> None:
     """L = 4 × (4 + 2) s: C0 = (1.5 × 24 + 5)/(1 − 800/1500)."""
     timing = FixedTime(amber=4.0, all_red=2.0).timing(four_way(density=200).site())
-    assert (
-        timing.cycle == pytest.approx(41.0 / (1.0 - 800 / 1500)) == pytest.approx(87.857, abs=1e-3)
-    )
+    assert timing.cycle == pytest.approx(41.0 / (1.0 - 800 / 1500))
     assert timing.greens == pytest.approx(((timing.cycle - 24.0) / 4,) * 4)
 
 
 def test_a_lost_time_of_its_own_moves_green_to_where_vehicles_leave() -> None:
     """Webster: green and amber shown are the effective green and the lost time."""
-    site = four_way(density=250).site()
-    timing = FixedTime(amber=3.0, lost_time=2.0).timing(site)
+    timing = FixedTime(amber=3.0, lost_time=2.0).timing(SITE)
     assert timing.cycle == pytest.approx(51.0)
     assert timing.greens == pytest.approx((9.75,) * 4)  # 10.75 s are effective
-    assert timing.saturation == pytest.approx(FixedTime().timing(site).saturation)
+    assert timing.saturation == pytest.approx(FixedTime().timing(SITE).saturation)
     empty = FixedTime(amber=9.0, lost_time=2.0).timing(four_way(density=0).site())
     assert min(empty.greens) >= MIN_GREEN
 
 
-def test_the_longest_cycle_holds_all_that_is_shown() -> None:
+def test_the_longest_cycle_of_an_over_saturated_junction_holds_all_that_is_shown() -> None:
     site = small_scenario(5, density=350).site(0)
     timing = FixedTime(amber=4.0, all_red=2.0, max_cycle=150.0).timing(site)
     assert timing.capped
@@ -70,12 +66,11 @@ def test_a_textbooks_signal() -> None:
     assert timing.greens == pytest.approx((28.9, 22.5), abs=0.1)
 
 
-def test_greens_may_be_one_number_or_one_a_lane() -> None:
-    site = four_way(density=250).site()
-    assert FixedTime(greens=8).timing(site).greens == (8.0,) * 4
-    assert FixedTime(greens=(5, 6, 7, 8)).timing(site).greens == (5.0, 6.0, 7.0, 8.0)
-    assert FixedTime(greens=(5, 6, 7, 8)).timing(site).cycle == 26.0 + 8.0
-    assert not FixedTime(greens=8).timing(site).capped
+def test_greens_may_be_one_number_or_one_per_lane() -> None:
+    same = FixedTime(greens=8).timing(SITE)
+    assert (same.greens, same.capped) == ((8.0,) * 4, False)
+    each = FixedTime(greens=(5, 6, 7, 8)).timing(SITE)
+    assert (each.greens, each.cycle) == ((5.0, 6.0, 7.0, 8.0), 26.0 + 8.0)
 
 
 def test_unbalanced_demand_has_proportional_or_equal_greens() -> None:
@@ -83,13 +78,6 @@ def test_unbalanced_demand_has_proportional_or_equal_greens() -> None:
     fair, equal = FixedTime().timing(site), FixedTime(equal_greens=True).timing(site)
     assert np.array(fair.greens) / sum(fair.greens) == pytest.approx([0.4, 0.3, 0.2, 0.1])
     assert equal.greens == pytest.approx((10.75,) * 4)
-    assert equal.saturation[0] == pytest.approx(1.27, abs=0.006)
-
-
-def test_an_over_saturated_junction_has_a_capped_cycle() -> None:
-    timing = FixedTime(max_cycle=120.0).timing(small_scenario(5, density=350).site(0))
-    assert timing.capped
-    assert timing.cycle == pytest.approx(120.0)
 
 
 @pytest.mark.parametrize("greens", [0, True, "10", (5, -1, 5, 5)])
@@ -99,22 +87,17 @@ def test_bad_greens_are_a_clear_error(greens: Any) -> None:
 
 
 def test_a_site_that_it_cannot_serve_is_a_clear_error() -> None:
-    site = four_way(density=250).site()
     with pytest.raises(InputError, match="3 values for 4 lanes"):
-        FixedTime(greens=(5, 6, 7)).start(site)
+        FixedTime(greens=(5, 6, 7)).start(SITE)
     with pytest.raises(InputError, match="max_cycle"):
-        FixedTime(max_cycle=10).start(site)
+        FixedTime(max_cycle=10).start(SITE)
 
 
 # Schedule.
 
 
-def at(dt: float = 0.1) -> Site:
-    return replace(four_way(density=250).site(), dt=dt)
-
-
 def test_each_lane_is_open_in_turn_and_the_cycle_begins_with_a() -> None:
-    assert drive(FixedTime(greens=(4, 5, 6, 7), amber=2.0, all_red=1.0), at(), 35.0) == {
+    assert drive(FixedTime(greens=(4, 5, 6, 7), amber=2.0, all_red=1.0), SITE, 35.0) == {
         0: ["Open 0"], 4: ["Close 0"], 7: ["Open 1"], 12: ["Close 1"], 15: ["Open 2"],
         21: ["Close 2"], 24: ["Open 3"], 31: ["Close 3"], 34: ["Open 0"],
     }  # fmt: skip
@@ -123,7 +106,7 @@ def test_each_lane_is_open_in_turn_and_the_cycle_begins_with_a() -> None:
 @pytest.mark.parametrize("dt", [0.1, 0.25, 0.03])
 def test_no_cycle_drifts_by_more_than_a_step(dt: float) -> None:
     green, cycle = 5.083, 4 * 7.083
-    answers = drive(FixedTime(greens=green), at(dt), 3600.0)
+    answers = drive(FixedTime(greens=green), replace(SITE, dt=dt), 3600.0)
     opened = [time for time, commands in answers.items() if "Open 0" in commands]
     closed = [time for time, commands in answers.items() if "Close 0" in commands]
     assert len(opened) == 3600 // cycle + 1
@@ -148,19 +131,12 @@ def test_a_late_head_still_ends_on_time() -> None:
     session.decide(View(10.0, (crossing,)))
     # b's green is due at 12 s, but a2 stands in the junction until 15 s.
     assert said(session.decide(View(12.0, (crossing,)))) == ["Wake 22"]
+    later = copy.deepcopy(session)
     assert said(session.decide(View(15.0, ()))) == ["Open 1", "Wake 22"]
     assert said(session.decide(View(22.0, ()))) == ["Close 1", "Wake 24"]
-
-
-def test_a_head_that_could_not_turn_green_stays_red() -> None:
-    session = FixedTime(greens=10.0, amber=2.0).start(four_way().site())
-    crossing = seen(3, 0, 2, -5.0)
-    session.decide(View(0.0, ()))
-    session.decide(View(10.0, (crossing,)))
-    session.decide(View(12.0, (crossing,)))
-    # No vehicle of lane b got the right of way, so none is let go when its time is over.
+    # Or until after its time: no vehicle of b got the right of way, so none is let go then.
     waiting = seen(4, 1, 2, 0.3, 1.5)
-    assert said(session.decide(View(22.0, (crossing, waiting)))) == ["Wake 24"]
+    assert said(later.decide(View(22.0, (crossing, waiting)))) == ["Wake 24"]
 
 
 def test_at_amber_only_vehicles_that_cannot_stop_keep_going() -> None:
@@ -173,7 +149,7 @@ def test_at_amber_only_vehicles_that_cannot_stop_keep_going() -> None:
 # On the road.
 
 
-@pytest.mark.parametrize("start", np.arange(0.0, 6.0, 0.3).tolist())
+@pytest.mark.parametrize("start", np.arange(0.0, 6.0, 0.6).tolist())
 def test_at_amber_a_vehicle_either_passes_or_stops_comfortably(start: float) -> None:
     # Green a: 0 … 37 s. Free flow takes 487.8/14 = 34.8 s to the stop line, so that these
     # vehicles are up to 47 m before it or past it at the end of the green.
@@ -182,10 +158,8 @@ def test_at_amber_a_vehicle_either_passes_or_stops_comfortably(start: float) -> 
     path = run.site.intersection.paths[1]
     frame = run.trajectories
     braking = -frame.loc[frame["s_m"] < path.entry, "acceleration_mps2"].min()
-    at_amber = frame.loc[frame["time_s"] == 37.0].iloc[0]
-    distance = path.entry - at_amber["s_m"]
-    passes = distance < 0.0 or distance < 14.0**2 / 9.0 + 0.5
-    if passes:
+    distance = path.entry - frame.loc[frame["time_s"] == 37.0, "s_m"].iloc[0]
+    if distance < 14.0**2 / 9.0 + 0.5:
         assert frame["speed_mps"].min() > 6.0
         assert braking < 1e-6
     else:
@@ -214,18 +188,14 @@ def test_drivers_of_different_speeds_are_served_without_collision() -> None:
     scenario = drained(4, density=350, vehicle=VehicleType(speed_deviation=0.3))
     run = minisim.simulate(scenario, FixedTime(), seed=2, record="junction")
     assert run.summary()["unfinished"] == 0
-    worst = safety_summary(run.trajectories, run.site)["min_pet_s"]
-    assert worst is not None
-    assert worst > 0.0
+    assert (safety_summary(run.trajectories, run.site)["min_pet_s"] or 0.0) > 0.0
 
 
 def test_waiting_grows_with_the_red() -> None:
     # Little traffic and a long cycle: the mean wait tends to red²/2C of the uniform arrivals.
     # Accelerating and braking take the rest of the delay; 15 % covers the sample.
     green, cycle = 30.0, 4 * 32.0
-    run = minisim.simulate(
-        four_way(density=60, profile="fair", horizon=20_000.0), FixedTime(greens=green), seed=1
-    )
+    scenario = four_way(density=60, profile="fair", horizon=20_000.0)
+    waiting = minisim.simulate(scenario, FixedTime(greens=green), 1).summary()["waiting_time_s"]
     red = cycle - green
-    waiting = run.summary()["waiting_time_s"]
     assert waiting == pytest.approx(red * red / (2 * cycle), rel=0.15)

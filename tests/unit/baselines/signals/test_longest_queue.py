@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import minisim
-from baselines import Adaptive, LongestQueue
+from baselines import LongestQueue
 from baselines.signals.longest_queue import QueueSession
 from minisim.control import Observed, View
 from minisim.errors import InputError
@@ -53,13 +53,10 @@ def test_among_equal_queues_the_one_that_waits_longest_goes() -> None:
     even = queues(2, 2, 2, 2)
     # A lane that was never green comes first, in the order of the arms; then by the last green.
     assert choices((2, even), (0, even), (1, even), (3, even), (2, even)) == [0, 1, 3, 2, 0]
+    assert choices((0, queues(2, 0, 2, 0))) == [2], "the present lane gives way"
 
 
-def test_the_present_lane_gives_way_to_an_equal_queue() -> None:
-    assert choices((0, queues(2, 0, 2, 0))) == [2]
-
-
-def test_it_looks_once_an_interval_and_changes_with_an_amber() -> None:
+def test_it_looks_once_per_interval_and_changes_with_an_amber() -> None:
     def vehicles(time: float) -> tuple[Observed, ...]:
         return tuple(queues(0, 0, 3, 0) if 12.0 < time < 29.0 else queues(1, 0, 0, 0))
 
@@ -99,9 +96,8 @@ def test_the_busier_lanes_get_more_green() -> None:
     assert max(share["a"], share["b"]) < min(share["c"], share["d"])
 
 
-@pytest.mark.parametrize("signal", [Adaptive, LongestQueue])
-def test_a_detector_shorter_than_a_queue_needs_is_refused(signal: type) -> None:
+def test_a_detector_shorter_than_a_queue_needs_is_refused() -> None:
     """Its next vehicle, a length of 5 m and a gap of 2.5 m behind, would not be seen."""
     with pytest.raises(InputError, match=r"detector_range \[m\] must be at least 11.25, got 11"):
-        signal(detector_range=11.0).start(SITE)
-    signal(detector_range=11.25).start(SITE)
+        LongestQueue(detector_range=11.0).start(SITE)
+    LongestQueue(detector_range=11.25).start(SITE)
