@@ -54,7 +54,9 @@ class AllWayStopSession:
     """
 
     def __init__(self, site: Site, reaction: float) -> None:
-        self.plan = Plan(marks=(LINE,), wake_on_clear=True, sight=LINE + SIGHT_MARGIN)
+        # SUMO's own vehicles stand a millimetre further off.
+        line = self._line = LINE if site.vehicle.sumo is None else LINE + 0.01
+        self.plan = Plan(marks=(line,), wake_on_clear=True, sight=line + SIGHT_MARGIN)
         self._reaction = reaction
         self._dt = site.dt
         self._vehicle = site.vehicle
@@ -97,7 +99,7 @@ class AllWayStopSession:
         for vehicle in view.vehicles:  # front to back
             if vehicle.distance >= 0.0 and vehicle.id not in self._gone:
                 heads.setdefault(vehicle.lane, vehicle)
-        return [vehicle for vehicle in heads.values() if vehicle.distance <= LINE]
+        return [vehicle for vehicle in heads.values() if vehicle.distance <= self._line]
 
     def _free_time(
         self, vehicle: Observed, waiting: list[Observed], crossing: list[Observed], now: float

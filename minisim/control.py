@@ -49,6 +49,14 @@ class Site:
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
 
+    @property
+    def looks_out(self) -> bool:
+        """Whether vehicles let others pass that cross their way inside the junction.
+
+        Only on SUMO's own ways, since its table of foes goes with them.
+        """
+        return self.vehicle.looks_out and self.intersection.ways is not None
+
     def __post_init__(self) -> None:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"

@@ -143,7 +143,7 @@ class FixedTimeSession:
         self._program = program
         self._heads = Heads(site)
         # In SUMO, a switch acts on the move that ends at its time.
-        self._early = site.dt if site.vehicle.looks_out else 0.0
+        self._early = site.dt if site.looks_out else 0.0
         self._half_step = site.dt / 2.0
 
     def decide(self, view: View) -> Iterable[Command]:

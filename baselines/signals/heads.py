@@ -66,9 +66,9 @@ class Heads:
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._open += [Colour.AMBER]
             self._stops = lambda _: True  # dead, see there
-        elif site.vehicle.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
+        elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
             self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
-        self._at_once = site.vehicle.looks_out
+        self._at_once = site.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * len(ways)
 

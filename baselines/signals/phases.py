@@ -66,7 +66,7 @@ class PhaseSession:
         self._order = full_order(order, site.intersection.n)
         self._heads = Heads(site)
         self._dt = site.dt
-        self._exact = site.vehicle.looks_out  # times its events like SUMO
+        self._exact = site.looks_out  # times its events like SUMO
         self._early = site.dt - TICK if self._exact else site.dt / 2.0
         self._rang = 0.0  # when the last timer was due
         self._min_green, self._amber = min_green, amber

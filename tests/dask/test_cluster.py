@@ -162,7 +162,7 @@ def test_a_lost_scheduler_leaves_what_was_done(tmp_path: Path) -> None:
             if done == 2:
                 process.kill()
 
-        with pytest.raises(ExecutorError, match=r"gave up .* of 12 runs; what was"):
+        with pytest.raises(ExecutorError, match=r"gave up .* of 12 runs; the others"):
             sweep(todo, executor, kill, store=store)
         assert 2 <= len(store) < len(todo)
         assert store.frame()["error"].isna().all()

@@ -112,7 +112,7 @@ def classes(intersection: Intersection, oracle: Oracle) -> Iterator[tuple[str, s
         apart = float(apart_by[intersection.index(a), intersection.index(b)])
         ours = [shapely.LineString(intersection.path(m).points) for m in (a, b)]
         merge = intersection.exit_arm(a) == intersection.exit_arm(b)
-        match harmony[a, b], oracle.are_foes(a, b):
+        match harmony.harmony(a, b), oracle.are_foes(a, b):
             case True, False:
                 kind = FREE
             case False, True:
@@ -182,7 +182,7 @@ def test_the_far_turns_of_the_paper_are_the_ones_that_the_radius_decides() -> No
         found[build] = {
             f"{a}{b}"
             for a, b in itertools.combinations(four.movements, 2)
-            if a.origin != b.origin and paper[a, b] == oracle.are_foes(a, b)
+            if a.origin != b.origin and paper.harmony(a, b) == oracle.are_foes(a, b)
         }
     assert found[as_hosted] == set()
     assert found[as_netconvert_draws_it] == {"a3c3", "b3d3"}
