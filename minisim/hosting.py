@@ -117,7 +117,7 @@ class Hosted:
                 self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
-        except Exception as error:
+        except Exception as error:  # a caller's code may raise anything
             raise _blamed(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
 
@@ -138,7 +138,7 @@ class Hosted:
             kinds: tuple[str, ...] = ()
             if isinstance(session, Kinds):
                 kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
-        except Exception as error:
+        except Exception as error:  # a caller's code may raise anything
             raise _blamed(self.controller, error, session) from error
         return Run(
             scenario=self.scenario,
@@ -200,7 +200,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         raise InputError(f"{name_of(controller)}: {error}") from error
     except MinisimError:
         raise
-    except Exception as error:
+    except Exception as error:  # a caller's code may raise anything
         raise _blamed(controller, error, controller) from error
     try:
         if not isinstance(plan, Plan) or not isinstance(session, Session):

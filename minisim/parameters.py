@@ -116,7 +116,7 @@ def _check_arguments(made: type) -> None:
         bound(made.__name__, signature, places, named)
         make(self, *places, **named)
 
-    made.__init__ = init  # type: ignore[misc]
+    made.__init__ = init  # type: ignore[misc]  # in its place
 
 
 def default_of(field: Field[Any]) -> Any:

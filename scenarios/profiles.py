@@ -66,13 +66,7 @@ AS_RUN = Profile(
 )
 
 #: `AS_RUN` in SUMO's speed mode 31, set by the driver of the fixed-time signal at unequal inflow.
-AS_RUN_OBEYING = Profile(
-    name="as_run_obeying",
-    vehicle=replace(_CRUISING, obeys=True),
-    speed_limit=14.0,
-    depart_speed=0.0,
-    dt=0.01,
-)
+AS_RUN_OBEYING = replace(AS_RUN, name="as_run_obeying", vehicle=replace(_CRUISING, obeys=True))
 
 #: How the published numbers of the two signals arose where the inflow was balanced, and those of
 #: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`

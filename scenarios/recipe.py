@@ -40,7 +40,7 @@ class Recipe:
 
     scenario: Scenario = part("what is simulated", Scenario)
     controller: Controller = checked(
-        "decides who goes; a text or table as for `controller_named` means the same",
+        "decides which vehicles go; a text or table as for `controller_named` means the same",
         _controller, "Controller",
     )  # fmt: skip
     seed: int = whole("of the random streams", low=0, default=0)

@@ -17,7 +17,7 @@ from minisim.engine.cruise.law import Cruise
 from minisim.engine.cruise.step import accelerate as accelerate_cruising
 from minisim.engine.insertion import insert
 from minisim.engine.state import ARRIVED, DRIVING, Floats, Records, Road
-from minisim.jit import njit
+from minisim.jit import njit, njit_inline
 from minisim.laws import (
     Law,
     braking_begins,
@@ -72,7 +72,7 @@ def advance(
     return tick, reasons, traced, observe(vehicles, lanes, law, observed)
 
 
-@njit
+@njit_inline
 def step(
     vehicles: Records,
     lanes: Records,
@@ -100,7 +100,7 @@ def step(
     return reasons
 
 
-@njit
+@njit_inline
 def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
@@ -137,7 +137,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                     break
                 j -= 1
 
-            # Who cannot stop before the junction has to see past a leader that may turn off.
+            # A vehicle that cannot stop before the junction sees past a leader that may turn off.
             near = s < ends[p, 0] and v * v > 2.0 * law.b_max * (law.entry - s)
             j = min(j, front) - 1
             while near and j >= first:
@@ -181,7 +181,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
     return overlap
 
 
-@njit
+@njit_inline
 def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
     """Move every vehicle by one step, add up waiting and loss, and collect reasons to return."""
     reasons = 0

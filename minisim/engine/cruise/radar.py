@@ -115,8 +115,8 @@ def radar(
 ) -> float:
     """Acceleration that the radar's leader asks of vehicle i on this `part` of its way [m/s²].
 
-    Part by part of the way: the leader on it, then the one of those that meet it behind whom there
-    is the least room, counting what they need to brake.
+    Part by part of the way: the leader on it, then, of the vehicles that meet it, the one with the
+    least room behind it, counting what it needs to brake.
     Source: `MSCFModel_CC::getRadarMeasurements`, `MSLane::getLeaderOnConsecutive`,
     `libsumo::Vehicle::getLeader` (where what is less than no room becomes none).
     """

@@ -34,7 +34,7 @@ ScenarioName = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom.")
 ]
 ControllerName = Annotated[
-    str, option("Who decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
+    str, option("What decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
 ]
 Humans = Annotated[float, option("Human drivers among DIM's, 0 … 1.", "SHARE")]
 Density = Annotated[
