@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 from minisim.errors import InputError, instance, number, printable
+from minisim.fleet import Fleet
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
@@ -43,11 +44,21 @@ class Site:
     """What a controller may know before the first vehicle arrives."""
 
     intersection: Intersection = part("its geometry", Intersection)
-    vehicle: VehicleType = part("the vehicles' type", VehicleType)
+    fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
+
+    @property
+    def vehicle(self) -> VehicleType:
+        """The vehicles' type; of several, one that is in every respect as bad as the worst."""
+        return self.fleet.worst
+
+    @property
+    def types(self) -> tuple[VehicleType, ...]:
+        """The vehicles' types; `Observed.type` is an index into them."""
+        return self.fleet.types
 
     @property
     def looks_out(self) -> bool:
@@ -61,6 +72,7 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
+        self.fleet.check(self.intersection.n)
         room = self.intersection.approach_length
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
@@ -68,9 +80,11 @@ class Site:
                 f"{room:g} m; arm_length must be more than "
                 f"{self.intersection.arm_length - room + needed:g} m"
             )
-        if entry_room(self.intersection, self.vehicle) <= 0.0:
+        if entry_room(self.intersection, self.fleet) <= 0.0:
+            tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
+            it = tight[0] if tight else self.vehicle
             raise InputError(
-                f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
+                f"vehicles of {it.length:g} × {it.width:g} m do not fit lanes "
                 f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
                 "touch another that waits beside it"
             )
@@ -78,7 +92,15 @@ class Site:
     @cached_property
     def conflicts(self) -> Bools:
         """Whether two movements from different arms must not be driven at once, shape (m, m)."""
-        return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
+        return conflicts(self.intersection, self.fleet) & self.intersection.movements.apart
+
+
+def _fleet(value: object) -> Fleet:
+    """A fleet, or the only type that drives, as a fleet."""
+    if isinstance(value, VehicleType):
+        return Fleet((value,))
+    instance("fleet", value, Fleet)
+    return cast(Fleet, value)
 
 
 class Observed(NamedTuple):
@@ -96,6 +118,7 @@ class Observed(NamedTuple):
     demand_time: float = 0.0  # when it wanted to enter the road [s]
     rank: int = 0  # its place among the vehicles of its lane, from 0
     speed_factor: float = 1.0  # its driver's factor on the speed limit
+    type: int = 0  # index of its type in `Site.types`; all can see whether it is a bus
 
     @property
     def movement(self) -> Movement:

@@ -174,6 +174,10 @@ class Fleet:
         return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
 
 
+#: What has `types`: a fleet, or the only type that drives.
+Vehicles = Fleet | VehicleType
+
+
 def fleet_named(value: Any, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 

@@ -78,10 +78,12 @@ class Simulation:
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
+        most = np.array([it.max_deceleration for it in self.site.types], float)
+        self._brakes = most[self._vehicles["type"]]
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
         self._traced = 0
-        self._bodies = np.zeros((16 * self.site.intersection.n, 5))
+        self._bodies = np.zeros((16 * self.site.intersection.n, 6))
         self._observed = np.zeros(len(self._vehicles) + 1, OBSERVED)
         self._seen = 0
         self._collisions: dict[tuple[int, int], Collision] = {}
@@ -163,7 +165,7 @@ class Simulation:
             case Advise(vehicle, speed):
                 self._vehicles["advice"][self._row[vehicle]] = speed
             case Brake(vehicle, asked) if not self._vehicles["cleared"][self._row[vehicle]]:
-                limited = min(asked, self._law.b_max)
+                limited = min(asked, self._brakes[self._row[vehicle]])
                 brake = -limited if limited > 0.0 else math.inf
                 self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
 from minisim.errors import InputError, number
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from minisim.recorded import clock
@@ -19,6 +20,9 @@ class Scenario:
     intersection: Intersection = part("the geometry", Intersection)
     demand: Demand = part("what to draw arrivals from", Demand)
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
+    fleet: Fleet | None = part(
+        "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
+    )
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
@@ -72,7 +76,7 @@ class Scenario:
         """What a controller may know about the scenario."""
         return Site(
             intersection=self.intersection,
-            vehicle=self.profile.vehicle,
+            fleet=self.fleet or Fleet((self.profile.vehicle,)),
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,
