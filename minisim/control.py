@@ -84,9 +84,9 @@ class Site:
             tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
             it = tight[0] if tight else self.vehicle
             raise InputError(
-                f"vehicles of {it.length:g} × {it.width:g} m do not fit lanes "
-                f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
-                "touch another that waits beside it"
+                f"vehicles of {it.length:g} × {it.width:g} m ({it.name}) do not fit lanes of "
+                f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
 
     @cached_property

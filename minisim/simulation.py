@@ -78,8 +78,6 @@ class Simulation:
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
         self._row = np.argsort(self._vehicles["id"]).tolist()
-        most = np.array([it.max_deceleration for it in self.site.types], float)
-        self._brakes = most[self._vehicles["type"]]
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
         self._traced = 0
@@ -165,7 +163,7 @@ class Simulation:
             case Advise(vehicle, speed):
                 self._vehicles["advice"][self._row[vehicle]] = speed
             case Brake(vehicle, asked) if not self._vehicles["cleared"][self._row[vehicle]]:
-                limited = min(asked, self._brakes[self._row[vehicle]])
+                limited = min(asked, float(self._vehicles["b_max"][self._row[vehicle]]))
                 brake = -limited if limited > 0.0 else math.inf
                 self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):

@@ -13,8 +13,10 @@ from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
+from minisim.fleet import Fleet, fleet_named
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Way
+from minisim.vehicle import VehicleType
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
 from scenarios.scenario import Scenario
@@ -30,8 +32,8 @@ PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
-    A profile may be given by name, and shares of lanes (`split`) and of manoeuvres (`turns`) as
-    numbers or as a text such as "4:3:2:1".
+    A profile may be given by name, a fleet as for `minisim.fleet.fleet_named`, and shares of lanes
+    (`split`) and of manoeuvres (`turns`) as numbers or as a text such as "4:3:2:1".
     """
 
     name: str
@@ -45,6 +47,7 @@ class Options(TypedDict, total=False):
     model: str
     min_headway: float
     profile: str | Profile
+    fleet: Fleet | VehicleType | Mapping[str, float | Sequence[float]] | str | None
     horizon: float
     warmup: float
     recorded: Arrivals | None
@@ -122,7 +125,9 @@ def from_bearings(
         raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
     if "min_headway" in given and given.get("model") != "shifted":
         raise InputError("min_headway goes with the model 'shifted'")
-    given["profile"] = profile_named(given.get("profile", "paper"))
+    profile = given["profile"] = profile_named(given.get("profile", "paper"))
+    if given.get("fleet") is not None:
+        given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in _PARTS

@@ -47,11 +47,10 @@ def insert(
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
             gap = vehicles[j]["s"] - vehicles[j]["length"] - s
-            b_ahead = road.types[vehicles[j]["type"]].b_max
             safe = insertable(gap, vehicles[j]["v"], mine, law)
             if safe < 0.0:
                 continue
-            room = room_behind(gap, vehicles[j]["v"], b_ahead, mine, law)
+            room = room_behind(gap, vehicles[j]["v"], vehicles[j]["b_max"], mine, law)
             v = min(v, safe, math.sqrt(max(room, 0.0)))
         lanes[lane]["next"] = i + 1
         vehicles[i]["status"] = DRIVING

@@ -130,8 +130,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 rear = ahead["s"] - ahead["length"]
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
                     z = closeness(v, rear - s, ahead["v"], mine, law)
-                    b_ahead = types[ahead["type"]].b_max
-                    room = room_behind(rear - s, ahead["v"], b_ahead, mine, law)
+                    room = room_behind(rear - s, ahead["v"], ahead["b_max"], mine, law)
                     overlap |= rear <= s
                     break
                 if s >= ends[p, 0]:
@@ -145,8 +144,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 ahead = vehicles[j]
                 rear = ahead["s"] - ahead["length"]
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
-                    b_ahead = types[ahead["type"]].b_max
-                    room = min(room, room_behind(rear - s, ahead["v"], b_ahead, mine, law))
+                    new = room_behind(rear - s, ahead["v"], ahead["b_max"], mine, law)
+                    room = min(room, new)
                 j -= 1
 
             # From the junction on, also the last vehicle before it bound for the same exit lane.
@@ -164,8 +163,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 if s >= law.entry or i == front:
                     z = max(z, closeness(v, gap, ahead["v"], mine, law))
                 if rear >= 0.0:
-                    b_ahead = types[ahead["type"]].b_max
-                    room = min(room, room_behind(gap, ahead["v"], b_ahead, mine, law))
+                    room = min(room, room_behind(gap, ahead["v"], ahead["b_max"], mine, law))
                 overlap |= gap <= 0.0 and s >= ends[p, 0]
 
             section, factor = me["section"], me["factor"]

@@ -37,6 +37,7 @@ VEHICLE = np.dtype(
         ("type", np.int64),  # index into `Road.types`
         ("demand_tick", np.int64),
         ("length", np.float64),  # of its type [m]
+        ("b_max", np.float64),  # the most that its brakes can do [m/s²]
         ("factor", np.float64),  # the driver's factor on the speed limit
         ("status", np.int64),
         ("s", np.float64),  # front bumper, from the road entry [m]
@@ -158,7 +159,9 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
     vehicles["type"] = types_of(site, arrivals)[order]
-    vehicles["length"] = np.array([it.length for it in site.types])[vehicles["type"]]
+    kinds = vehicles["type"]
+    vehicles["length"] = np.array([it.length for it in site.types], float)[kinds]
+    vehicles["b_max"] = np.array([it.max_deceleration for it in site.types], float)[kinds]
     factors = arrivals.speed_factor
     vehicles["factor"] = _speed_factors(site, vehicles) if factors is None else factors[order]
     for name in ("ahead", "depart_tick", "arrival_tick"):
