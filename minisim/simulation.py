@@ -150,7 +150,7 @@ class Simulation:
             collisions=self.collisions,
             columns=collect_trips(self._vehicles, demand, movements, self.site.dt, end),
             trace=np.concatenate([*self._traces, self._trace[:0]]),
-            rows=self._vehicles[["id", "path"]].copy(),
+            rows=self._vehicles[["id", "path", "type"]].copy(),
         )
 
     def _decide(self) -> None:

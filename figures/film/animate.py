@@ -195,7 +195,8 @@ class Picture:
         now = film.at(time)
         near = film.rows(now, 1.1 * self._reach)
         x, y, angle = film.x[near], film.y[near], film.angle[near]
-        body, glass = drawing.body_shape(run.site.vehicle)
+        shapes = zip(*map(drawing.body_shape, run.site.types), strict=True)
+        body, glass = (np.stack(shape)[film.type[near]] for shape in shapes)
         states = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])
         self._bodies.set_verts(list(drawing.place(body, x, y, angle)))
         self._bodies.set_facecolor(states[film.state[near]].tolist())

@@ -113,9 +113,10 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trip
     # SUMO still inserts vehicles at the very end. One that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
     arrived = departed & (arrival >= 0.0)
+    types = job.vehicles["type"][np.argsort(job.vehicles["id"])]
     loss = np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float)
     return trips_of(
-        arrivals.time, arrivals.lane, arrivals.manoeuvre, job.movements, end,
+        arrivals.time, arrivals.lane, arrivals.manoeuvre, types, job.movements, end,
         depart=np.where(departed, depart, np.nan), arrival=np.where(arrived, arrival, np.nan),
         waiting_time=np.where(departed, waiting, 0.0), time_loss=loss,
     )  # fmt: skip
