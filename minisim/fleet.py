@@ -141,6 +141,13 @@ class Fleet:
         """The names of the types."""
         return tuple(it.name for it in self.types)
 
+    def __str__(self) -> str:
+        """As `fleet_named` reads it, such as "car:0.8,bus:0.2"; the name of an only type."""
+        if len(self.types) == 1:
+            return self.types[0].name
+        shares = ("/".join(f"{share:g}" for share in row) for row in self.shares)
+        return ",".join(f"{name}:{share}" for name, share in zip(self.names, shares, strict=True))
+
     @cached_property
     def worst(self) -> VehicleType:
         """A vehicle that is in every respect as bad as the worst: the longest, the weakest brakes.
@@ -184,7 +191,7 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     Args:
         value: a Fleet or VehicleType as it is; or the shares of `TYPES`, as a table such as
             `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
-            such as "car:0.8,bus:0.2".
+            such as "car:0.8,bus:0.2", with shares by lane written 0.2/0.1/0.2/0.1.
         base: its law drives the vehicles of a table or text.
 
     Raises:
@@ -199,11 +206,13 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     if isinstance(value, str):
         pairs = [part.rpartition(":") for part in value.split(",")]
         try:
-            value = {name.strip(): float(share) for name, _, share in pairs}
+            value = {
+                name.strip(): [float(share) for share in row.split("/")] for name, _, row in pairs
+            }
         except ValueError:
             raise InputError(f"fleet must be {wanted}, got {show(value)}") from None
         if len(value) < len(pairs):
-            raise InputError("fleet names a vehicle type twice")
+            raise InputError(f"fleet names a vehicle type twice: {', '.join(p[0] for p in pairs)}")
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
     if base.sumo is not None:
@@ -212,20 +221,22 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
 
 
-#: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
-#: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
-#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and knows no
-#: motorcycles or auto-rickshaws.
+#: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
+#:
+#: `pcu` is IRC:106-1990 (table 1), with a factor for a type that makes up 5 % of the traffic and
+#: one for 10 % or more. `pcu-irc64` is IRC:64-1990, with one. `pcu-hcm` is the Highway Capacity
+#: Manual (2000, chapter 16), which counts a heavy vehicle at a junction as two cars, and knows
+#: neither motorcycles nor auto-rickshaws.
 PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "IRC:106": {
+    "pcu": {
         "motorcycle": (0.5, 0.75), "auto-rickshaw": (1.2, 2.0), "car": (1.0, 1.0),
         "lcv": (1.4, 2.0), "bus": (2.2, 3.7), "truck": (2.2, 3.7),
     },
-    "IRC:64": {
+    "pcu-irc64": {
         "motorcycle": (0.5, 0.5), "auto-rickshaw": (1.0, 1.0), "car": (1.0, 1.0),
         "lcv": (1.5, 1.5), "bus": (3.0, 3.0), "truck": (3.0, 3.0),
     },
-    "HCM": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
+    "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
 }  # fmt: skip
 
 #: SUMO's classes count as the types that they stand for.
@@ -235,24 +246,24 @@ _ALIKE = {
 }  # fmt: skip
 
 
-def pcu_factors(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> tuple[float, ...]:
+def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
 
-    Where a source has two factors, they are those of shares of 5 % and 10 %; in between the factor
-    is interpolated. Raises `InputError` for a source or a type without a factor.
+    Where a unit has two factors, they are those of shares of 5 % and 10 %; in between the factor
+    is interpolated. Raises `InputError` for an unknown unit, or a type without a factor.
     """
-    table = PCU[choice("source of passenger car units", source, PCU)]
+    table = PCU[choice("passenger car unit", unit, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
     if len(fleet.types) == 1:  # the unit is made for cars alone
         return (1.0,)
     kinds = [_ALIKE.get(name, name) for name in fleet.names]
-    rows = [table[choice(f"vehicle type in {source}", kind, table)] for kind in kinds]
+    rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)
     )
 
 
-def mean_pcu(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> float:
-    """Passenger car units of the mean vehicle, over `n` lanes with the same inflow."""
-    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    return float(np.dot(pcu_factors(fleet, source, n), shares))
+def mean_pcu(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
+    """Passenger car units of the mean vehicle of each of `n` lanes."""
+    factors = pcu_factors(fleet, unit, n)
+    return tuple(float(np.dot(factors, fleet.of_lane(lane))) for lane in range(n))

@@ -8,12 +8,12 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
-from minisim.fleet import Fleet, fleet_named
+from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Way
 from minisim.vehicle import VehicleType
@@ -33,7 +33,8 @@ class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
     A profile may be given by name, a fleet as for `minisim.fleet.fleet_named`, and shares of lanes
-    (`split`) and of manoeuvres (`turns`) as numbers or as a text such as "4:3:2:1".
+    (`split`) and of manoeuvres (`turns`) as numbers or as a text such as "4:3:2:1". `unit` is that
+    of the density: "veh", or passenger car units (`minisim.fleet.PCU`).
     """
 
     name: str
@@ -47,6 +48,7 @@ class Options(TypedDict, total=False):
     model: str
     min_headway: float
     profile: str | Profile
+    unit: str
     fleet: Fleet | VehicleType | Mapping[str, float | Sequence[float]] | str | None
     horizon: float
     warmup: float
@@ -56,8 +58,11 @@ class Options(TypedDict, total=False):
 #: Mean inflow per lane by default [veh/h].
 DENSITY = 350.0
 
+#: The unit of a density that counts vehicles.
+VEHICLES = "veh"
+
 #: Keywords that recorded arrivals replace.
-DRAWN = ("density", "split", "turns", "model", "min_headway")
+DRAWN = ("density", "split", "turns", "model", "min_headway", "unit")
 
 _PARTS = (Intersection, Demand, Scenario)
 
@@ -66,7 +71,8 @@ _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
 def _shown(make: _Maker) -> _Maker:
     """Give `make` a signature in which help and completion see `Options` and their defaults."""
-    defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
+    defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)}
+    defaults |= {"name": None, "unit": VEHICLES}
     *own, _ = inspect.signature(make).parameters.values()  # the last is `options`
     options = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=defaults[key])
@@ -128,15 +134,28 @@ def from_bearings(
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
+    unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in _PARTS
     )
-    return Scenario(
+    made = Scenario(
         intersection=Intersection(bearings=numbers("bearings", bearings), **geometry),
         demand=Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
+    return made if unit == VEHICLES else _in_vehicles(made, unit)
+
+
+def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
+    """The same scenario, with an inflow that was given in passenger car units as vehicles."""
+    if scenario.fleet is None:
+        raise InputError(f"unit {unit!r} needs a fleet, such as car:0.8,bus:0.2")
+    n = scenario.intersection.n
+    means = mean_pcu(scenario.fleet, unit, n)
+    rates = [rate / mean for rate, mean in zip(scenario.demand.rates(n), means, strict=True)]
+    split = scenario.demand.split if len(set(means)) == 1 else tuple(rates)
+    return replace(scenario, demand=replace(scenario.demand, density=sum(rates) / n, split=split))
 
 
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:

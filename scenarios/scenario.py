@@ -40,14 +40,22 @@ class Scenario:
         self.demand.rates(n)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        self.vehicles.check(n)
         if self.recorded is not None:
             self.recorded.check(n)
+            if self.recorded.type is not None:
+                self.vehicles.indices(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
                 raise InputError(
                     f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
                     f"recorded arrival is at {clock(first)}; `start` says where in the table a run "
                     f"begins"
                 )
+
+    @property
+    def vehicles(self) -> Fleet:
+        """The fleet, or the profile's vehicle as one."""
+        return self.fleet or Fleet((self.profile.vehicle,))
 
     @property
     def profile_name(self) -> str:
@@ -76,7 +84,7 @@ class Scenario:
         """What a controller may know about the scenario."""
         return Site(
             intersection=self.intersection,
-            fleet=self.fleet or Fleet((self.profile.vehicle,)),
+            fleet=self.vehicles,
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,

@@ -127,7 +127,8 @@ class Run:
         what = self.scenario
         return {
             "controller": name_of(self.controller), "scenario": what.name,
-            "profile": what.profile_name, "density": what.density, "seed": self.seed,
+            "profile": what.profile_name, "fleet": str(self.site.fleet), "density": what.density,
+            "seed": self.seed,
             "horizon_s": what.horizon, "warmup_s": what.warmup, "host": self.host["host"],
             **summarise(self, metrics, by),
         }  # fmt: skip
