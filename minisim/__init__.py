@@ -13,10 +13,11 @@ The names below are loaded on first use, so `import minisim` is quick.
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING
 
 from minisim.version import __version__
 
+# Not typing's: `python -m minisim` may find a typing.py in the working directory. Checkers know it.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand
     from minisim.errors import MinisimError

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from minisim.errors import InputError, instance, number, printable
+from minisim.errors import InputError, instance, number, printable, told
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
@@ -342,9 +342,14 @@ class Controller(Protocol):
 
 def as_controller(what: str, value: object) -> Controller:
     """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
-    if isinstance(value, Controller) and not isinstance(value, type):
-        printable(f"the name of {what}", value.name)
-        return value
+    try:
+        if isinstance(value, Controller) and not isinstance(value, type):
+            printable(f"the name of {what}", value.name)
+            return value
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        raise InputError(f"{what} has no name: {told(error)}") from error
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
