@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 import minisim
-from minisim.control import Marking, Open, Plan, Wake
+from minisim.control import Marking, Open, Plan, Session, Site, Wake
 from minisim.errors import ControllerError, InputError, MinisimError
 from minisim.hosting import Alarm, checked_window, start
 from minisim.testing import small_scenario
@@ -122,10 +122,13 @@ def test_what_ends_the_process_is_no_error_of_a_controller(raised: type[BaseExce
 
 
 def test_a_controller_without_a_name_to_read_is_refused() -> None:
-    class Nameless(Fixed):
+    class Nameless:
         @property
         def name(self) -> str:
             sys.exit("no name")
+
+        def start(self, site: Site) -> Session:
+            raise NotImplementedError
 
         def __repr__(self) -> str:
             raise ZeroDivisionError
