@@ -130,9 +130,7 @@ class Manager:
         self._law = law_of(site)
         self._ways = courses(site)
         zones = conflict_zones(site.intersection, site.vehicle).tolist()
-        self._zones = [
-            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
-        ]
+        self._zones = [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
         self._rows = site.intersection.movements.rows

@@ -53,8 +53,7 @@ FREED = 506.0  #: distance driven at which a place in the action list is given u
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
 #: Distance driven at which a vehicle is told 20 m/s for good [m], and no longer shown. The authors
-#: have no such limit, but in the three runs that we checked, no vehicle is told anything after
-#: 531 m.
+#: have no such limit, but in three runs that we checked, no vehicle is told anything after 531 m.
 FOLLOWED = 600.0
 SEEN_BEYOND = 10.0  #: how much farther a vehicle stays in view, to be seen past that mark [m]
 

@@ -24,8 +24,7 @@ class Zones:
     yellow: float = real(
         "length of the yellow zone", "m", default=6.0, above=0, high=1000, label="yellow zone"
     )
-    # A vehicle that brakes for the hold line must never look unable to stop before the junction,
-    # or the others would wait for it.
+    # A vehicle that brakes for the hold line must never look unable to stop: others would wait.
     green: float = real(
         "length of the green zone", "m", default=2.0, low=COMMIT_MARGIN, high=1000,
         label="green zone",

@@ -136,8 +136,7 @@ def check_controller(
 
     A controller is a recipe: it compares, hashes, prints and pickles like a value, and runs
     leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
-    same trips, even from a pickled copy or after other runs. No vehicles collide, and all are
-    served once the demand is over.
+    same trips, even from a pickled copy or after other runs. None collides, and all are served.
 
     Args:
         controller: to check.

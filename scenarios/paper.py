@@ -41,8 +41,7 @@ SPLITS = ("balanced", "4:3:2:1", "4:1:4:1")
 
 #: Mean inflow per lane [veh/h] -> green [s] in the published fixed-time runs: Webster's, rounded as
 #: in the paper's table. The 5 and 7 s follow from the trips, whose cycles last 28 and 36 s. The
-#: 61.75 s is in the network file, and the 19.25 s (the table prints 19.75) is in that of the
-#: adaptive signal.
+#: 61.75 s is in the network file, the 19.25 s (printed 19.75) in that of the adaptive signal.
 GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.

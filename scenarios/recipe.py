@@ -48,9 +48,7 @@ class Recipe:
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
-    label: str = text(
-        "what rows call the controller; its own name if empty", empty=True, default=""
-    )
+    label: str = text("what rows call the controller; if empty, its name", empty=True, default="")
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
         REACTIONS, default="stop",

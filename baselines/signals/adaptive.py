@@ -25,8 +25,7 @@ class Adaptive:
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
     it needs to reach the stop line at the speed limit, if that is before `max_green`. A green also
     goes on while the other lanes are empty. Time loss is relative to the speed that the driver
-    would like (`MSE2Collector`). Defaults are SUMO's, except for greens and amber, which are from
-    the authors' network.
+    would like (`MSE2Collector`). Defaults are SUMO's; greens and amber are the authors'.
     """
 
     name = Name("adaptive")

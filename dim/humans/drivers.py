@@ -49,14 +49,12 @@ class Humans:
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A driver must look for longer than a vehicle with the right of way takes to move
-    # off, which is a few steps.
+    # (AASHTO). A vehicle with the right of way needs less to move off: a few steps.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
     )  # fmt: skip
-    # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
-    # Anal. Prev. 74:1).
+    # 29 % of right, 25 % of left turns in the USA (Sullivan et al. 2015, Accid. Anal. Prev. 74:1).
     unsignalled: tuple[float, float] = reals(
         "share of near and of far turns that no indicator announces",
         count=2, low=0, high=1, default=(0.29, 0.25),

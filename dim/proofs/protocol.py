@@ -79,9 +79,7 @@ class Protocol:
     matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
     order: str = word("which clique is preferred", ORDERS, default="size")
     gate: str = word("what may enter while others cross", GATES, default="clear")
-    commit: str = word(
-        "when a vehicle is committed", COMMITS, label="commit rule", default="stoppable"
-    )
+    commit: str = word("when a vehicle commits", COMMITS, label="commit rule", default="stoppable")
     priorities: str = word("which lane comes first at a tie", PRIORITIES, default="fixed")
 
     @property

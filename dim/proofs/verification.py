@@ -22,8 +22,7 @@ from dim.perception import Percept
 from minisim.errors import InputError
 
 #: Up to this number of arms, the participants are listed in every order (120 per case with 5 arms);
-#: beyond it, only as each participant would list them: itself first, then the others around the
-#: junction, in either direction.
+#: beyond it, only as each would list them: itself first, then the others around, either way.
 ALL_ORDERS = 5
 
 Lanes = int  #: a set of lanes, bit i for lane i

@@ -43,8 +43,7 @@ def write_animation(
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
     The run must have been recorded with `record="all"` over the time shown. There are `fps` frames
-    per second, at most one per step, and 50 in a GIF; `progress` is called with the frames done and
-    the total.
+    per second, at most one per step, and 50 in a GIF; `progress` gets frames done and the total.
 
     Raises:
         InputError: an unknown suffix, a time that was not recorded, or a number out of range.

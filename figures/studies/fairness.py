@@ -57,7 +57,6 @@ def _draw_lanes(axes: Axes, rows: pd.DataFrame) -> None:
 SECTION = Section(
     "Fairness",
     (
-        Item("fairness", "fixed, rotating and longest-waiting priority", fairness_figure,
-             ("fairness",)),
+        Item("fairness", "fixed, rotating and waiting priority", fairness_figure, ("fairness",)),
     ),
 )  # fmt: skip

@@ -75,8 +75,7 @@ class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
     The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
-    warm-up (`Run.counted`). A number that needs only trips is also measured for each lane,
-    movement and kind.
+    warm-up (`Run.counted`). A number that needs only trips also has a value per group of trips.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")

@@ -83,11 +83,9 @@ def simulate(
         keep_files: new or empty folder for SUMO's files, which are temporary by default: network,
             routes, configuration, log and trips. If the run fails, they stay, and the exception
             has a note that names the folder.
-        fcd: file for SUMO's own floating-car data of every step; created once the run has
-            succeeded.
+        fcd: file for SUMO's own floating-car data of every step, written if the run succeeds.
         gui: show the run in sumo-gui.
-        progress: called at every wake-up with the number of steps done and the total up to the
-            horizon.
+        progress: called at every wake-up with the steps done and the total up to the horizon.
 
     Raises:
         MissingExtraError: SUMO is not installed.

@@ -26,9 +26,7 @@ from scenarios.cli.shared.terminal import bar, show
 def figures(
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[NAME...]", help="Which ones; by default all that there are runs for."
-        ),
+        typer.Argument(metavar="[NAME...]", help="Which ones; by default all that have runs."),
     ] = None,
     out: options.Folder = Path("out/figures"),
     store: Annotated[

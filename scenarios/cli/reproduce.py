@@ -38,9 +38,7 @@ def reproduce(
     jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
-        option(
-            f"Only this study and its figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"
-        ),
+        option(f"Only this study, with figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"),
     ] = None,
     quick: Annotated[bool, option("A smoke test: two demands, 150 s.", None, "--quick")] = False,
 ) -> None:

@@ -82,9 +82,7 @@ def sweep(
         str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
     ] = None,
     export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
-    horizon: Annotated[
-        float | None, option("Simulated time; as the file says, or 3600.", "S")
-    ] = None,
+    horizon: Annotated[float | None, option("Simulated time; the file's, or 3600.", "S")] = None,
 ) -> None:
     """Run many experiments over seeds, and keep the results; stored runs are not repeated."""
     from minisim.arrivals import MAX_TIME

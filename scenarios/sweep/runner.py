@@ -50,8 +50,7 @@ def sweep(
         jobs: processes of the pool, one per core by default; 1 runs in this process.
         store: keeps each row as it comes; rows that it has are not computed again.
         metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`,
-            `Metric`s or functions of your own, or `module:name` of these. With several processes
-            the function must be in a module.
+            `Metric`s or functions of your own (for several processes in a module), `module:name`.
 
     Returns:
         What was run (`scenarios.sweep.rows.identity_of`); the keys of `Run.summary()`, nested

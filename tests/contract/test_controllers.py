@@ -241,9 +241,7 @@ class Says(Broken):
 def never_d(site: Site) -> Session:
     """A signal whose last head stays red."""
     signal = FixedTime().start(site)
-    return ScriptedSession(
-        signal.plan, lambda view: [c for c in signal.decide(view) if c != Open(3)]
-    )
+    return ScriptedSession(signal.plan, lambda at: [c for c in signal.decide(at) if c != Open(3)])
 
 
 @dataclass(frozen=True)

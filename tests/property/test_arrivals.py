@@ -77,9 +77,7 @@ def test_a_longer_duration_only_adds_arrivals(
 
 
 @given(demands(N, 300.0), st.integers(0, 2**32), st.integers(0, N - 1), floats(0.1, 2.0))
-def test_the_rate_of_a_lane_changes_no_other(
-    demand: Demand, seed: int, lane: int, factor: float
-) -> None:
+def test_the_rate_of_a_lane_is_its_own(demand: Demand, seed: int, lane: int, factor: float) -> None:
     """With the other rates as they are: as numbers, not as shares of another total."""
     split = [factor if k == lane else 1.0 for k in range(N)]
     density = 200.0 * sum(split) / N

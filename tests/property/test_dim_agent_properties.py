@@ -39,9 +39,8 @@ def views(draw: st.DrawFn, n: int) -> list[View]:
             distance = draw(st.floats(-15.0, 9.0))
             for k in range(first[lane], min(first[lane] + draw(st.integers(0, 3)), 5)):
                 speed = draw(st.sampled_from([0.0, 1.0, 2.5, 5.0]))
-                seen.append(
-                    Observed(100 * lane + k, lane, wishes[5 * lane + k], distance, speed, LENGTH)
-                )
+                wish = wishes[5 * lane + k]
+                seen.append(Observed(100 * lane + k, lane, wish, distance, speed, LENGTH))
                 distance += LENGTH + draw(st.floats(0.5, 5.0))
         result.append(View(float(time), tuple(v for v in seen if v.distance <= 8.5)))
     return result

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 #: A group of options in the help.
 FILES = "Files"
 
-#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
-#: that none does is (1/2)^30, one in 10^9.
+#: So many arrivals use the last lane or manoeuvre: on 4 equal arms, all but one in 2^30 times.
 ENOUGH = 30
 
 

@@ -113,9 +113,7 @@ def test_of_one_lane_only_one_goes(first: str) -> None:
 
 
 @pytest.mark.parametrize(("driven", "chosen"), [(490.01, ()), (508.0, ()), (508.01, (2,))])
-def test_nothing_is_decided_while_the_junction_is_busy(
-    driven: float, chosen: tuple[int, ...]
-) -> None:
+def test_no_decision_while_the_junction_is_busy(driven: float, chosen: tuple[int, ...]) -> None:
     rule = rules()
     rule.serving = [1]
     step(rule, car("v1.c_1", driven), car("v2.a_1", 486.0))

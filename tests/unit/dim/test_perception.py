@@ -101,9 +101,7 @@ def test_commit_stoppable(distance: float, speed: float, committed: bool) -> Non
 @pytest.mark.parametrize(
     ("distance", "committed"), [(2.0, False), (1.0, False), (0.99, True), (0.0, True)]
 )
-def test_commit_paper_is_half_of_the_green_zone(
-    distance: float, committed: bool, speed: float
-) -> None:
+def test_commit_paper_is_half_a_green_zone(distance: float, committed: bool, speed: float) -> None:
     vehicle = car(1, "b2", distance, speed)
     assert PAPER.committed(vehicle) is committed
     assert PAPER.read(view(vehicle)).crossing == ((1,) if committed else ())

@@ -348,9 +348,8 @@ def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
 
 def test_html_holds_every_frame(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    frames = [
-        Image.fromarray((rng.integers(0, 4, (5, 6, 3)) * 85).astype(np.uint8)) for _ in range(4)
-    ]
+    pictures = (rng.integers(0, 4, (4, 5, 6, 3)) * 85).astype(np.uint8)
+    frames = [Image.fromarray(picture) for picture in pictures]
     palette = palette_of(Image.fromarray(np.concatenate([np.asarray(f) for f in frames])))
     palette = palette.crop((0, 0, 6, 5))
     file = tmp_path / "film.html"

@@ -226,9 +226,7 @@ def test_speed_towards_asks_for_more_than_b_where_b_cannot_make_it() -> None:
 
 @pytest.mark.parametrize("gap", [2.5, 3.0, 10.0, 80.0])
 @pytest.mark.parametrize("v_leader", [0.0, 6.0, 14.0])
-def test_insertion_speed_is_the_highest_that_keeps_the_desired_gap(
-    gap: float, v_leader: float
-) -> None:
+def test_the_insertion_speed_is_the_highest_that_keeps_the_gap(gap: float, v_leader: float) -> None:
     v = insertion_speed(gap, v_leader, 2.6, 4.5, 1.0, 2.5)
     assert v >= 0.0
     assert SUMO.z(v, gap, v_leader) == pytest.approx(1.0)

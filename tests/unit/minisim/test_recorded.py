@@ -128,9 +128,7 @@ MORNING = "demand_time_s,lane,manoeuvre\n25100,c,2\n25205.5,a,2\n25207,b,1\n2800
 
 
 @pytest.mark.parametrize("start", ["07:00", "7:00", "07:00:00", 25200, 25200.0, "25200"])
-def test_a_run_may_begin_at_a_time_of_day(
-    csv_file: Callable[[str], Path], start: float | str
-) -> None:
+def test_a_run_begins_at_a_time_of_day(csv_file: Callable[[str], Path], start: float | str) -> None:
     arrivals = read_arrivals(csv_file(MORNING), 4, start)
     assert arrivals.time.tolist() == [5.5, 7.0, 2800.0]
     assert arrivals.lane.tolist() == [0, 1, 2]

@@ -130,9 +130,7 @@ def test_other_processes_find_it() -> None:
 @pytest.mark.usefixtures("folder")
 def test_a_sweep_says_what_a_plain_class_lacks() -> None:
     recipe = Recipe(four_way(), "own_mine:Plain(k=3)")  # type: ignore[arg-type]
-    with pytest.raises(
-        InputError, match=r"Plain is not a dataclass.*make it a frozen dataclass"
-    ) as it:
+    with pytest.raises(InputError, match=r"Plain is not a dataclass.*it a frozen dataclass") as it:
         key_of(recipe)
     assert "0x" not in str(it.value)
 
@@ -160,8 +158,8 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
         ("own_exits:Mine", "cannot import own_exits: own_exits.py, line 1: SystemExit: 3"),
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
         ("own_empty:Mine", "own_empty has no 'Mine', and no other controller either"),
-        ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
-        ("time:Mine", "time.py has the name of another module, time; rename the file"),
+        ("json.py:Mine", "json.py has the name of another module, json; rename it"),
+        ("time:Mine", "time.py has the name of another module, time; rename it"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_sentence(folder: Path, spec: str, message: str) -> None:

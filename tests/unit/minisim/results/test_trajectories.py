@@ -80,9 +80,7 @@ def test_a_frame_without_the_columns_is_an_error(tmp_path: Path, write: Any) -> 
             write(frame, tmp_path / "out.csv")
 
 
-def test_fcd_follows_the_schema_of_sumo_and_says_what_the_frame_says(
-    run: Run, tmp_path: Path
-) -> None:
+def test_fcd_follows_sumos_schema_and_says_what_the_frame_says(run: Run, tmp_path: Path) -> None:
     """Element and attribute names and kinds of SUMO's fcd_file.xsd."""
     path = tmp_path / "fcd.xml"
     write_fcd(run.trajectories, path, run.site)

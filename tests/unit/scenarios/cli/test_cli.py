@@ -202,9 +202,7 @@ def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: 
     assert trips.exists()
 
 
-def test_without_safety_nothing_is_recorded(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_safety_no_recording(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     records, real = [], minisim.simulation.Simulation
 
     def spy(*arguments: Any, **options: Any) -> Any:
@@ -382,9 +380,8 @@ def test_a_film_shows_the_run_of_the_same_options(
     recorded = tmp_path / "arrivals.csv"
     write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
     films: list[Run] = []
-    monkeypatch.setattr(
-        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
-    )
+    writer = "figures.film.animate.write_animation"
+    monkeypatch.setattr(writer, lambda run, *_, **__: films.append(run))
     what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
     for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
         options = (*what, "-c", controller)
@@ -464,10 +461,7 @@ BAD = [
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
     (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
-    (
-        ("run", "four-way", "--metrics", "pets,trips", "--no-safety"),
-        "asks for pets, which --no-saf",
-    ),
+    (("run", "four-way", "--metrics", "pets,trips", "--no-safety"), "asks for pets, which --no"),
     (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),

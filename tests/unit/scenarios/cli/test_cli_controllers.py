@@ -39,9 +39,7 @@ def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
 
-def test_a_class_of_your_own(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_your_own_class(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own_signal.py").write_text(
         "from baselines import FixedTime\n\n"

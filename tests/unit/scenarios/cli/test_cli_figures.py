@@ -93,9 +93,7 @@ def test_reproduce_computes_what_is_missing(tmp_path: Path) -> None:
     assert not any(made.failed for made in first)
 
 
-def test_progress_is_told_without_a_terminal(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_progress_without_a_terminal(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([0.0, 5.0, 25.0, 30.0, 50.0])
     monkeypatch.setattr(terminal, "SILENCE", 20.0)
     monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock))

@@ -173,9 +173,7 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
 LIMIT = 1.0
 
 
-def test_a_global_that_an_own_metric_reads_is_part_of_the_key(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_global_that_a_metric_reads_is_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = Recipe(four_way(), Dim(), metrics=(Metric("mine", lambda run: LIMIT),))
     before = key_of(recipe)
     monkeypatch.setattr(sys.modules[__name__], "LIMIT", 2.0)

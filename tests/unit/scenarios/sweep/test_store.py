@@ -196,9 +196,7 @@ def test_another_writer_is_waited_for(
         assert len(ours) == 3
 
 
-def test_a_store_that_another_holds_is_told_soon(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_store_in_use_is_told_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenarios.sweep.store.OPENING", 0.1)
     with Store(tmp_path / "s.db") as theirs:
         theirs._database.executescript("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE")
