@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import signal
@@ -44,13 +43,13 @@ from minisim.sumo import host, network, simulate
 from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.cli import main
 from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
 from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
 from tests.sumo.conftest import both
+from tests.unit.scenarios.cli.test_cli import Captured, answer, fails, ok
 
 FAIR_FOUR = four_way(100, profile="fair")
 
@@ -537,40 +536,31 @@ def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPat
 RUN = ("run", "four-way", "-p", "fair", "-d", "300", "--horizon", "120")
 
 
-def test_the_command_line_hosts_in_sumo(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert main([*RUN, "--json", "--host", "sumo", "--keep-files", str(tmp_path / "kept")]) == 0
-    printed = json.loads(capsys.readouterr().out)
+def test_the_command_line_hosts_in_sumo(capsys: Captured, tmp_path: Path) -> None:
+    printed = answer(capsys, *RUN, "--host", "sumo", "--keep-files", str(tmp_path / "kept"))
     assert (tmp_path / "kept" / "minisim.net.xml").is_file()
-    assert main([*RUN, "--json"]) == 0
-    ours = json.loads(capsys.readouterr().out)
+    ours = answer(capsys, *RUN)
     assert (ours["host"], printed["host"]) == ("minisim", "sumo")
     assert printed.keys() == ours.keys()
     assert printed["trips"] == ours["trips"]
     assert printed["travel_time_s"] == pytest.approx(ours["travel_time_s"], rel=0.03)
 
 
-def test_the_command_line_prints_a_table_of_sumos_run(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_command_line_prints_a_table_of_sumos_run(capsys: Captured, tmp_path: Path) -> None:
     kept = str(tmp_path / "kept")
     fcd = tmp_path / "sumo.xml"
     options = ("-c", "fixed-time", "--host", "sumo", "--sumo-model", "Krauss", "--keep-files", kept)
-    assert main([*RUN, *options, "--sumo-fcd", str(fcd)]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert f"wrote {fcd}" in captured.out.replace("\n", "")
+    said = ok(capsys, *RUN, *options, "--sumo-fcd", str(fcd))
+    assert f"wrote {fcd}" in said.replace("\n", "")
     assert fcd.read_text().count("<timestep") == 1201  # 0 … 120 s
-    assert "host sumo" in captured.out
-    assert f"  SUMO's files are in {kept}\n" in captured.out
+    assert "host sumo" in said
+    assert f"  SUMO's files are in {kept}\n" in said
 
 
-def test_a_collision_names_what_is_there_and_what_is_not(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_collision_names_what_is_there_and_what_is_not(capsys: Captured, tmp_path: Path) -> None:
     fcd, kept = tmp_path / "fcd.xml", tmp_path / "kept"
     options = ("-c", "unregulated", "--host", "sumo", "--sumo-fcd", str(fcd))
-    assert main([*RUN, *options, "--keep-files", str(kept)]) == 1
-    said = capsys.readouterr().err
+    said = fails(capsys, *RUN, *options, "--keep-files", str(kept), code=1)
     assert f"SUMO's files up to there are in {kept}; {fcd} not written; --on-collision" in said
     assert not fcd.exists()
 
@@ -585,13 +575,8 @@ def test_a_collision_names_what_is_there_and_what_is_not(
         (("--host", "sumo", "--sumo-model", "CACC"), "unknown SUMO model 'CACC'"),
     ],
 )
-def test_wrong_options_are_one_line(
-    capsys: pytest.CaptureFixture[str], options: tuple[str, ...], message: str
-) -> None:
-    assert main([*RUN, *options]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
+def test_wrong_options_are_told(capsys: Captured, options: tuple[str, ...], message: str) -> None:
+    assert message in fails(capsys, *RUN, *options)
 
 
 def test_a_crossed_vehicle_still_follows_into_its_exit() -> None:

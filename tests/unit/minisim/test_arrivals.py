@@ -116,9 +116,6 @@ def test_inflow_counts_vehicles_before_the_horizon() -> None:
     assert arrivals.rates(3, 3600.0) == pytest.approx((3.0, 2.0, 0.0))
 
 
-# --- shares ------------------------------------------------------------------------------------
-
-
 def test_unbalanced_demand_keeps_the_total_and_gives_each_lane_its_share() -> None:
     """The paper's unbalanced demand: λ = share · D · N, shares 0.4, 0.3, 0.2, 0.1."""
     demand = Demand(density=350.0, split=(4, 3, 2, 1))
@@ -162,9 +159,6 @@ def test_manoeuvres_are_drawn_from_their_own_stream() -> None:
     turning = Demand(density=350.0, turns=(5, 1, 5)).draw(4, 3600.0, seed=1)
     np.testing.assert_array_equal(uniform.time, turning.time)
     assert (uniform.manoeuvre != turning.manoeuvre).any()
-
-
-# --- the table ---------------------------------------------------------------------------------
 
 
 def test_the_table_is_sorted_by_time_then_lane_and_read_only() -> None:

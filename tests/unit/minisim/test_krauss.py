@@ -21,7 +21,6 @@ from tests.builders import Fixed, replayed
 
 #: SUMO's passenger car under Krauß's law.
 CAR = VehicleType(model="krauss")
-#: The published vehicle, every driver at the limit.
 #: The vehicle of the signals by minisim's own rules, which the host shares.
 HOSTED = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, sumo=None))
 ALIKE = replace(HOSTED, vehicle=replace(HOSTED.vehicle, speed_deviation=0.0))

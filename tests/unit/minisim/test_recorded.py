@@ -122,8 +122,6 @@ def test_a_table_may_have_speed_factors(csv_file: Callable[[str], Path]) -> None
         Arrivals(np.zeros(1), np.zeros(1, int), np.ones(1, int), np.array([0.1]))
 
 
-# --- the time of day ---------------------------------------------------------------------------
-
 MORNING = "demand_time_s,lane,manoeuvre\n25100,c,2\n25205.5,a,2\n25207,b,1\n28000,c,3\n"
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -37,8 +34,7 @@ from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.profiles import Profile
 from scenarios.scenario import Scenario
-from tests import ROOT
-from tests.builders import Fixed, Scripted, digest, replayed
+from tests.builders import Fixed, Scripted, digest, python, replayed
 
 STRAIGHT = (0.0, 0, 2)
 KRAUSS = dataclasses.replace(FAIR, name="krauss", vehicle=VehicleType(model="krauss"))
@@ -391,9 +387,7 @@ for scenario, controller in (
 ):
     print(digest(minisim.simulate(scenario, controller, seed=11, record="all")))
 """
-    told = subprocess.check_output(
-        [sys.executable, "-c", code], text=True, cwd=ROOT, env={**os.environ, **environment}
-    )
+    told = python("-c", code, **environment).stdout
     assert len(told.split()) == 4
     return told
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from scenarios import four_way
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import key_of
-from tests import ROOT
+from tests.builders import python
 
 MINE = '''
 from dataclasses import dataclass
@@ -120,11 +119,7 @@ def test_other_processes_find_it() -> None:
     recipe = Recipe(four_way(), controller_named("own_mine:Mine(k=3)"))
     data = pickle.dumps([recipe, {"a": recipe.controller}])
     code = f"import pickle; a, b = pickle.loads({data!r}); print(a.name, b['a'] == a.controller)"
-    answer = subprocess.run(
-        [sys.executable, "-c", code], cwd="/", env={"PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert answer.stdout == "mine-3 True\n"
+    assert python("-c", code, cwd=Path("/")).stdout == "mine-3 True\n"
 
 
 @pytest.mark.usefixtures("folder")

@@ -54,9 +54,6 @@ def test_vehicles_that_cannot_stop_and_all_before_them_are_committed(
     assert [v.id for v in committed(vehicles, lambda v: can_stop(v, BRAKING))] == those
 
 
-# Heads.
-
-
 def test_the_end_of_green_closes_the_lane_and_lets_the_committed_go() -> None:
     heads = heads_showing(GREEN, RED, RED, RED)
     near, far, other = seen(1, 0, 1, 3.0), seen(2, 0, 2, 40.0), seen(3, 1, 1, 1.0)
