@@ -1,8 +1,7 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
 The paper describes one algorithm; the runs behind its figures followed another. This module repeats
-those runs vehicle by vehicle. We cannot tell what was intended and what was a slip, so each
-difference is a quirk with a name:
+those runs vehicle by vehicle. Intended or a slip, each difference is a quirk with a name:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
    road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
@@ -25,8 +24,7 @@ difference is a quirk with a name:
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
     error at that vehicle, and nothing is decided in it.
 
-All numbers are those of the authors' driver. Everything happens at the end of a step and takes
-effect in the next.
+All numbers are the authors'. Everything happens at the end of a step, with effect in the next.
 """
 
 from __future__ import annotations

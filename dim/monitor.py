@@ -59,9 +59,8 @@ class Monitor:
     )  # fmt: skip
     # Used where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
     look_ahead: float = real("how far motion is predicted", "s", default=4.0, low=0.5, high=30)
-    # The lateral error that automated driving on local streets must stay below (0.29 m; Reid et
-    # al., "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv
-    # 1906.01061).
+    # The lateral error of automated driving on local streets must stay below 0.29 m (Reid et al.,
+    # "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019).
     tolerance: float = real(
         "how far beside a path a vehicle may seem to be while it is on it", "m",
         default=0.3, above=0, high=1,

@@ -107,9 +107,8 @@ class Hosted:
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
 
-        Raises:
-            ControllerError: the session raised an error, named with its file and line, or its
-                answer cannot be carried out.
+        Raises `ControllerError` for an error of the session, named with its file and line, or an
+        answer that cannot be carried out.
         """
         try:
             commands = _listed(self.session.decide(view))

@@ -91,6 +91,5 @@ class Recipe:
 
         if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
             options["record"] = options.get("record") or "junction"
-        return (host or simulate)(
-            self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
-        )
+        options["on_collision"] = self.on_collision
+        return (host or simulate)(self.scenario, self.driven, self.seed, **options)

@@ -30,9 +30,7 @@ class Adaptive:
 
     name = Name("adaptive")
 
-    detector_range: float = real(
-        "length of the detectors before the junction", "m", low=1, high=1000, default=100.0
-    )
+    detector_range: float = real("length of the detectors", "m", low=1, high=1000, default=100.0)
     min_time_loss: float = real(
         "time lost from which on a vehicle prolongs the green", "s",
         low=0, high=3600, default=1.0,

@@ -134,8 +134,7 @@ class Protocol:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
-        are, and the gate "harmonious" keeps out any that conflict with a crossing one. Of the
-        others, only the best clique goes.
+        are, and "harmonious" keeps out those in conflict. Of the others, the best clique goes.
         """
         n, rows, bits = self.matrix.n, self.matrix.movements.rows, self.matrix.movements.bits
         there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]

@@ -97,9 +97,7 @@ def analyse(
     table = DecisionTable(matrix, order, priorities)
     n, total = matrix.n, len(table)
     if total > MAX_CASES:
-        raise InputError(
-            f"{n} arms have {total} cases, too many to try them all (at most {MAX_CASES})"
-        )
+        raise InputError(f"{n} arms have {total} cases, too many to try all (at most {MAX_CASES})")
     checks = Case(table)
     failures: Counter[str] = Counter()
     examples: dict[str, Movements] = {}
@@ -245,8 +243,7 @@ def most_cliques(k: int) -> int:
     """The most maximal cliques that any graph of k ≥ 1 nodes can have.
 
     Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as close to it as
-    groups of 2, 3 and 4 nodes can come. That graph has cliques of only one size, so this is also
-    the bound for cliques that tie.
+    groups of 2, 3 and 4 nodes can come. All cliques of that graph have one size, so they tie.
     """
     if k < 2:
         return 1

@@ -88,11 +88,8 @@ def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str)
 
 def doubts(table: Table) -> tuple[float, ...]:
     """How likely each reading is to be wrong, by Bayes' rule for equally frequent manoeuvres."""
-    columns = list(zip(*table, strict=True))
-    return tuple(
-        1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
-        for m, column in enumerate(columns)
-    )
+    columns = enumerate(zip(*table, strict=True))
+    return tuple(1.0 - of[m] / sum(of) if sum(of) > 0.0 else 0.0 for m, of in columns)
 
 
 def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:

@@ -204,11 +204,8 @@ class Picture:
         self._glass.set_verts(list(drawing.place(glass, x, y, angle)))
         self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
         self._ways.set_segments(film.ways(near))
-        opened = film.open_lanes(near)
-        colours = [
-            style.RIGHT_OF_WAY if i in opened else style.INK for i in range(run.site.intersection.n)
-        ]
-        self._holds.set_color(colours)
+        opened, lanes = film.open_lanes(near), range(run.site.intersection.n)
+        self._holds.set_color([style.RIGHT_OF_WAY if i in opened else style.INK for i in lanes])
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:

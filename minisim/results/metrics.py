@@ -86,9 +86,7 @@ class Metric:
     )  # fmt: skip
     unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
-    needs: str = word(
-        "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
-    )
+    needs: str = word("measured from", ("trips", "run", "trajectories", "counts"), default="run")
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",

@@ -74,9 +74,7 @@ def sweep(
         Path,
         typer.Option("--out", "-o", metavar="STORE", help="Keeps the results; made if new."),
     ] = Path("sweep.db"),
-    seeds: Annotated[
-        int | None, option("Runs per cell, seeds 1 … N; as the file says, or 10.", "N")
-    ] = None,
+    seeds: Annotated[int | None, option("Seeds 1 … N per cell; the file's, or 10.", "N")] = None,
     jobs: options.Jobs = None,
     scheduler: Annotated[
         str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
@@ -125,9 +123,7 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
 
     studies = ("paper", *STUDIES)
     if what in SEARCHES:
-        raise InputError(
-            f"{what} chooses runs by the results of earlier ones: minisim reproduce --only {what}"
-        )
+        raise InputError(f"{what} chooses runs by earlier ones: minisim reproduce --only {what}")
     if what in studies or not (Path(what).suffix or os.path.exists(what)):
         study = study_named("text" if what == "paper" else choice("study", what, studies))
         recipes = [recipe for _, recipe in study.runs(seeds or 10, horizon or 3600.0)]

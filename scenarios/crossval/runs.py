@@ -78,10 +78,7 @@ def film(
     apart = [(result.case, result.divergence) for result in results if result.divergence]
     tasks = [(case, host, divergence) for case, divergence in apart for host in HOSTS]
     frames = iter(_gather(_record, tasks, jobs, progress))
-    return [
-        _parted(result, next(frames), next(frames)) if result.divergence else result
-        for result in results
-    ]
+    return [_parted(it, next(frames), next(frames)) if it.divergence else it for it in results]
 
 
 class _Excerpt:

@@ -83,9 +83,7 @@ EDGES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda c: c.name)
-def test_what_a_controller_covers_is_safe_and_served_and_it_refuses_what_it_cannot(
-    controller: Controller,
-) -> None:
+def test_what_a_controller_covers_is_safe_and_served_or_refused(controller: Controller) -> None:
     for what, (options, vehicle) in EDGES.items():
         scenario = small_scenario(
             3, demand_time=30.0, drain=20_000.0, vehicle=VehicleType(**vehicle), **options

@@ -139,9 +139,7 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
 @pytest.mark.parametrize("maker", [three_way, four_way, five_way])
 @pytest.mark.parametrize("commit", COMMITS)
 @pytest.mark.parametrize("gate", GATES)
-def test_wake_ups_lose_nothing_in_dense_traffic(
-    gate: str, commit: str, maker: Callable[..., Scenario]
-) -> None:
+def test_wake_ups_lose_nothing(gate: str, commit: str, maker: Callable[..., Scenario]) -> None:
     """The same trips, and collisions of the paper's commit rule, as when looking all the time."""
     scenario = maker(density=350, horizon=600.0)
     dim = Dim(gate=gate, commit=commit)

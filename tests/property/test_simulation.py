@@ -141,9 +141,7 @@ def _id(sim: Simulation, row: int) -> int:
 
 @given(vehicles(), st.floats(0.0, 60.0), st.floats(5.0, 25.0), st.sampled_from([0.05, 0.1, 0.2]))
 @settings(max_examples=60)
-def test_a_platoon_stops_at_the_line_one_behind_the_other(
-    vehicle, hold_distance: float, speed: float, dt: float
-) -> None:
+def test_platoons_stop_at_the_line(vehicle, hold_distance: float, speed: float, dt: float) -> None:
     """The front bumper 0 … 0.3 m before the line, never beyond; none touches the one ahead."""
     profile = Profile(name="random", vehicle=vehicle, speed_limit=speed, dt=dt)
     trips = [(1.5 * k, 0, 2) for k in range(6)]

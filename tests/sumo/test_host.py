@@ -84,9 +84,7 @@ CONTROLLERS: tuple[Controller, ...] = (
 @pytest.mark.parametrize(
     ("arms", "horizon"), [((4,), 60.0), pytest.param((3, 5), 120.0, marks=pytest.mark.slow)]
 )
-def test_controllers_keep_their_contract_in_sumo(
-    controller: Controller, arms: tuple[int, ...], horizon: float
-) -> None:
+def test_contracts_in_sumo(controller: Controller, arms: tuple[int, ...], horizon: float) -> None:
     check_controller(controller, arms=arms, horizon=horizon, host="sumo")
 
 
@@ -99,9 +97,8 @@ def test_the_horizon_is_exclusive() -> None:
 def test_what_happens_does_not_depend_on_the_horizon() -> None:
     profile = replace(FAIR, vehicle=replace(FAIR.vehicle, speed_deviation=0.1))
     road = four_way(300, profile=profile, arm_length=200.0)
-    short, long = (
-        simulate(replace(road, horizon=t), Mixed(share=0.5), 3).trips for t in (80.0, 110.0)
-    )
+    roads = (replace(road, horizon=t) for t in (80.0, 110.0))
+    short, long = (simulate(road, Mixed(share=0.5), 3).trips for road in roads)
     over = short["arrival_s"] < 80.0
     assert over.sum() > 5
     assert short[over].equals(long[: len(short)][over])
@@ -344,9 +341,7 @@ def test_other_junctions_run(arms: int, side: str) -> None:
     assert its == pytest.approx(mine, rel=0.03)
 
 
-def test_what_netconvert_says_is_passed_on_and_its_files_kept(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_what_netconvert_says_is_passed_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(network, "_outline", lambda intersection: "here and there")
     with pytest.raises(SumoError, match=r"netconvert failed \(exit code 1\): .*shape.*node 'C'"):
         simulate(single(), Unregulated(), keep_files=tmp_path / "new" / "folder")

@@ -74,9 +74,7 @@ Arrivals = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
-Start = Annotated[
-    str | None, option("Begin at this time in the table.", "07:00", rich_help_panel=FILES)
-]
+Start = Annotated[str | None, option("Begin here in the table.", "07:00", rich_help_panel=FILES)]
 
 
 def processes(jobs: int | None) -> int:

@@ -364,9 +364,7 @@ def meet(
     [(-0.6, 0.0, 0.3), pytest.param(np.arange(-2.0, 2.01, 0.1).round(1), marks=pytest.mark.slow)],
     ids=["some", "many"],
 )
-def test_two_that_misread_each_other_do_not_collide_nor_block(
-    profile: str, offsets: Iterable[float]
-) -> None:
+def test_two_that_misread_each_other_do_not_collide(profile: str, offsets: Iterable[float]) -> None:
     """The worst case: neither knows of the conflict until the other's motion shows it."""
     without = 0
     for pair in misread_pairs():

@@ -147,10 +147,7 @@ def krauss_law(v: float, gap: float, v_leader: float, dt: float) -> float:
 
 @pytest.mark.parametrize(
     ("law", "move", "within"),
-    [
-        (lambda *state: SUMO.idm(*state[:3]), ballistic, 0.05),
-        (krauss_law, semi_implicit, 0.5),
-    ],
+    [(lambda *state: SUMO.idm(*state[:3]), ballistic, 0.05), (krauss_law, semi_implicit, 0.5)],
     ids=["idm", "krauss"],
 )
 def test_the_scheme_is_of_first_order(law: Any, move: Any, within: float) -> None:

@@ -74,9 +74,7 @@ def test_turning_vehicle_takes_the_arc_at_the_lateral_limit() -> None:
 
 @pytest.mark.parametrize("hold_distance", [0.0, 2.0, 40.0])
 @pytest.mark.parametrize(("profile", "spared"), [(PAPER, 0.0), (FAIR, 0.0), (KRAUSS, 0.1)])
-def test_held_vehicle_stands_just_before_its_line(
-    hold_distance: float, profile: Profile, spared: float
-) -> None:
+def test_it_is_held_at_its_line(hold_distance: float, profile: Profile, spared: float) -> None:
     """It brakes at b, or up to a tenth less if it slows in whole steps, and not too early."""
     scenario = lone(profile, 120.0)
     run = minisim.simulate(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
@@ -235,10 +233,7 @@ def test_hold_after_the_hold_line_stops_before_the_junction() -> None:
 
 @pytest.mark.parametrize(
     ("plan", "answer", "step"),
-    [
-        (Plan(), lambda view: [Wake(view.time + 0.7)], 0.7),
-        (Plan(period=0.5), lambda view: (), 0.5),
-    ],
+    [(Plan(), lambda view: [Wake(view.time + 0.7)], 0.7), (Plan(period=0.5), lambda view: (), 0.5)],
     ids=["wake", "period"],
 )
 def test_wake_ups_come_on_the_tick(plan: Plan, answer: Any, step: float) -> None:

@@ -5,8 +5,7 @@ environment of their own) ran its own `static`, `delay_based` or `actuated` prog
 network of that run, with the published arrivals and speed factors, departPos "base", departSpeed 0
 and steps of 0.01 s. At unequal inflow, the fixed-time signal's vehicles were `CC` under ACC with a
 headway of 1.5 s in speed mode 31; the means of those runs are the published ones to the last digit.
-These trips are the first of each run, from `tripinfo`. SUMO 1.18 cannot be installed beside 1.28,
-so nothing here runs it again.
+These trips are the first of each run, from `tripinfo`. SUMO 1.18 and 1.28 exclude each other.
 """
 
 from __future__ import annotations

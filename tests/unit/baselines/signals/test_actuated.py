@@ -78,9 +78,7 @@ def test_a_gap_of_three_seconds_ends_the_green() -> None:
         (0.5, 49.0, 50.0),  # not beyond the longest
     ],
 )
-def test_a_green_goes_on_until_the_last_vehicle_is_over_the_line(
-    left: float, elapsed: float, end: float
-) -> None:
+def test_a_green_lasts_until_the_last_is_over(left: float, elapsed: float, end: float) -> None:
     lane, after = verdict(left, elapsed)
     assert lane == 0
     assert elapsed + after == pytest.approx(end)

@@ -65,9 +65,7 @@ def test_what_is_not_a_controller_has_no_page(capsys: Captured, name: str) -> No
     fails(capsys, "controllers", name)
 
 
-def test_registered_names_are_listed_with_their_meaning(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_registered_names_are_listed(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"extra": "baselines:FixedTime", "broken": "no_such:Thing", "dim": "dim:Dim"}
     points = [EntryPoint(name, value, "minisim.controllers") for name, value in values.items()]
     monkeypatch.setattr(table, "entry_points", lambda group: points)

@@ -32,9 +32,7 @@ def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
     assert {file.name for file in (tmp_path / "new").iterdir()} == names
 
 
-def test_without_a_store_what_needs_runs_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
+def test_without_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     few = {name: GALLERY[name] for name in ("webster", "gate", "fair")}
     monkeypatch.setattr(gallery, "GALLERY", few)
     assert main(["figures", "--out", str(tmp_path)]) == 0

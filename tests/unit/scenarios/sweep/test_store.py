@@ -179,9 +179,7 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
         sweep([replace(recipe_of(), controller=odd)], jobs=1, store=store)
 
 
-def test_another_writer_is_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome
-) -> None:
+def test_writers_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome) -> None:
     monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
     with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
         ours.put(recipe_of(1), outcome)
