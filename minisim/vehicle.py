@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from minisim.errors import InputError
-from minisim.parameters import declared, real, switch, word
+from minisim.parameters import declared, real, switch, text, word
 
 #: SUMO's `POSITION_EPS` [m].
 POSITION_EPS = 0.1
@@ -93,6 +93,11 @@ class VehicleType:
         "lines and inside the junction; only with krauss; none for minisim's own rules",
         ("1.18",), optional=True, default=None, label="SUMO version of a vehicle",
     )  # fmt: skip
+    name: str = text(
+        "what tables, arrival tables and figures call it",
+        default="car",
+        label="vehicle type's name",
+    )
     model: str = word(
         f"car following: {'; '.join(f'{name}, {it.meaning}' for name, it in MODELS.items())}",
         tuple(MODELS), default="idm", label="car-following model",
@@ -111,6 +116,11 @@ class VehicleType:
                 f"{self.max_deceleration!r}: with acceleration {self.acceleration:g} and "
                 f"deceleration {self.deceleration:g} the car-following law itself brakes that hard"
             )
+
+    @property
+    def types(self) -> tuple[VehicleType, ...]:
+        """Itself, as the types of a `minisim.fleet.Fleet` that has only one."""
+        return (self,)
 
     @property
     def needed_braking(self) -> float:
