@@ -107,7 +107,7 @@ class AsRunDim:
             raise InputError(f"the as-run rules are for 3, 4 or 5 arms, the intersection has {n}")
         matrix = HarmonyMatrix.paper(n) if self.matrix is None else self.matrix
         if matrix.n != n:
-            raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
+            raise InputError(f"the matrix is for {matrix.n} arms, the intersection has {n}")
         if len(self.names) < n:
             raise InputError(f"names must be {n} letters, one per arm, got {self.names!r}")
         return AsRunSession(site, AsRunRules(self, matrix))

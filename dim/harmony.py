@@ -37,8 +37,7 @@ class HarmonyMatrix:
     """
 
     n: int  #: number of arms, 3 … 12
-    #: Shape (m, m) with m = n(n−1), read-only; rows and columns in the order a1, a2, …, b1, … True
-    #: is harmony, False conflict.
+    #: Shape (m, m), m = n(n−1), read-only, in the order a1, a2, …, b1, …; True is harmony.
     values: Bools
 
     def __post_init__(self) -> None:

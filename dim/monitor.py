@@ -206,14 +206,12 @@ class Patience:
         self._since: dict[int, float] = {}
         self._alone: set[int] = set()
 
-    def goes(
-        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
-    ) -> bool:
-        """Whether it goes, as `decided` or alone; of the true `view` it uses only motion."""
+    def goes(self, view: View, seen: View, ego: Observed, may: bool, ranks: Sequence[int]) -> bool:
+        """Whether it goes, because it `may` or alone; of the true `view` it uses only motion."""
         alone = ego.id in self._alone
-        if not alone and (decided or ego.speed >= HALTING):
+        if not alone and (may or ego.speed >= HALTING):
             self._since.pop(ego.id, None)
-            return decided
+            return may
         ids = {v.id for v in seen.vehicles}
         near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
         free = not any(_crosses(v, self._deceleration) for v in near if v.id != ego.id)

@@ -173,8 +173,8 @@ def replay(
         scenario(split, density, arms, controller, profile=profile),
         recorded=published_arrivals(split, density, arms, controller),
     )
-    vehicle, junction = made.profile.vehicle, made.intersection
-    if vehicle.sumo is None or junction.ways is None:
+    vehicle, road = made.profile.vehicle, made.intersection
+    if vehicle.sumo is None or road.ways is None:
         return made
     if sumo != "1.18":
         turnarounds = ""
@@ -189,9 +189,7 @@ def replay(
     waits = controller not in SIGNALS or (controller == "fts" and split == RENAMED)
     ways = published_ways(arms, turnarounds, waits=waits)
     return replace(
-        made,
-        intersection=replace(junction, ways=ways),
-        profile=replace(made.profile, vehicle=vehicle),
+        made, intersection=replace(road, ways=ways), profile=replace(made.profile, vehicle=vehicle)
     )
 
 

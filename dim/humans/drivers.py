@@ -4,8 +4,7 @@ The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20,
 control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
 in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
 junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
-Drivers here do both: among themselves, the first to stop goes first, and they accept gaps between
-vehicles that need not stop.
+Drivers here do both: the first of them to stop goes first, and they accept gaps in other traffic.
 """
 
 from __future__ import annotations

@@ -98,8 +98,7 @@ class Protocol:
             yield TURN, state._replace(turn=(state.turn + 1) % self.matrix.n, decided=False)
 
     def arrivals(self, state: State) -> Iterator[Step]:
-        """A vehicle comes to the front of a lane: at the start of the yellow zone, or behind one
-        that has just entered the junction."""
+        """A vehicle comes to the front of a lane: at the yellow zone, or when another enters."""
         for lane, front in enumerate(state.fronts):
             if front is None:
                 came = (*state.came, lane) if self.priorities == "waiting" else ()

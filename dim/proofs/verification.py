@@ -233,9 +233,8 @@ class Case:
                 choose(maximal_cliques(order, matrix), table.order, table.priorities)
                 for order in node_orders(movements, matrix.n)
             )
-            self._same_order[graph] = all(
-                sum(1 << m.origin for m in clique) == decision for clique in chosen
-            )
+            decisions = {sum(1 << m.origin for m in clique) for clique in chosen}
+            self._same_order[graph] = decisions == {decision}
         return self._same_order[graph]
 
 

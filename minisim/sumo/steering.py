@@ -26,8 +26,7 @@ from minisim.sumo.messages import Job
 #: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
 #: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
 #: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
-#: of them shares neither lane nor exit with it. Meanwhile it follows the vehicle ahead into its
-#: exit by minisim's law.
+#: of them shares neither lane nor exit with it, and follows the one ahead by minisim's law.
 FOLLOWING, IGNORING = 2, 2 + 32
 
 #: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.

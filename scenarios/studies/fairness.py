@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 STUDY = Study(
-    "fairness",
-    "Which lanes wait under which priority rule?",
-    fair_grid(PRIORITIES, (4,), DENSITIES),
+    "fairness", "Which lanes wait under which priority?", fair_grid(PRIORITIES, (4,), DENSITIES)
 )
 
 #: Column of a lane's mean waiting, in the complete form, or a starved lane would look served.

@@ -140,8 +140,7 @@ def _check_portable(recipes: Iterable[Recipe]) -> None:
 def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
     """Let one process compile to disk, or all would compile when minisim is freshly installed.
 
-    The compiled code depends on the class of the vehicle. A run that fails here fails again in its
-    turn, and its row says why.
+    Compiled code depends on the class of the vehicle. A run that fails here fails again later.
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
         dt = recipe.scenario.profile.dt

@@ -58,15 +58,12 @@ def read_as(seen: View, **readings: int) -> View:
 
 
 def braking(
-    monitors: Monitors,
-    true: View,
-    seen: dict[int, View] | None = None,
-    going: set[int] | None = None,
+    watch: Monitors, true: View, seen: dict[int, View] | None = None, going: set[int] | None = None
 ) -> dict[int, float]:
     """Vehicle -> how hard it must brake, where all see everything unless `seen` says otherwise."""
     everything = {v.id: true for v in true.vehicles}
     ids = set(everything)
-    commands = list(monitors.look(true, everything | (seen or {}), ids if going is None else going))
+    commands = list(watch.look(true, everything | (seen or {}), ids if going is None else going))
     assert all(isinstance(command, Brake) for command in commands)
     return {command.vehicle: command.deceleration for command in commands}
 
