@@ -82,8 +82,7 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        One that brakes comfortably for the hold line never is, since the green zone is longer than
-        the margin of `can_stop`.
+        One that brakes comfortably for the hold line never is: the green zone exceeds the margin.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0
