@@ -60,8 +60,8 @@ def summarise(
     """The usual numbers of a run, and the metrics asked for.
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
-    complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds or are of several
-    types, by kind (`kinds`) or type (`types`).
+    complete form. Trips are grouped by lane (`lanes`) and, if there are several, by kind (`kinds`)
+    and type (`types`).
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
