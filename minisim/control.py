@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
-`streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the engine, the
-hosts or the results; `make lint` checks this.
+Controllers may also import `junction`, `vehicle`, `fleet`, `parameters`, `names`, `errors`,
+`files`, `streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
+engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.

@@ -43,7 +43,7 @@ def mixed_figure(results: Results) -> Figure:
     for axes in grid[:, 0]:
         axes.set_ylabel(f"mean waiting [s], {plots.scale_words(0.1)}", **style.LABEL)
     title = "The same demand in passenger car units, as cars and as Indian vehicles"
-    plots.frame(figure, title, map(style.look, RIVALS), missing_note(results), ncols=4, marks=0.885)
+    plots.frame(figure, title, map(style.look, RIVALS), missing_note(results), ncols=4, marks=0.87)
     return figure
 
 
