@@ -108,5 +108,5 @@ SECTION = Section(
              comparison_table, (study,))
         for study in paper.HEADINGS
     ),
-    paper.agreement, ending, appendix=True,
+    ending, appendix=True,
 )  # fmt: skip

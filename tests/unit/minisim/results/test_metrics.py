@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from typing import Any
@@ -130,6 +131,7 @@ def test_an_error_in_a_metric_tells_which_and_where(run: Run) -> None:
     for of, what in (
         (lambda run: 1 / 0, r"ZeroDivisionError: division by zero \(test_metrics.py, line \d+\)"),
         (lambda run: run.trips["dely"], r"KeyError: 'dely' \(test_metrics.py, line \d+\)"),
+        (lambda run: sys.exit("enough"), r"SystemExit: enough \(test_metrics.py, line \d+\)"),
         (math.sqrt, "TypeError: must be real number, not Run"),
     ):
         with pytest.raises(InputError, match=f"^metric 'broken' raised {what}$"):
