@@ -53,8 +53,7 @@ class Humans:
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
     )  # fmt: skip
-    # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
-    # Anal. Prev. 74:1).
+    # 29 % of right, 25 % of left turns in the USA (Sullivan et al. 2015, Accid. Anal. Prev. 74:1).
     unsignalled: Reals[tuple[float, float]] = reals(
         "share of near and of far turns that no indicator announces",
         count=2, low=0, high=1, default=(0.29, 0.25),
