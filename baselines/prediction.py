@@ -1,8 +1,8 @@
-"""Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
+"""Where a vehicle will be, step by step, if it drives on as hosts move vehicles that are alike.
 
-It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.laws`). Positions are distances past the
-junction entry, negative before it.
+It follows the vehicles ahead in its lane, and those that enter the same exit lane before it, by the
+run's own law (`minisim.laws`). Their motion is known. Positions are distances past the junction
+entry, negative before it.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ other module knows its quirks:
    of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
 3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
 4. *free for a moment is free*: on release a vehicle is expected to leave after (v_des − v)/a,
-   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list reckon with
+   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list assume
    1.3 s instead of 11 s;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
    so vehicles leave at 20 m/s;
@@ -154,7 +154,7 @@ class V2ICAsRunSession:
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
         if self._origin < LEFT:
             raise InputError(
-                f"the as-run V2I-C ends {LEFT:g} m after insertion, the approach lanes leave "
+                f"the as-run V2I-C ends {LEFT:g} m after insertion, but the approach lanes leave "
                 f"{self._origin:.4g} m"
             )
         insertion = self._origin + INSERTION

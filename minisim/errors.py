@@ -134,7 +134,7 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 def nearest(value: object, allowed: Iterable[str]) -> str:
-    """The question whether the nearest of `allowed` was meant, in any case of letters; else ""."""
+    """A question that suggests the nearest of `allowed`, whatever its case; "" if none is near."""
     options = {option.casefold(): option for option in allowed}
     text = value.casefold() if isinstance(value, str) else ""
     close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)

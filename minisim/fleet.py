@@ -24,7 +24,7 @@ ROUNDING = 1e-6
 #: Sizes of vehicles on Indian roads (Chandra, Kumar 2003, Journal of Transportation Engineering
 #: 129:155, table 1). What they can do is SUMO's default for the class (page "Vehicle Type Parameter
 #: Defaults"), with three exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
-#: a vehicle that likes to brake at 10 m/s², so it drives like a car. There is no class for
+#: a vehicle whose comfortable braking is 10 m/s², so it drives like a car. There is no class for
 #: auto-rickshaws: the acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
 #: Moratuwa, handle 123/19055), the brakes are those of heavy vehicles.
 _INDIAN = (
@@ -143,7 +143,7 @@ class Fleet:
 
     @cached_property
     def worst(self) -> VehicleType:
-        """A vehicle that is in every respect as bad as the worst: the longest, the weakest brakes.
+        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
 
         With one type it is that type.
         """
@@ -178,7 +178,7 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
-        value: a Fleet or VehicleType as it is; or the shares of `TYPES`, as a table such as
+        value: a Fleet or VehicleType, kept unchanged; or the shares of `TYPES`, as a table such as
             `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
             such as "car:0.8,bus:0.2".
         base: its law drives the vehicles of a table or text.
@@ -210,7 +210,7 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
 
 #: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
 #: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
-#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and knows no
+#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and has no
 #: motorcycles or auto-rickshaws.
 PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "IRC:106": {

@@ -15,7 +15,7 @@ from minisim.files import AnyPath, read_file, write_text
 from minisim.junction.movements import ARM_NAMES
 
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
-#: May follow: the drivers' factors on the speed limit.
+#: Optional: the drivers' factors on the speed limit.
 FACTORS = "speed_factor"
 
 

@@ -35,10 +35,10 @@ def published_ways(
 
     Args:
         arms: how many.
-        turnarounds: arms at whose far end the road leads back; None is as in the networks of the
-            authors.
-        waits: whether vehicles that turn far have a place to wait inside. Those in the networks of
-            the signals have none.
+        turnarounds: arms at whose far end the road leads back; None means as in the authors'
+            networks.
+        waits: whether far turns have a place to wait inside. Those in the networks of the signals
+            have none.
 
     Raises:
         InputError: another number of arms.

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, numbers
 
-#: Of every interval here.
+#: The level of all intervals.
 CONFIDENCE = 0.95
 
 #: A queue is growing if its increase exceeds this many standard deviations of chance; a normal

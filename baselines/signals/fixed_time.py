@@ -36,7 +36,7 @@ class FixedTime:
     name = Name("fixed-time")
 
     greens: tuple[float, ...] | float | None = checked(
-        "green of each lane, or one number for all; none is Webster's, from the expected demand",
+        "green of each lane, or one number for all; none means Webster's for the expected demand",
         _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
         optional=True, default=None,
     )  # fmt: skip
@@ -47,7 +47,7 @@ class FixedTime:
     # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
     # 2 s of amber that drivers still use.
     lost_time: float | None = real(
-        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
     )  # fmt: skip
     equal_greens: bool = switch(

@@ -65,7 +65,7 @@ class Heads:
         self._open = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._open += [Colour.AMBER]
-            self._stops = lambda _: True  # dead, see there
+            self._stops = lambda _: True  # on the spot, see `obeys`
         elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
             self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
         self._at_once = site.looks_out
@@ -119,7 +119,7 @@ def lane_order() -> Any:
         )
 
     return checked(
-        "lanes in the order of their greens, by letter or number (a is 0); none is a, b, c…",
+        "lanes in the order of their greens, by letter or number (a is 0); none means a, b, c…",
         check, "lanes such as (c,b,a,d)", optional=True, default=None,
     )  # fmt: skip
 

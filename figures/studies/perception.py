@@ -45,7 +45,7 @@ def perception_figure(results: Results, series: str) -> Figure:
         for place, ((shared, persistent), look) in enumerate(LOOKS.items()):
             line = outcomes.select(signalled, kind=kind, shared=shared, persistent=persistent)
             cells = [exact, *(outcomes.select(line, rate=rate) for rate in RATES[1:])]
-            # Side by side, so that error bars do not overlap. Ticks are evenly spaced; rates not.
+            # Side by side, so that error bars do not overlap; ticks are evenly spaced.
             places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
             outcomes.draw(axes, places, cells, outcome, look)
         level = outcomes.estimated(silent, outcome)

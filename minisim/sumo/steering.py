@@ -1,4 +1,4 @@
-"""Steering: it tells vehicles in SUMO what the road ahead and the controller ask of them.
+"""Tells vehicles in SUMO what the road ahead and the controller ask of them.
 
 `Follower` steers SUMO's IDM and Krauss. minisim's laws (`minisim.laws`) compute what a hold line, a
 marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`) where a lower
@@ -53,9 +53,9 @@ class Car:
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
         self.s = self.v = self.a = 0.0
-        # Between looks more than a step apart, it grows by the time beyond that at the limit.
+        # Between rare looks, it grows by the time beyond that which the limit needs.
         self.lost_ticks = 0.0
-        self.brake = 0.0  # the least that it must brake [m/s²]; 0 without such a command
+        self.brake = 0.0  # how hard it must brake [m/s²]; 0 without such a command
         self.section = self.mark = 0
         self.seen = 0  # tick of the last look at it
         self.present = False  # on the road
@@ -106,7 +106,7 @@ class Follower(Steering):
     """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
-        # SUMO's Krauss may drive vehicles whose own law is another.
+        # SUMO's Krauss may drive vehicles with another law.
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
         super().__init__(law, libsumo)
         self._limits = limits(job)
@@ -118,7 +118,7 @@ class Follower(Steering):
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def depart(self, car: Car) -> None:
-        """Leave all giving way to the controller."""
+        """Let the controller alone decide."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:

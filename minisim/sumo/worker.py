@@ -173,7 +173,7 @@ class Worker:
         self._turn_to(car)
 
     def _arrive(self, car: Car) -> bool:
-        """Note it; returns whether SUMO took it off the road before it had left the junction."""
+        """Note an arrival; returns whether SUMO removed the car before it had left the junction."""
         self._arrived += 1
         self._travel(car, self._end[car.path])
         car.present = False
@@ -245,7 +245,7 @@ class Worker:
         return self._position(car.path, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
-        """Leave a car whose rear has left the junction to SUMO alone."""
+        """Leave a car to SUMO alone: its rear has left the junction."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
         self._steering.release(car)

@@ -53,7 +53,7 @@ def protocol(
         str,
         typer.Option(
             metavar="fixed|rotating|waiting",
-            help="Which lane comes first where cliques tie: lane a, the one that has its turn, "
+            help="Which lane comes first where cliques tie: lane a, the one whose turn it is, "
             "or the one whose vehicle came first.",
         ),
     ] = "fixed",

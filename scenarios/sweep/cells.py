@@ -125,10 +125,10 @@ def pairs(
     one, other = (good[good[column] == name] for name in names)
     for name, runs in zip(names, (one, other), strict=True):
         if runs.duplicated([*by, "seed"]).any():
-            raise InputError(f"{name} has several runs of one seed; {', '.join(by)} are the same")
+            raise InputError(f"{name} has several runs of one seed with equal {', '.join(by)}")
     both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
     if (both["arrivals"] != both["arrivals_other"]).any():
-        raise InputError(f"{' and '.join(names)} did not meet the same arrivals")
+        raise InputError(f"{' and '.join(names)} had different arrivals")
     gap = both[metric].astype(float) - both[f"{metric}_other"].astype(float)
     grouped = gap.groupby([both[key] for key in by], sort=False)
     return {key: values.tolist() for key, values in grouped}
@@ -157,7 +157,7 @@ def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
     The travel time on a free road is travel time less time loss, of the trips that ended or, if
-    none did, of what was driven.
+    none did, of all.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 #: A group of options in the help.
 FILES = "Files"
 
-#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
-#: that none does is (1/2)^30, one in 10^9.
+#: Of this many arrivals, some use the last lane or manoeuvre: with equal shares on 4 arms, the
+#: chance that none does is (1/2)^30, one in 10^9.
 ENOUGH = 30
 
 
@@ -45,9 +45,9 @@ Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
-Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
-Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
+Side = Annotated[str, option("Traffic keeps left or right.", "SIDE")]
+Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
+Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
@@ -86,7 +86,7 @@ def processes(jobs: int | None) -> int:
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
-    """Raise `InputError` if an option has a value twice; None is an option not given."""
+    """Raise `InputError` if an option has a value twice; None means not given."""
     for name, values in given.items():
         for value, count in Counter(values or ()).items():
             if count > 1:
@@ -100,7 +100,7 @@ def build_scenario(
     start: str | None = None,
     **options: Any,
 ) -> Scenario:
-    """The scenario that the options describe; None is an option not given."""
+    """The scenario that the options describe; None means not given."""
     from minisim.recorded import read_arrivals
     from scenarios.library import scenario_named
 
@@ -118,7 +118,7 @@ def build_scenario(
     arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
     if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
         raise InputError(
-            f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from lane "
+            f"{arrivals} looks like arrivals at a junction with {arms} arms: none comes from lane "
             f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
         )
     return replace(made, recorded=recorded)
@@ -131,7 +131,7 @@ def _bearings(text: str) -> list[float]:
             values.append(number(part, float(part)))
         except ValueError:
             raise InputError(
-                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is not a finite "
+                f"--bearings must be like 0,80,190,260, got {text!r}: {part!r} is not a finite "
                 "number"
             ) from None
     return values

@@ -76,9 +76,9 @@ def test_recorded_arrivals_replace_the_demand() -> None:
 
 @pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])
 def test_bad_shares_are_one_sentence(text: str) -> None:
-    with pytest.raises(InputError, match="split is balanced or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="split must be balanced or like 4:3:2:1, got"):
         four_way(split=text)
-    with pytest.raises(InputError, match="turns is uniform or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="turns must be uniform or like 4:3:2:1, got"):
         four_way(turns=text)
 
 

@@ -491,7 +491,7 @@ BAD = [
     (("sweep", "/dev/full"), "/dev/full: it is neither an ordinary file nor a pipe"),
     (("sweep", "/"), "cannot read experiments from /: Is a directory"),
     (("run", "four-way", "--arrivals", "/dev/zero"), "neither an ordinary file nor a pipe"),
-    (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
+    (("run", "four-way", "--split", "(4,3,2,1"), "split must be balanced or like 4:3:2:1"),
     (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),

@@ -154,7 +154,7 @@ WRONG = [
     ('controller = {name = "unregulated", x = 3}', r"unregulated has no parameters, got x"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"unknown profile 3"),
-    ('split = "4-3"', r"split is balanced or written like"),
+    ('split = "4-3"', r"split must be balanced or like"),
     ("density = []", r"density is an empty list"),
     ('density = "many"', r"density"),
     ("seeds = 0", r"toml: seeds must be an integer 1 … .*, got 0; or a list of seeds"),
