@@ -21,8 +21,8 @@ from minisim.engine.state import Records
 from minisim.laws import STOP_MARGIN, Law
 from minisim.sumo.messages import Job
 
-#: SUMO keeps the maximum acceleration (2) and heeds no right of way (no 8). A commanded speed may
-#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1),
+#: SUMO keeps the maximum acceleration (2) but not the right of way (8 off). A commanded speed may
+#: brake harder than is comfortable (4 off) and keeps the gaps itself: if SUMO kept them (1),
 #: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
 #: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
 #: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
@@ -53,7 +53,7 @@ class Car:
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
         self.s = self.v = self.a = 0.0
-        # Between rare looks, it grows by the time beyond that which the limit needs.
+        # Between rare looks it grows by the time that exceeds a drive at the limit.
         self.lost_ticks = 0.0
         self.brake = 0.0  # how hard it must brake [m/s²]; 0 without such a command
         self.section = self.mark = 0

@@ -1,7 +1,7 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed are
-draws like others: their cell has their mean density.
+A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed count
+as draws: their cell has their mean density.
 """
 
 from __future__ import annotations
