@@ -17,7 +17,7 @@ other module knows its quirks:
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
    advice of 0 stops a vehicle at once.
 
-The loop of the authors' driver runs every 0.01 s, and what it sets takes effect in the next step.
+The loop of the authors' script runs every 0.01 s, and what it sets takes effect in the next step.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Platoon(NamedTuple):
     movement: int  #: its index
     driven: float  #: distance since insertion [m]
     speed: float  #: [m/s]
-    #: Sorts vehicles that register in the same step, as the authors' driver spawned them.
+    #: Sorts vehicles that register in the same step, as the authors' script spawned them.
     order: tuple[float, ...]
 
 

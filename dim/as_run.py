@@ -25,7 +25,7 @@ difference is a quirk with a name:
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
     error at that vehicle, and nothing is decided in it.
 
-All numbers are those of the authors' driver. Everything happens at the end of a step and takes
+All numbers are those of the authors' script. Everything happens at the end of a step and takes
 effect in the next.
 """
 
@@ -117,7 +117,7 @@ class AsRunDim:
 
 
 class Car(NamedTuple):
-    """What the rules know about a vehicle: its name in the authors' driver, and how far it is."""
+    """What the rules know about a vehicle: its name in the authors' script, and how far it is."""
 
     id: int
     name: str

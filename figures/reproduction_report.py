@@ -75,7 +75,7 @@ def _report(
         if name in parts and section.answer is not None
     ]
     if answers:
-        yield "## Result in short"
+        yield "## Summary"
         yield from answers
     for section in SECTIONS:
         known = drawn.keys() | missing.keys()
@@ -114,9 +114,9 @@ def _made_table(made: Sequence[Made]) -> Table:
         (*rows, ("all", "", *totals(made))), labels=2,
         notes=(
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
-            "clique first) and says what the paper's rules give; `as-run` are the profiles "
-            "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
-            "the published numbers must be compared with; all others are the profile `fair`: one "
+            "clique first) and says what the paper's rules give; `as-run` has the profiles "
+            "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s): compare the "
+            "published numbers with it; all others are the profile `fair`: one "
             "vehicle, one limit for all. Wall time is that of the runs computed now, without "
             "drawing. CPU time is that of all runs, whenever they were made; a run that two "
             "studies share counts in both.",

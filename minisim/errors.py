@@ -35,7 +35,7 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched, and the run was not told to record that and go on.
+    """Two bodies touched, and the run does not record that and go on.
 
     Attributes:
         collisions: the `minisim.engine.collision.Collision`s of the last step.

@@ -105,10 +105,10 @@ class VehicleType:
 
     def __post_init__(self) -> None:
         if self.model == "cc" and not isinstance(self, CruiseVehicle):
-            raise InputError("the car-following model 'cc' goes with a CruiseVehicle")
+            raise InputError("the car-following model 'cc' needs a CruiseVehicle")
         if self.sumo is not None and self.model not in ("krauss", "cc"):
             raise InputError(
-                f"sumo={self.sumo!r} goes with the car-following model 'krauss', not {self.model!r}"
+                f"sumo={self.sumo!r} needs the car-following model 'krauss', not {self.model!r}"
             )
         if self.max_deceleration < self.needed_braking:
             raise InputError(

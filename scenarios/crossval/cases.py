@@ -138,6 +138,6 @@ def replayed_cases(
         wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]
         raise InputError(
             f"the paper has no {' or '.join(controllers)} run of {', '.join(wanted)}; it has "
-            f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only, with dim"
+            f"{', '.join(map(str, DENSITIES))} veh/h; on 3 and 5 arms, only dim and balanced"
         )
     return cases

@@ -129,7 +129,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
     if "min_headway" in block and "shifted" not in axes["model"]:
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
     if (count := prod(map(len, axes.values()))) > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
@@ -151,7 +151,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     recorded, start = chosen.pop("arrivals"), chosen.pop("start")
     if recorded is None and start is not None:
-        raise InputError("start goes with arrivals: it is a time in the table")
+        raise InputError("start needs arrivals: it is a time in the table")
     if chosen["model"] != "shifted":
         del chosen["min_headway"]
     with _at("scenario"):

@@ -109,7 +109,7 @@ def build_scenario(
     if arrivals is not None and clash:
         raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
     if arrivals is None and start is not None:
-        raise InputError("--start goes with --arrivals: it is a time in the table")
+        raise InputError("--start needs --arrivals: it is a time in the table")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made

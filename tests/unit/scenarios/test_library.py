@@ -70,7 +70,7 @@ def test_recorded_arrivals_replace_the_demand() -> None:
     assert four_way(recorded=recorded).recorded is recorded
     with pytest.raises(InputError, match="recorded replaces density, split; give one or the"):
         four_way(100, split="4:3:2:1", recorded=recorded)
-    with pytest.raises(InputError, match="min_headway goes with the model 'shifted'"):
+    with pytest.raises(InputError, match="min_headway needs the model 'shifted'"):
         four_way(min_headway=2.0)
 
 

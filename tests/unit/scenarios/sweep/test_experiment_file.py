@@ -169,11 +169,11 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('start = "07:00"', r"start goes with arrivals"),
+    ('start = "07:00"', r"start needs arrivals"),
     ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
      r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
-    ("min_headway = 2", r"min_headway goes with the model 'shifted'"),
+    ("min_headway = 2", r"min_headway needs the model 'shifted'"),
     ("seeds = 1\n[[experiment]]\nseeds = 2", r"seeds above the blocks is never used"),
 ]  # fmt: skip
 
