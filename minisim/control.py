@@ -51,7 +51,7 @@ class Site:
 
     @property
     def looks_out(self) -> bool:
-        """Whether vehicles let those crossing their way inside the junction pass.
+        """Whether vehicles give way to those crossing inside the junction.
 
         Only on SUMO's own ways, since its table of foes goes with them.
         """

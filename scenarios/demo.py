@@ -36,7 +36,7 @@ CONTROLLERS = {
 #: Columns of a sweep that are averaged over seeds.
 METRICS = ("waiting_time_s", "travel_time_s", "depart_delay_s", "unfinished")
 
-#: The table's.
+#: Of the table.
 HEADINGS = ("veh/h/lane", "controller", *map(heading, METRICS), "collisions")
 
 PROFILE = "fair"

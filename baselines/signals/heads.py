@@ -1,7 +1,7 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. If vehicles look out for those that cross (`VehicleType`), it
+depend on the length of an amber. If vehicles give way to those crossing (`VehicleType`), it
 turns green at once, as the published signals did. At the end of a green, vehicles that can no
 longer stop comfortably keep their right of way; all others stop.
 """

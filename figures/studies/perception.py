@@ -73,7 +73,7 @@ def perception_table(results: Results) -> Table:
         manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
         listed.append((style.look(str(series)).label, error, manner, *_outcomes(cell)))
     return Table(
-        f"What misread intents do, {CLASSIFIER:.0%} of them misread, on four arms, {DENSITY:g} "
+        f"What misread intents do at an error rate of {CLASSIFIER:.0%}, four arms, {DENSITY:g} "
         "veh/h/lane",
         ("controller", "error", "manner", "crossings", f"collisions / {CROSSINGS:,} crossings",
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",
