@@ -484,7 +484,7 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "--horizon [s] must be a finite number, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "capacity"), "earlier ones: minisim reproduce --only capacity"),
+    (("sweep", "capacity"), "earlier results: use minisim reproduce --only capacity"),
     (("sweep", "x" * 300), "unknown study 'xxx"),
     (("sweep", "x" * 300 + ".toml"), "File name too long"),
     (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "cannot read xxx"),
