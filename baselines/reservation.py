@@ -83,7 +83,10 @@ class Reservation:
     )
 
     def start(self, site: Site) -> ReservationSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted.
+
+        A period below the host's step is refused, too.
+        """
         self.covers.check(self.name, site.vehicle)
         return ReservationSession(self, site)
 
@@ -196,7 +199,7 @@ class ReservationSession:
             reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
         reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._dt = site.dt
         self._brakes = site.vehicle.deceleration
         self._requests: dict[int, None] = {}  # in the order of first requests

@@ -48,7 +48,7 @@ class V2IC:
     )  # fmt: skip
 
     def start(self, site: Site) -> V2ICSession:
-        """Begin a run."""
+        """Begin a run; raises `InputError` for a period below the host's step."""
         return V2ICSession(self, site)
 
 
@@ -88,7 +88,7 @@ class V2ICSession:
         paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
         self._acceleration = site.vehicle.acceleration

@@ -42,7 +42,7 @@ from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View
 from minisim.errors import InputError, printable
 from minisim.junction.movements import Movement
 from minisim.names import Name
-from minisim.parameters import checked, declared, part, real, word
+from minisim.parameters import Spelled, checked, declared, part, real, word
 
 #: Where the junction begins for the rules: arms -> distance driven [m] (the authors' `JUNC_BOUND`).
 BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
@@ -87,7 +87,7 @@ class AsRunDim:
         "clique, as the paper describes",
         ORDERS, default="lanes",
     )  # fmt: skip
-    matrix: HarmonyMatrix | None = part(
+    matrix: Spelled[HarmonyMatrix | None] = part(
         "harmony of the movements; none means the paper's",
         HarmonyMatrix,
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},

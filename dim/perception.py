@@ -31,7 +31,10 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None if all see the same, so that wake-ups suffice."""
+        """How often vehicles look [s], at most every step; None if wake-ups suffice.
+
+        They do if all vehicles see the same.
+        """
 
     def start(self, site: Site) -> See:
         """Begin a run; its random numbers and its memory belong to the result."""

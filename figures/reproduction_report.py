@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import style
-from figures.gallery import GALLERY, SECTIONS, STUDIES, write
+from figures.gallery import GALLERY, SECTIONS, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
 from minisim.files import make_folder, write_text
@@ -69,14 +69,10 @@ def _report(
     yield "## What was run"
     yield _made_table(made).markdown()
     yield _cost_table(studies).markdown()
-    answers = [
-        section.answer(archive.study(name))
-        for name, section in STUDIES.items()
-        if name in parts and section.answer is not None
-    ]
-    if answers:
+    verdicts = [it.study.verdict(it) for it in studies if it.study.verdict is not None]
+    if verdicts:
         yield "## Summary"
-        yield from answers
+        yield from verdicts
     for section in SECTIONS:
         known = drawn.keys() | missing.keys()
         shown = [item for item in section.items if item.in_report and item.name in known]

@@ -117,7 +117,7 @@ class Hosted:
                 self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
-        except Exception as error:  # a caller's code may raise anything
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blamed(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
 
@@ -138,7 +138,7 @@ class Hosted:
             kinds: tuple[str, ...] = ()
             if isinstance(session, Kinds):
                 kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
-        except Exception as error:  # a caller's code may raise anything
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blamed(self.controller, error, session) from error
         return Run(
             scenario=self.scenario,
@@ -200,13 +200,13 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         raise InputError(f"{name_of(controller)}: {error}") from error
     except MinisimError:
         raise
-    except Exception as error:  # a caller's code may raise anything
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
         raise _blamed(controller, error, controller) from error
     try:
         if not isinstance(plan, Plan) or not isinstance(session, Session):
             raise InputError(f"start() must return a Session with a Plan, got {show(session)}")
         if plan.period is not None:
-            number("period of the plan [s], in steps of the host,", plan.period, low=site.dt)
+            site.period("period of the plan", plan.period)
         road = site.intersection.approach_length
         room = road - site.vehicle.length
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
@@ -222,7 +222,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
 
 
 def _blamed(
-    controller: Controller, error: Exception, code: object, when: str = ""
+    controller: Controller, error: BaseException, code: object, when: str = ""
 ) -> ControllerError:
     """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):

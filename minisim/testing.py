@@ -38,7 +38,7 @@ from minisim.errors import (
 )
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
-from minisim.parameters import declared, part, real, reals, text, word
+from minisim.parameters import Reals, declared, part, real, reals, text, word
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
@@ -62,7 +62,7 @@ class ContractError(MinisimError, AssertionError):
 class SmallScenario:
     """A scenario for tests: SUMO's passenger car at 14 m/s, and roads that empty at the end."""
 
-    bearings: tuple[float, ...] = reals(
+    bearings: Reals[tuple[float, ...]] = reals(
         "of the arms, clockwise from north", "deg", default=(0.0, 90.0, 180.0, 270.0)
     )
     side: Literal["left", "right"] = word("of the road", ("left", "right"), default="left")

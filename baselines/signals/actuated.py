@@ -14,7 +14,7 @@ from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens, shortest_detector
 from minisim.control import Site, View
 from minisim.names import Name
-from minisim.parameters import declared, real, switch
+from minisim.parameters import Switch, declared, real, switch
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -47,7 +47,7 @@ class Actuated:
     passing_time: float = real(
         "time of a waiting vehicle over the line", "s", low=0.1, high=60, default=1.9
     )
-    presence: bool = switch(
+    presence: Switch = switch(
         "whether vehicles between loop and line prolong the green; SUMO does not see them",
         default=True,
     )

@@ -11,7 +11,7 @@ from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict
 from minisim.control import Site, View
 from minisim.names import Name
-from minisim.parameters import declared, real, switch
+from minisim.parameters import Switch, declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
@@ -41,7 +41,7 @@ class Adaptive:
     # The authors' network: `minDur`, `maxDur` and its amber.
     min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
     max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
-    extend_max_green: bool = switch(
+    extend_max_green: Switch = switch(
         "whether a green may last longer than `max_green` while the other lanes are empty (SUMO's "
         "`extendMaxDur`)", default=False,
     )  # fmt: skip

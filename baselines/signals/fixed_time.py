@@ -13,7 +13,7 @@ from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webste
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
 from minisim.names import Name
-from minisim.parameters import checked, declared, real, refuse_idle, switch
+from minisim.parameters import Switch, Takes, checked, declared, real, refuse_idle, switch
 
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
@@ -35,7 +35,7 @@ class FixedTime:
 
     name = Name("fixed-time")
 
-    greens: tuple[float, ...] | float | None = checked(
+    greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
         "green of each lane, or one number for all; none means Webster's for the expected demand",
         _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
         optional=True, default=None,
@@ -50,7 +50,7 @@ class FixedTime:
         "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
     )  # fmt: skip
-    equal_greens: bool = switch(
+    equal_greens: Switch = switch(
         "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
         default=False,
     )

@@ -17,7 +17,7 @@ from minisim.control import Observed, Site
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
-from minisim.parameters import declared, real, reals, word
+from minisim.parameters import Reals, declared, real, reals, word
 from minisim.streams import Draws
 
 #: What others go by to tell a human's way. "motion": only what its place and heading show.
@@ -33,11 +33,11 @@ class Humans:
     """How people drive. Triples are for the near turn, straight on, and the far turn."""
 
     # Critical gaps: HCM exhibit 20-17; follow-up times: exhibit 20-18.
-    critical_gaps: tuple[float, float, float] = reals(
+    critical_gaps: Reals[tuple[float, float, float]] = reals(
         "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
         count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
     )  # fmt: skip
-    follow_up: tuple[float, float, float] = reals(
+    follow_up: Reals[tuple[float, float, float]] = reals(
         "shortest time between two drivers of one lane", "s",
         count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
     )  # fmt: skip
@@ -57,7 +57,7 @@ class Humans:
     )  # fmt: skip
     # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
     # Anal. Prev. 74:1).
-    unsignalled: tuple[float, float] = reals(
+    unsignalled: Reals[tuple[float, float]] = reals(
         "share of near and of far turns that no indicator announces",
         count=2, low=0, high=1, default=(0.29, 0.25),
     )  # fmt: skip

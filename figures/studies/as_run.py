@@ -109,5 +109,5 @@ SECTION = Section(
              comparison_table, (study,))
         for study in paper.HEADINGS
     ),
-    paper.agreement, ending, appendix=True,
+    ending, appendix=True,
 )  # fmt: skip

@@ -20,7 +20,7 @@ import numpy as np
 from minisim.errors import InputError, number, numbers
 from minisim.junction.movements import ARM_NAMES, Movement, Movements, movements_of
 from minisim.junction.paths import ARC_SEGMENTS, Path, Way
-from minisim.parameters import checked, declared, part, real, word
+from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
@@ -78,7 +78,7 @@ class Intersection:
     KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
     """
 
-    bearings: tuple[float, ...] = checked(
+    bearings: Reals[tuple[float, ...]] = checked(
         "of the arms, clockwise from true north", _bearings,
         f"3 … {len(ARM_NAMES)} numbers in [0, 360), ascending, {MIN_ANGLE:g} or more apart", "deg",
     )  # fmt: skip

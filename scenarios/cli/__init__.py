@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Terminated as end:
-        return _fail("terminated", int(end.code or 0))
+        return _fail("terminated", end.code)
     except BrokenPipeError:  # the reader of our output has stopped early, as `head` does
         drop_output()
         return 1

@@ -131,7 +131,7 @@ def _check_portable(recipes: Iterable[Recipe]) -> None:
     for part in parts.values():
         try:
             pickle.dumps(part)
-        except Exception as error:  # a class of the caller's own may raise anything
+        except (Exception, SystemExit) as error:  # a class of the caller's own may raise anything
             raise InputError(
                 f"{show(part)} cannot go to other processes ({error}); put its class or function "
                 "at the top of a module, or use one job"

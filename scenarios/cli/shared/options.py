@@ -12,17 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from minisim.errors import InputError, integer, number
-from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 #: A group of options in the help.
 FILES = "Files"
-
-#: Of this many arrivals, some use the last lane or manoeuvre: with equal shares on 4 arms, the
-#: chance that none does is (1/2)^30, one in 10^9.
-ENOUGH = 30
 
 
 def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
@@ -113,14 +108,7 @@ def build_scenario(
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made
-    n = made.intersection.n
-    recorded = read_arrivals(arrivals, n, start or 0.0)
-    arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
-    if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
-        raise InputError(
-            f"{arrivals} looks like arrivals at a junction with {arms} arms: none comes from lane "
-            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-        )
+    recorded = read_arrivals(arrivals, made.intersection.n, start or 0.0)
     return replace(made, recorded=recorded)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from minisim.errors import InputError, integer, show
-from minisim.parameters import checked, declared, part, real, reals, whole
+from minisim.parameters import MaybeReals, checked, declared, part, real, reals, whole
 
 
 def _power_of_two(title: str, value: Any) -> int:
@@ -38,7 +38,7 @@ class Effort:
 
     seeds: int = whole("runs per point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
-    densities: tuple[float, ...] | None = reals(
+    densities: MaybeReals[tuple[float, ...]] = reals(
         "only points with these demands, in studies that have them; none means all",
         "veh/h/lane", optional=True, label="densities", default=None,
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from typing import Any
@@ -133,6 +134,7 @@ def test_an_error_in_a_metric_tells_which_and_where(run: Run) -> None:
     for of, what in (
         (lambda run: 1 / 0, r"ZeroDivisionError: division by zero \(test_metrics.py, line \d+\)"),
         (lambda run: run.trips["dely"], r"KeyError: 'dely' \(test_metrics.py, line \d+\)"),
+        (lambda run: sys.exit("enough"), r"SystemExit: enough \(test_metrics.py, line \d+\)"),
         (math.sqrt, "TypeError: must be real number, not Run"),
     ):
         with pytest.raises(InputError, match=f"^metric 'broken' raised {what}$"):
@@ -154,7 +156,7 @@ def test_a_count_of_the_controller_hides_no_metric(run: Run) -> None:
     summary = counting.summary(["crossings"])
     assert (summary["honks"], summary["crossings"]) == (3, 2)
     for name, asked in (("honks", [Metric("honks", lambda run: 1)]), ("trips", [])):
-        with pytest.raises(InputError, match=f"{name!r} is also what the controller calls a count"):
+        with pytest.raises(InputError, match=f"count {name!r} has the name of another number"):
             replace(run, counts={name: 3}).summary(asked)
 
 

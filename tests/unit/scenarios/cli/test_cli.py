@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import signal
@@ -672,8 +673,12 @@ def test_a_faulty_controller_is_one_line(capsys: Captured, monkeypatch: pytest.M
     ["--version"], pytest.param(["sweep", "e.toml", "--jobs", "2"], marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_path: Path) -> None:
-    """Neither for the command nor for its workers; `collections.py` would, for all of Python."""
-    for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
+    """Neither for the command nor for its workers, except those that `python -m` itself loads."""
+    (tmp_path / "modules.py").write_text("import sys; print(*sys.modules)")
+    loaded = python("-m", "modules", cwd=tmp_path).stdout.split()
+    assert "collections" in loaded
+    here = filter(importlib.util.find_spec, sys.stdlib_module_names)
+    for name in {*here, "dim", "numpy", "scenarios", "typer"}.difference(loaded):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
     (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
     done = python("-m", "minisim", *command, cwd=tmp_path)
@@ -702,6 +707,39 @@ def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: P
     done = python("-c", PRESSING, "reproduce", module, cwd=tmp_path)
     assert done.returncode in (130, -signal.SIGINT)
     assert done.stderr in ("", "minisim: interrupted\n")
+
+
+#: Runs minisim; a signal comes in a callback, whose exceptions Python drops.
+DROPPING = """
+import os, runpy, signal, sys, weakref
+
+number = int(sys.argv.pop())
+
+class Dropped:
+    pass
+
+class Presses:
+    def find_spec(self, name, *_):
+        if name == "minisim.simulation":
+            it = Dropped()
+            self.ref = weakref.ref(it, lambda _: os.kill(os.getpid(), number))
+            del it
+
+sys.meta_path.insert(0, Presses())
+runpy.run_module("minisim", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize(
+    ("number", "code", "told"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_no_signal_is_lost_in_a_callback(number: int, code: int, told: str, tmp_path: Path) -> None:
+    """Python's import system has such a callback after every import."""
+    run = "run", "four-way", "--horizon", "60", str(int(number))
+    done = python("-c", DROPPING, *run, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", f"minisim: {told}\n")
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from baselines import FixedTime
 from dim import Dim, Zones
 from minisim.errors import FileError, InputError
-from minisim.recorded import write_arrivals
+from minisim.recorded import read_arrivals, write_arrivals
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.file import read_experiments
@@ -120,6 +120,17 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     (later,) = read(tmp_path, 'arrivals = "a.csv"\nstart = "00:01"\nseeds = [0]\nhorizon = 100\n')
     expected = arrivals.time[arrivals.time >= 60.0] - 60.0
     assert later.scenario.recorded.time.tolist() == expected.tolist()
+
+
+def test_arrivals_of_a_smaller_junction_are_refused(tmp_path: Path) -> None:
+    """As on the command line and in Python."""
+    write_arrivals(three_way(300, horizon=300).arrivals(1), tmp_path / "a.csv")
+    told = "looks like arrivals of a junction with 3 arms: none comes from lane d or"
+    with pytest.raises(InputError, match=rf"e.toml: .*a.csv {told}"):
+        read(tmp_path, 'arrivals = "a.csv"\n')
+    with pytest.raises(InputError, match=told):
+        read_arrivals(tmp_path / "a.csv", 4)
+    assert len(read_arrivals(tmp_path / "a.csv")) == len(read_arrivals(tmp_path / "a.csv", 3)) > 30
 
 
 def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
