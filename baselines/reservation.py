@@ -22,8 +22,7 @@ their predictions, and predicts again where they differ. A holder whose new pass
 loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
-old; `buffer` covers it. Predictions come true in minisim for vehicles that are alike and follow a
-known law; all others are refused.
+old; `buffer` covers it. Vehicles that differ or follow an unknown law are refused.
 """
 
 from __future__ import annotations
@@ -78,9 +77,7 @@ class Reservation:
         "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
         low=0, high=10, default=0.5,
     )  # fmt: skip
-    period: float = real(
-        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
-    )
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
     def start(self, site: Site) -> ReservationSession:
         """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted.
@@ -133,9 +130,7 @@ class Manager:
         self._law = law_of(site)
         self._ways = courses(site)
         zones = conflict_zones(site.intersection, site.vehicle).tolist()
-        self._zones = [
-            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
-        ]
+        self._zones = [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
         self._rows = site.intersection.movements.rows

@@ -144,9 +144,7 @@ class Dim:
         if self.matrix is None:
             return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
         if self.matrix.n != n:
-            raise InputError(
-                f"the harmony matrix is for {self.matrix.n} arms, the intersection has {n}"
-            )
+            raise InputError(f"the matrix is for {self.matrix.n} arms, the intersection has {n}")
         return self.matrix
 
 

@@ -82,8 +82,7 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        A vehicle braking comfortably for the hold line never is: the green zone is longer than the
-        margin of `can_stop`.
+        Not one braking comfortably for the hold line: the green zone exceeds the margin.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0

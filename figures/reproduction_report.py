@@ -160,9 +160,8 @@ def _collisions(studies: Iterable[Results]) -> str:
             if count := int(rows["collisions"].sum()):
                 hours = len(rows) * results.effort.horizon / 3600.0
                 where = f"{style.look(point.series).label}, {point.where}, {point.density:g}"
-                lines.append(
-                    f"- {results.study.name}: {where} veh/h/lane: {count} in {hours:.1f} h"
-                )
+                where = f"{results.study.name}: {where} veh/h/lane"
+                lines.append(f"- {where}: {count} in {hours:.1f} h")
     return "\n".join(lines) or "None in any run."
 
 
@@ -184,9 +183,7 @@ def _saturated(studies: Iterable[Results]) -> str:
         "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
-        lines.append(
-            f"- In {short} cells, the runs are too short to tell: the roads were still filling."
-        )
+        lines.append(f"- The runs of {short} cells are too short: the roads were still filling.")
     return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 

@@ -44,12 +44,9 @@ class CollisionError(MinisimError):
     """
 
     def __init__(
-        self,
-        message: str,
-        collisions: tuple[Any, ...] = (),
-        replay: Callable[..., Any] | None = None,
+        self, text: str, collisions: tuple[Any, ...] = (), replay: Callable[..., Any] | None = None
     ) -> None:
-        super().__init__(message)
+        super().__init__(text)
         self.collisions = collisions
         self.replay = replay
 

@@ -25,8 +25,7 @@ from minisim.errors import (
 )
 from minisim.spelling import read
 
-#: Returns a field's value, perhaps in another form, or raises `InputError`. It takes what messages
-#: call the field, and the value.
+#: A field's title in messages and its value -> the value, perhaps in another form, or `InputError`.
 Check = Callable[[str, Any], Any]
 
 _Kept_co = TypeVar("_Kept_co", covariant=True)
@@ -185,9 +184,8 @@ def part(
             raise InputError(f"{title} must be {wanted}, got {show(made)}")
         return made
 
-    return checked(
-        meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common
-    )
+    allowed = " | ".join(map(_form, kinds.items()))
+    return checked(meaning, check_part, allowed, kinds=kinds, **common)
 
 
 def _form(kind: tuple[str, Callable[..., Any]]) -> str:

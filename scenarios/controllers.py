@@ -162,9 +162,7 @@ def read_spec(spec: str | Mapping[str, Any]) -> Call:
         return Call(spec)
     call = parse_arguments(head, rest)
     if call.places or not call.named:
-        raise InputError(
-            f"parameters of {head} are written {head}:key=value,key=value, got {show(spec)}"
-        )
+        raise InputError(f"parameters are written {head}:key=value,key=value, got {show(spec)}")
     return call
 
 

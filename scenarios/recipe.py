@@ -48,9 +48,7 @@ class Recipe:
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
-    label: str = text(
-        "what rows call the controller; its own name if empty", empty=True, default=""
-    )
+    label: str = text("what rows call the controller; if empty, its name", empty=True, default="")
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
         REACTIONS, default="stop",
@@ -93,6 +91,5 @@ class Recipe:
 
         if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
             options["record"] = options.get("record") or "junction"
-        return (host or simulate)(
-            self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
-        )
+        options["on_collision"] = self.on_collision
+        return (host or simulate)(self.scenario, self.driven, self.seed, **options)

@@ -25,15 +25,12 @@ class Adaptive:
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
     it needs to reach the stop line at the speed limit, if that is before `max_green`. A green also
     goes on while the other lanes are empty. Time loss is relative to the speed that the driver
-    would like (`MSE2Collector`). Defaults are SUMO's, except for greens and amber, which are from
-    the authors' network.
+    would like (`MSE2Collector`). Defaults are SUMO's; greens and amber are the authors'.
     """
 
     name = Name("adaptive")
 
-    detector_range: float = real(
-        "length of the detectors before the junction", "m", low=1, high=1000, default=100.0
-    )
+    detector_range: float = real("length of the detectors", "m", low=1, high=1000, default=100.0)
     min_time_loss: float = real(
         "time lost from which a vehicle prolongs the green", "s",
         low=0, high=3600, default=1.0,

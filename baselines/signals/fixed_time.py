@@ -41,11 +41,8 @@ class FixedTime:
         optional=True, default=None,
     )  # fmt: skip
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
-    saturation_flow: float = real(
-        "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
-    )
-    # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
-    # 2 s of amber that drivers still use.
+    saturation_flow: float = real("of a lane", "veh/h", low=1, high=1e5, default=1500.0)
+    # HCM 2000, ch. 10: amber and all-red; 2 s of start-up loss, less 2 s of amber that drivers use.
     lost_time: float | None = real(
         "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
@@ -102,8 +99,7 @@ class FixedTime:
 class Program:
     """Lanes that are green in turn, over and over; the first turns green at time 0.
 
-    What it shows follows from the time alone. `order` holds the lanes in the order of their greens;
-    times are in seconds.
+    What it shows follows from the time [s] alone. `order` holds the lanes in order of their greens.
     """
 
     def __init__(

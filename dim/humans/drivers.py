@@ -4,8 +4,7 @@ The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20,
 control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
 in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
 junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
-Drivers here do both: among themselves, the first to stop goes first, and they accept gaps between
-vehicles that need not stop.
+Drivers here do both: the first of them to stop goes first, and they accept gaps in other traffic.
 """
 
 from __future__ import annotations
@@ -49,14 +48,12 @@ class Humans:
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A driver must look for longer than a vehicle with the right of way takes to move
-    # off, which is a few steps.
+    # (AASHTO). A vehicle with the right of way needs less to move off: a few steps.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
     )  # fmt: skip
-    # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
-    # Anal. Prev. 74:1).
+    # 29 % of right, 25 % of left turns in the USA (Sullivan et al. 2015, Accid. Anal. Prev. 74:1).
     unsignalled: Reals[tuple[float, float]] = reals(
         "share of near and of far turns that no indicator announces",
         count=2, low=0, high=1, default=(0.29, 0.25),

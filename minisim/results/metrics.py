@@ -75,8 +75,7 @@ class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
     The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
-    warm-up (`Run.counted`). A number that needs only trips is also measured for each lane,
-    movement and kind.
+    warm-up (`Run.counted`). A number that needs only trips also has a value per group of trips.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
@@ -87,9 +86,7 @@ class Metric:
     )  # fmt: skip
     unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
-    needs: str = word(
-        "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
-    )
+    needs: str = word("measured from", ("trips", "run", "trajectories", "counts"), default="run")
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",

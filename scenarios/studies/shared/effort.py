@@ -20,9 +20,7 @@ class Search:
     """How to search for a limit: by bisection, with `seeds` · log₂(`steps`) runs per point."""
 
     step: float = real("demands are multiples of it", "veh/h", above=0, default=10.0)
-    steps: int = checked(
-        "the highest demand is `steps` · `step`", _power_of_two, "power of two", default=128
-    )
+    steps: int = checked("highest demand, in `step`s", _power_of_two, "power of two", default=128)
     seeds: int = whole("each has a bisection of its own; the seeds 1 … `seeds`", low=1, default=4)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
 

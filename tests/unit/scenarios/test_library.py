@@ -163,9 +163,7 @@ def test_unknown_scenarios_are_refused(name: str, message: str) -> None:
     ],
 )
 @pytest.mark.parametrize("make", [three_way, four_way, five_way])
-def test_bad_options_are_refused(
-    make: Callable[..., Scenario], options: dict[str, Any], message: str
-) -> None:
+def test_bad_options(make: Callable[..., Scenario], options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         make(**options)
 

@@ -203,9 +203,7 @@ def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: 
     assert trips.exists()
 
 
-def test_without_safety_nothing_is_recorded(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_safety_no_recording(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     records, real = [], minisim.simulation.Simulation
 
     def spy(*arguments: Any, **options: Any) -> Any:
@@ -383,9 +381,8 @@ def test_a_film_shows_the_run_of_the_same_options(
     recorded = tmp_path / "arrivals.csv"
     write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
     films: list[Run] = []
-    monkeypatch.setattr(
-        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
-    )
+    writer = "figures.film.animate.write_animation"
+    monkeypatch.setattr(writer, lambda run, *_, **__: films.append(run))
     what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
     for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
         options = (*what, "-c", controller)
@@ -397,9 +394,7 @@ def test_a_film_shows_the_run_of_the_same_options(
         pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
 
 
-def test_animate_checks_before_it_simulates(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_animate_checks(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", here := str(tmp_path))
     for file, more, said in (
@@ -447,12 +442,10 @@ BAD = [
     (("run",), "SCENARIO"),
     (("run", "four-way", "--fo"), "--fo"),
     (("run", "for-way"), "did you mean 'four-way'"),
-    (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is not a finite number"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is not a file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
-    (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
     (("run", "four-way", "-d", "many"), "many"),
     (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
@@ -464,18 +457,14 @@ BAD = [
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
-    (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
-    (
-        ("run", "four-way", "--metrics", "pets,trips", "--no-safety"),
-        "asks for pets, which --no-saf",
-    ),
+    (("run", "four-way", "--metrics", "pets,trips", "--no-safety"), "asks for pets, which --no"),
     (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
     (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
-    (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
+    (("verify", "9-way"), "9 arms have 387420488 cases, too many to try all"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
     (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
@@ -485,15 +474,12 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "--horizon [s] must be a finite number, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "capacity"), "earlier results: use minisim reproduce --only capacity"),
+    (("sweep", "capacity"), "earlier ones: use minisim reproduce --only capacity"),
     (("sweep", "x" * 300), "unknown study 'xxx"),
     (("sweep", "x" * 300 + ".toml"), "File name too long"),
     (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "cannot read xxx"),
     (("sweep", "/dev/full"), "/dev/full: it is neither an ordinary file nor a pipe"),
     (("sweep", "/"), "cannot read experiments from /: Is a directory"),
-    (("run", "four-way", "--arrivals", "/dev/zero"), "neither an ordinary file nor a pipe"),
-    (("run", "four-way", "--split", "(4,3,2,1"), "split must be balanced or like 4:3:2:1"),
-    (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),

@@ -90,9 +90,8 @@ def test_results_say_what_is_missing() -> None:
         return None if recipe.seed == 1 else {**synthetic_row(recipe), "error": "broken"}
 
     results = study.collect(effort, lambda asked: [*map(row_of, asked)])
-    assert all(
-        runs == (2 if point.series == "dim" else 0, 2) for point, runs in results.runs.items()
-    )
+    wanted = {point: (2 if point.series == "dim" else 0, 2) for point in results.runs}
+    assert results.runs == wanted
     assert results.rows["error"].notna().sum() == len(study.points) // 2
     assert len(results.good) == len(study.points)
     assert study.collect(effort, lambda asked: [None] * len(asked)).good.empty

@@ -190,9 +190,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG)
-def test_what_is_wrong_is_named_with_its_place(
-    text: str, message: str, tmp_path: Path, capsys: Captured
-) -> None:
+def test_wrong_places_are_named(text: str, message: str, tmp_path: Path, capsys: Captured) -> None:
     with pytest.raises((InputError, FileError), match=message) as caught:
         read(tmp_path, text)
     file = str(tmp_path / "e.toml")
@@ -208,9 +206,7 @@ def test_what_is_not_a_file_of_experiments(tmp_path: Path) -> None:
             read_experiments(tmp_path / name)
 
 
-def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_a_controller_that_cannot_serve_is_told_first(tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text('scenario = "three-way"\ncontroller = "fixed-time:greens=(1,2)"\n')
     said = fails(capsys, "sweep", str(file), "--out", str(store))

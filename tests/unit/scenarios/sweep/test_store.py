@@ -211,9 +211,7 @@ def test_a_plain_class_with_a_version_is_known_by_it_and_its_attributes(
         key_of(recipe())
 
 
-def test_another_writer_is_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome
-) -> None:
+def test_writers_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome) -> None:
     monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
     with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
         ours.put(recipe_of(1), outcome)
@@ -228,9 +226,7 @@ def test_another_writer_is_waited_for(
         assert len(ours) == 3
 
 
-def test_a_store_that_another_holds_is_told_soon(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_store_in_use_is_told_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenarios.sweep.store.OPENING", 0.1)
     with Store(tmp_path / "s.db") as theirs:
         theirs._database.executescript("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE")
