@@ -296,7 +296,7 @@ def test_a_run_counts_once() -> None:
     frame = pd.DataFrame({
         "who": ["x", "x", "y"], "m": 1.0, "where": 1, "seed": 1, "arrivals": "same", "error": None,
     })  # fmt: skip
-    with pytest.raises(InputError, match="x has several runs of one seed; where are the same"):
+    with pytest.raises(InputError, match="x has several runs of one seed with equal where"):
         pairs(frame, "m", "who", ("x", "y"), ["where"])
 
 
