@@ -71,7 +71,7 @@ class AllWayStopSession:
         heads = self._heads(view)
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
-        # A moving head can stand as soon as comfortable braking has stopped it.
+        # A moving head can be standing once comfortable braking has stopped it.
         moving = [v for v in heads if v.id not in self._standing]
         brakes = [self._types[v.type].deceleration for v in moving]
         looks = [view.time + (v.speed - HALTING) / b for v, b in zip(moving, brakes, strict=True)]

@@ -1,7 +1,7 @@
 """Where a vehicle will be, step by step, if its driver is like all others and it may drive on.
 
-It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.laws`). Positions count from the junction entry.
+By the run's own law (`minisim.laws`) it follows the vehicles ahead in its lane, and those that
+enter its exit lane first. Their motion is known. Positions count from the junction entry.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def from_bearings(
     if given.get("recorded") is not None and clash:
         raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
     if "min_headway" in given and given.get("model") != "shifted":
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)

@@ -32,7 +32,7 @@ CLEARANCE = 0.5
 #: Spacing of the bodies that make up a corridor, and of those tested for zones [m].
 SWEEP_STEP = 0.5
 
-#: Spacing of the bodies tested for clearing distances [m]; at half the clearance, none is missed.
+#: Spacing of the bodies tested for clearing distances [m]; half the clearance misses none.
 CLEARING_STEP = CLEARANCE / 2.0
 
 #: Spacing of the bodies tested for areas [m].
@@ -120,8 +120,8 @@ def conflict_zones(
     between `[p, q, 0]` and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
     left the junction. Two vehicles can touch only when both are in their zones.
 
-    A zone begins one tested body before the first one too close and ends one after the last. If no
-    tested body is too close, but the corridors are in between, the zone is the whole crossing.
+    A zone reaches one tested body beyond the first and the last that are too close. If none is too
+    close, but the corridors are in between, the zone is the whole crossing.
     """
     ends = [path.crossing + vehicle.length for path in intersection.paths]
     past = [np.linspace(0.0, end, math.ceil(end / SWEEP_STEP) + 1) for end in ends]
@@ -145,7 +145,7 @@ def clearing_distances(
     `others` are the vehicles on the other paths, by default of the same type.
 
     `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
-    of movement p. Minus infinity if the two do not conflict; infinite if this is only so once the
+    of movement p. Minus infinity if the two do not conflict; infinite if that takes until the
     rear has left the junction, as when both use the same exit lane.
     """
     others = others or vehicle

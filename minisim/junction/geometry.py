@@ -87,7 +87,7 @@ class Intersection:
     )
     lane_width: float = real("width of every lane", "m", default=3.2, low=2, high=6)
     junction_radius: float = real(
-        "distance of every entry and exit from the centre; none is the smallest with a kerb of "
+        "distance of every entry and exit from the centre; none means the smallest with a kerb of "
         f"{KERB_RADIUS:g} m",
         "m", above=0, optional=True, default=None,
     )  # fmt: skip
@@ -95,8 +95,8 @@ class Intersection:
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
     ways: tuple[Way, ...] | None = part(
-        "another simulator's curves through the junction, a Way per movement, in their order; none "
-        "is the arcs",
+        "another simulator's curves through the junction, one Way per movement, in order; none "
+        "means arcs",
         tuple, optional=True, default=None,
     )  # fmt: skip
 

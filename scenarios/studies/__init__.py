@@ -20,7 +20,7 @@ NAMES = (
     "confidence",
 )  # fmt: skip
 
-#: Studies that choose runs by the results of earlier ones, so their runs cannot be listed before.
+#: Studies that choose runs by the results of earlier ones, so they cannot be listed in advance.
 SEARCHES = ("capacity",)
 
 

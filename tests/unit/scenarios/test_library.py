@@ -70,15 +70,15 @@ def test_recorded_arrivals_replace_the_demand() -> None:
     assert four_way(recorded=recorded).recorded is recorded
     with pytest.raises(InputError, match="recorded replaces density, split; give one or the"):
         four_way(100, split="4:3:2:1", recorded=recorded)
-    with pytest.raises(InputError, match="min_headway goes with the model 'shifted'"):
+    with pytest.raises(InputError, match="min_headway needs the model 'shifted'"):
         four_way(min_headway=2.0)
 
 
 @pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])
 def test_bad_shares_are_one_sentence(text: str) -> None:
-    with pytest.raises(InputError, match="split is balanced or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="split must be balanced or like 4:3:2:1, got"):
         four_way(split=text)
-    with pytest.raises(InputError, match="turns is uniform or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="turns must be uniform or like 4:3:2:1, got"):
         four_way(turns=text)
 
 
