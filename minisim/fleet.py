@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -101,10 +102,13 @@ def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
 
 def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list | tuple) else (value,)
-    return tuple(
+    kept = tuple(
         numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
         for i, row in enumerate(rows)
     )
+    for share in itertools.chain.from_iterable(kept):
+        number("share of a type", share, low=0, high=1)
+    return kept
 
 
 @declared
@@ -121,7 +125,7 @@ class Fleet:
     shares: Takes[
         tuple[tuple[float, ...], ...], float | Sequence[float | Sequence[float]]
     ] = checked(
-        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers ≥ 0",
+        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers 0 … 1",
         default=((1.0,),),
     )  # fmt: skip
 
@@ -132,8 +136,7 @@ class Fleet:
         if len(counts - {1}) > 1:
             raise InputError(f"shares by lane need a number per lane, got {self.shares}")
         for lane in range(max(counts)):
-            for share in (row := self.of_lane(lane)):
-                number("share of a type", share, low=0, high=1)
+            row = self.of_lane(lane)
             if abs(sum(row) - 1.0) > ROUNDING:
                 where = f" on lane {ARM_NAMES[lane]}" if max(counts) > 1 else ""
                 given = ", ".join(
