@@ -63,7 +63,7 @@ def test_wrong_shares_are_refused_in_one_sentence(value: object, message: str) -
 
 
 def test_what_cannot_be_mixed_is_refused() -> None:
-    with pytest.raises(InputError, match="profiles paper and fair"):
+    with pytest.raises(InputError, match="needs the profile paper or fair"):
         fleet_named("india", CruiseVehicle())
     with pytest.raises(InputError, match="same car-following model"):
         Fleet((CAR, VehicleType(name="other", model="krauss")), ((0.5,), (0.5,)))
