@@ -90,7 +90,7 @@ class V2ICSession:
         self.granted: set[int] = set()  #: ids of those with the right of way
         self._period = controller.period
         self._rows = site.intersection.movements.rows
-        self._limit = site.speed_limit
+        self._limit = site.limit
         self._acceleration = site.vehicle.acceleration
         self._crossing = [path.crossing + length for path in paths]
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
@@ -115,26 +115,27 @@ class V2ICSession:
         latest = [0.0] * len(self._foes)  # leaving time of the last of each movement so far [s]
         for vehicle in self.order:
             me = seen[vehicle]
+            limit = self._limit(me.lane)
             p = self._rows[me.lane][me.manoeuvre]
             blocked = max([latest[q] for q in self._foes[p]], default=0.0)
             distance = me.distance + self._crossing[p]
             if vehicle in self.granted:
-                leaving = self.leaving_time(distance, me.speed, 0.0)
+                leaving = self.leaving_time(distance, me.speed, 0.0, limit)
             elif blocked > 0.0:
-                yield Advise(vehicle, advised_speed(me.distance, me.speed, blocked, self._limit))
-                leaving = self.leaving_time(distance, me.speed, blocked)
+                yield Advise(vehicle, advised_speed(me.distance, me.speed, blocked, limit))
+                leaving = self.leaving_time(distance, me.speed, blocked, limit)
             else:
                 self.granted.add(vehicle)
                 yield Go(vehicle)
                 yield Advise(vehicle, math.inf)
-                leaving = time_to_cover(distance, me.speed, self._acceleration, self._limit)
+                leaving = time_to_cover(distance, me.speed, self._acceleration, limit)
             latest[p] = max(latest[p], leaving)
 
-    def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
+    def leaving_time(self, distance: float, speed: float, blocked: float, limit: float) -> float:
         """Time that a vehicle needs to leave, `distance` ahead, at its present speed [s].
 
         It is never 0, since a listed vehicle has not left, and at most `blocked`, the time until
         it can be let go, plus the time from rest at its present place.
         """
-        from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
+        from_rest = time_to_cover(distance, 0.0, self._acceleration, limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)

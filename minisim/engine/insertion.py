@@ -30,7 +30,8 @@ def insert(
             continue
         if cruise is not None and blocked(vehicles, road, law, cruise, lane):
             continue
-        s, p = law.length + law.margin, vehicles[i]["path"]
+        p = vehicles[i]["path"]
+        s = road.ends[p, 3] + law.length + law.margin
         section = 0
         while s >= road.section_start[p, section + 1]:
             section += 1

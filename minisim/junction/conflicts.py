@@ -97,10 +97,12 @@ def entry_room(intersection: Intersection, vehicle: VehicleType) -> float:
     a vehicle waiting beside that lane.
     """
     entry, movements = intersection.approach_length, intersection.movements
-    firsts = [intersection.paths[movements.rows[arm][1]] for arm in range(intersection.n)]
+    arms, allowed = intersection.approaches, intersection.allowed
+    firsts = [intersection.paths[movements.rows[arm][1]] for arm in arms]
     held = np.asarray(shapely.polygons([path.bodies(entry, vehicle) for path in firsts]))
     distance = shapely.distance(corridors(intersection, vehicle)[:, None], held[None, :])
-    return float(distance[movements.origins[:, None] != np.arange(intersection.n)].min())
+    others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
+    return float(distance[others].min(initial=math.inf))
 
 
 @lru_cache(maxsize=256)
