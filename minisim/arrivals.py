@@ -266,7 +266,7 @@ def _open_shares(shares: tuple[float, ...], lanes: Bools, *, even: bool) -> tupl
                 "its share must be 0"
             )
     return tuple(
-        (1.0 / lanes.sum() if even else share) * used
+        (1.0 / int(lanes.sum()) if even else share) * used
         for share, used in zip(shares, lanes.tolist(), strict=True)
     )
 

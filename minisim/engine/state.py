@@ -35,7 +35,7 @@ VEHICLE = np.dtype(
         ("demand_tick", np.int64),
         ("factor", np.float64),  # the driver's factor on the speed limit
         ("status", np.int64),
-        ("s", np.float64),  # front bumper, from the road entry [m]
+        ("s", np.float64),  # front bumper on its path [m], see `minisim.junction.paths`
         ("v", np.float64),  # [m/s]
         ("a", np.float64),  # of the step just taken [m/s²]
         ("section", np.int64),  # of the speed profile

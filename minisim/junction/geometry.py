@@ -127,7 +127,7 @@ class Intersection:
 
     def __post_init__(self) -> None:
         self._check_roads()
-        halves = [w / 2.0 if road.one_way else w for w, road in zip(*self._sections, strict=True)]
+        halves = self.half_widths
         smallest = max(
             (max(pair) + KERB_RADIUS) / math.tan(math.radians(gap) / 2.0)
             for pair, gap in zip(pairwise((*halves, halves[0])), _gaps(self.bearings), strict=True)
@@ -197,6 +197,18 @@ class Intersection:
         """Width of the lanes of each arm [m]."""
         return tuple(road.lane_width or self.lane_width for road in self._each_road)
 
+    @cached_property
+    def offsets(self) -> tuple[float, ...]:
+        """Distance of each arm's lanes from its axis [m]; 0 on one-way roads."""
+        each = zip(self.lane_widths, self._each_road, strict=True)
+        return tuple(0.0 if road.one_way else width / 2.0 for width, road in each)
+
+    @property
+    def half_widths(self) -> tuple[float, ...]:
+        """Half the width of each arm's road [m]."""
+        each = zip(self.lane_widths, self.offsets, strict=True)
+        return tuple(width if offset else width / 2.0 for width, offset in each)
+
     @property
     def approach_length(self) -> float:
         """Distance from the far end of the longest approach lane to the junction entry [m].
@@ -248,18 +260,6 @@ class Intersection:
     @property
     def _each_road(self) -> tuple[Road, ...]:
         return self.roads or (Road(),) * self.n
-
-    @property
-    def _sections(self) -> tuple[tuple[float, ...], tuple[Road, ...]]:
-        """Lane widths [m] and roads."""
-        return self.lane_widths, self._each_road
-
-    @cached_property
-    def offsets(self) -> tuple[float, ...]:
-        """Distance of each arm's lanes from its axis [m]; 0 on one-way roads."""
-        return tuple(
-            0.0 if road.one_way else w / 2.0 for w, road in zip(*self._sections, strict=True)
-        )
 
     def _half_angle(self, movement: Movement) -> float:
         """Half the clockwise angle from the arm of origin to the arm of exit [rad]."""

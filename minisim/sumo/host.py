@@ -213,7 +213,7 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
     depart_speed = request.scenario.depart_speed
     vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
-    network = build_network(site.intersection, site.speed_limit, folder, home)
+    network = build_network(site, folder, home)
     job = Job(
         command=_command(request.gui),
         folder=str(folder),
