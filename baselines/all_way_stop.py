@@ -35,11 +35,8 @@ class AllWayStop:
 
     name = Name("all-way-stop")
 
-    # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
-    # safety measures (device SSM, MDRAC).
-    reaction: float = real(
-        "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
-    )
+    # SUMO's `jmAllwayStopWait`, by default a single step; 1 s is SUMO's reaction time (SSM, MDRAC).
+    reaction: float = real("how long a driver stands", "s", low=0, high=60, default=1.0)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""

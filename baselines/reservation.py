@@ -22,8 +22,7 @@ their predictions, and predicts anew where they differ. A holder whose new passa
 loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
-old; `buffer` covers it. Predictions come true in minisim for vehicles that are alike and follow a
-known law; all others are refused.
+old; `buffer` covers it. Vehicles that differ or follow an unknown law are refused.
 """
 
 from __future__ import annotations
@@ -78,12 +77,13 @@ class Reservation:
         "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
         low=0, high=10, default=0.5,
     )  # fmt: skip
-    period: float = real(
-        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
-    )
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
     def start(self, site: Site) -> ReservationSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted.
+
+        A period below the host's step is refused, too.
+        """
         self.covers.check(self.name, site.vehicle)
         return ReservationSession(self, site)
 
@@ -130,9 +130,7 @@ class Manager:
         self._law = law_of(site)
         self._ways = courses(site)
         zones = conflict_zones(site.intersection, site.vehicle).tolist()
-        self._zones = [
-            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
-        ]
+        self._zones = [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
         self._rows = site.intersection.movements.rows
@@ -196,7 +194,7 @@ class ReservationSession:
             reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
         reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._dt = site.dt
         self._brakes = site.vehicle.deceleration
         self._requests: dict[int, None] = {}  # in the order of first requests

@@ -31,7 +31,10 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None if all see the same, so that wake-ups suffice."""
+        """How often vehicles look [s], at most every step; None if wake-ups suffice.
+
+        They do if all vehicles see the same.
+        """
 
     def start(self, site: Site) -> See:
         """Begin a run; its random numbers and its memory belong to the result."""
@@ -79,8 +82,7 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        One that brakes comfortably for the hold line never is, since the green zone is longer than
-        the margin of `can_stop`.
+        One that brakes comfortably for the hold line never is: the green zone exceeds the margin.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0

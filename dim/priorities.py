@@ -31,8 +31,7 @@ CHANGING = ("rotating", "waiting")  #: priorities that change with time
 TURN_TIME = 10.0
 
 #: How far vehicles see the others' approach lanes and yellow zones [m]. Manoeuvres have been read
-#: from up to 150 m before a junction (Phillips, Wheeler, Kochenderfer, "Generalizable intention
-#: prediction", IEEE IV 2017).
+#: from 150 m (Phillips, Wheeler, Kochenderfer, "Generalizable intention prediction", IEEE IV 2017).
 SENSOR_RANGE = 100.0
 
 SAME_TIME = 1e-6  #: times that differ by less count as the same [s]: hosts round their clocks

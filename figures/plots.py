@@ -20,8 +20,7 @@ from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
-#: Series are drawn side by side, so that their bars do not cover each other: spread over this share
-#: of the smallest step between demands.
+#: Series stand side by side, spread over this share of the smallest step between demands.
 SPREAD = 0.12
 #: Lines with few points are this far apart [veh/h/lane].
 DODGE = 2.5

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import style
-from figures.gallery import GALLERY, SECTIONS, STUDIES, write
+from figures.gallery import GALLERY, SECTIONS, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
 from minisim.files import make_folder, write_text
@@ -69,14 +69,10 @@ def _report(
     yield "## What was run"
     yield _made_table(made).markdown()
     yield _cost_table(studies).markdown()
-    answers = [
-        section.answer(archive.study(name))
-        for name, section in STUDIES.items()
-        if name in parts and section.answer is not None
-    ]
-    if answers:
+    verdicts = [it.study.verdict(it) for it in studies if it.study.verdict is not None]
+    if verdicts:
         yield "## Result in short"
-        yield from answers
+        yield from verdicts
     for section in SECTIONS:
         known = drawn.keys() | missing.keys()
         shown = [item for item in section.items if item.in_report and item.name in known]
@@ -164,9 +160,8 @@ def _collisions(studies: Iterable[Results]) -> str:
             if count := int(rows["collisions"].sum()):
                 hours = len(rows) * results.effort.horizon / 3600.0
                 where = f"{style.look(point.series).label}, {point.where}, {point.density:g}"
-                lines.append(
-                    f"- {results.study.name}: {where} veh/h/lane: {count} in {hours:.1f} h"
-                )
+                where = f"{results.study.name}: {where} veh/h/lane"
+                lines.append(f"- {where}: {count} in {hours:.1f} h")
     return "\n".join(lines) or "None in any run."
 
 
@@ -188,9 +183,7 @@ def _saturated(studies: Iterable[Results]) -> str:
         "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
-        lines.append(
-            f"- In {short} cells, the runs are too short to tell: the roads were still filling."
-        )
+        lines.append(f"- The runs of {short} cells are too short: the roads were still filling.")
     return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 

@@ -44,12 +44,9 @@ class CollisionError(MinisimError):
     """
 
     def __init__(
-        self,
-        message: str,
-        collisions: tuple[Any, ...] = (),
-        replay: Callable[..., Any] | None = None,
+        self, text: str, collisions: tuple[Any, ...] = (), replay: Callable[..., Any] | None = None
     ) -> None:
-        super().__init__(message)
+        super().__init__(text)
         self.collisions = collisions
         self.replay = replay
 
@@ -197,6 +194,8 @@ def show(value: object) -> str:
         text = re.sub(r" at 0x[0-9A-Fa-f]+", "", repr(value))
     except ValueError:  # Python refuses to print integers of thousands of digits
         return f"a {type(value).__name__} too large to print"
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        return f"a {type(value).__name__} whose repr raises {type(error).__name__}"
     return text if len(text) <= 200 else f"{text[:200]}…"
 
 

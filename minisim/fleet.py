@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, choice, instance, number, numbers, show
 from minisim.junction.movements import ARM_NAMES
-from minisim.parameters import checked, declared
+from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
 from minisim.vehicle import CruiseVehicle, VehicleType
 
@@ -104,8 +104,12 @@ class Fleet:
     else.
     """
 
-    types: tuple[VehicleType, ...] = checked("of vehicles", _types, "VehicleTypes of one model")
-    shares: tuple[tuple[float, ...], ...] = checked(
+    types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(
+        "of vehicles", _types, "VehicleTypes of one model"
+    )
+    shares: Takes[
+        tuple[tuple[float, ...], ...], float | Sequence[float | Sequence[float]]
+    ] = checked(
         "of each type: a number, or one per lane; they sum to 1", _shares, "numbers ≥ 0",
         default=((1.0,),),
     )  # fmt: skip

@@ -1,8 +1,7 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
 Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the table of
-models in `minisim.vehicle`. The hosts move vehicles by these functions, and `baselines.prediction`
-predicts by them.
+models in `minisim.vehicle`. Hosts move vehicles by these functions, `baselines.prediction` too.
 """
 
 from __future__ import annotations
@@ -125,8 +124,7 @@ def build_law(
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
     """The weight that this run's law gives a vehicle ahead, from 0 to infinity; the most decides.
 
-    It is the ratio of the desired gap to the actual one under the IDM, and the inverse of the safe
-    speed under Krauß's law.
+    Under the IDM it is the desired gap over the actual one, under Krauß's law 1/(safe speed).
     """
     if law.model == KRAUSS:
         v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
@@ -138,8 +136,7 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
     """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader stops no sooner than its brakes can stop it, and what corners need in a turn stays
-    free.
+    The leader stops no sooner than its brakes can, and what corners need in a turn stays free.
     """
     room = gap - law.room
     if law.semi_implicit:

@@ -26,6 +26,11 @@ from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
 
 from minisim.errors import InputError, show
 from minisim.fields import KEY, Parameter
+from minisim.fields import MaybeReals as MaybeReals
+from minisim.fields import Reals as Reals
+from minisim.fields import Spelled as Spelled
+from minisim.fields import Switch as Switch
+from minisim.fields import Takes as Takes
 from minisim.fields import checked as checked
 from minisim.fields import part as part
 from minisim.fields import real as real

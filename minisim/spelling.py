@@ -105,7 +105,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
         return make(*given.args, **given.kwargs)
     except MinisimError as error:
         raise InputError(f"{title}: {error}") from None
-    except Exception as error:  # the caller's own class may raise anything
+    except (Exception, SystemExit) as error:  # the caller's own class may raise anything
         raise InputError(f"{title} cannot be made: {type(error).__name__}: {error}") from error
 
 

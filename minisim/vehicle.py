@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from minisim.errors import InputError
-from minisim.parameters import declared, real, switch, text, word
+from minisim.parameters import Switch, declared, real, switch, text, word
 
 #: SUMO's `POSITION_EPS` [m].
 POSITION_EPS = 0.1
@@ -187,7 +187,7 @@ class CruiseVehicle(VehicleType):
         "upper bound before and inside the junction (maxSpeed)", "m/s",
         default=55.55, above=0, high=100,
     )  # fmt: skip
-    obeys: bool = switch(
+    obeys: Switch = switch(
         "whether it keeps to limits and lights by itself, but late: it brakes once it is in a "
         "turn, runs amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
     )  # fmt: skip

@@ -138,6 +138,12 @@ def controller_named(
     return as_controller(call.name, build(name, maker_of(name), call))
 
 
+def label_of(series: str) -> str:
+    """What figures and reports call a variant; the name itself if it has no look."""
+    variant = VARIANTS.get(series)
+    return variant.look.label if variant and variant.look else series
+
+
 def read_spec(spec: str | Mapping[str, Any]) -> Call:
     """Split a controller's text or table into its name and arguments; raises `InputError`."""
     if isinstance(spec, Mapping):
@@ -156,9 +162,7 @@ def read_spec(spec: str | Mapping[str, Any]) -> Call:
         return Call(spec)
     call = parse_arguments(head, rest)
     if call.places or not call.named:
-        raise InputError(
-            f"parameters of {head} are written {head}:key=value,key=value, got {show(spec)}"
-        )
+        raise InputError(f"parameters are written {head}:key=value,key=value, got {show(spec)}")
     return call
 
 

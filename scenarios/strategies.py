@@ -26,7 +26,7 @@ from minisim.junction.movements import movements_of
 from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
-from scenarios.profiles import FAIR, PAPER, PROFILES
+from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
 try:
@@ -74,7 +74,7 @@ def roads(draw: st.DrawFn, n: int) -> tuple[Road, ...]:
         "lane_width": st.sampled_from([None, 2.8, 4.0]),
         "traffic": st.sampled_from(["both", "both", "in", "out"]),
     }
-    made = st.builds(Road, **maybe)  # type: ignore[arg-type]
+    made = st.builds(Road, **maybe)
     return tuple(draw(st.lists(made, min_size=n, max_size=n)))
 
 
@@ -150,24 +150,6 @@ def scenarios(
         demand=draw(demands(intersection.n, max_density)),
         profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=horizon,
-    )
-
-
-@st.composite
-def emptying(draw: st.DrawFn) -> Scenario:
-    """A random junction with demand for a minute, and an hour in which to serve it."""
-    intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
-    demand = draw(demands(intersection.n))
-    arrivals = demand.draw(intersection.n, 60.0, seed=draw(st.integers(0, 1000)))
-    return Scenario(
-        name="random",
-        intersection=intersection,
-        demand=demand,
-        profile=PROFILES[
-            draw(st.sampled_from(sorted(set(PROFILES) - {"as_run"})))
-        ],  # its signals are dead
-        horizon=3600.0,
-        recorded=arrivals,
     )
 
 

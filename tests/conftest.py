@@ -22,9 +22,6 @@ settings.register_profile(
 settings.register_profile("thorough", settings.get_profile("ci"), max_examples=600)
 # For `make mutants`: nobody reads a mutant's counterexample, so it is not made small.
 settings.register_profile(
-    "mutants",
-    settings.get_profile("ci"),
-    max_examples=20,
-    phases=[Phase.explicit, Phase.generate],
+    "mutants", settings.get_profile("ci"), max_examples=20, phases=[Phase.explicit, Phase.generate]
 )
 settings.load_profile("ci")

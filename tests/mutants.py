@@ -117,9 +117,7 @@ def _affordable(tests: Iterable[str]) -> list[str]:
 def _verdicts() -> dict[str, dict[str, int | None]]:
     """Module -> mutant -> exit code of its tests, None for those not tried yet."""
     return {
-        path.name.removesuffix(".meta"): json.loads(path.read_text(encoding="utf-8"))[
-            "exit_code_by_key"
-        ]
+        path.name.removesuffix(".meta"): json.loads(path.read_bytes())["exit_code_by_key"]
         for path in sorted(Path("mutants/dim").rglob("*.py.meta"))
     }
 

@@ -22,8 +22,7 @@ class LongestQueue:
 
     One phase per approach: one lane carries all turns, so any two approaches have movements that
     conflict. Of equal queues, the one whose last green was longest ago goes first; further ties go
-    in the order a, b, c…. An empty junction keeps its green. A lane may wait long while others
-    always have more vehicles.
+    in the order a, b, c…. An empty junction keeps its green. A lane of few vehicles may wait long.
     """
 
     name = Name("longest-queue")

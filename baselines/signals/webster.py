@@ -28,8 +28,7 @@ class SignalTiming:
     cycle: float  #: [s]
     greens: tuple[float, ...]  #: of each lane [s]
     flow_ratio: float  #: Webster's Y, the sum over the lanes of inflow over saturation flow
-    #: Degree of saturation x = qC/(sg) of each lane, with its effective green g. Above 1 its queue
-    #: grows while demand lasts.
+    #: Degree of saturation x = qC/(sg) by lane, g its effective green; above 1 its queue grows.
     saturation: tuple[float, ...]
     capped: bool = False  #: whether the optimum cycle was cut to a maximum (or does not exist)
 

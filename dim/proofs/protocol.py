@@ -79,9 +79,7 @@ class Protocol:
     matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
     order: str = word("which clique is preferred", ORDERS, default="size")
     gate: str = word("what may enter while others cross", GATES, default="clear")
-    commit: str = word(
-        "when a vehicle is committed", COMMITS, label="commit rule", default="stoppable"
-    )
+    commit: str = word("when a vehicle commits", COMMITS, label="commit rule", default="stoppable")
     priorities: str = word("which lane comes first at a tie", PRIORITIES, default="fixed")
 
     @property
@@ -100,8 +98,7 @@ class Protocol:
             yield TURN, state._replace(turn=(state.turn + 1) % self.matrix.n, decided=False)
 
     def arrivals(self, state: State) -> Iterator[Step]:
-        """A vehicle comes to the front of a lane: at the start of the yellow zone, or behind one
-        that has just entered the junction."""
+        """A vehicle comes to the front of a lane: at the yellow zone, or when another enters."""
         for lane, front in enumerate(state.fronts):
             if front is None:
                 came = (*state.came, lane) if self.priorities == "waiting" else ()
@@ -136,8 +133,7 @@ class Protocol:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
-        are, and the gate "harmonious" keeps out any that conflict with a crossing one. Of the
-        others, only the best clique goes.
+        are, and "harmonious" keeps out those in conflict. Of the others, the best clique goes.
         """
         n, rows, bits = self.matrix.n, self.matrix.movements.rows, self.matrix.movements.bits
         there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]

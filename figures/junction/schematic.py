@@ -64,7 +64,7 @@ def _draw_map(axes: Axes, scenario: Scenario) -> None:
     for path in intersection.paths:
         if path.movement.origin == 0:
             start, end = path.entry - plan.hold_distance, path.exit + 6.0
-            drawing.draw_way(axes, path, start, end, style.BLUE, strong=False)
+            drawing.draw_way(axes, path, start, end, style.BLUE, bold=False)
     left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # no junction in the paper has a road there
     axes.plot([left, left + 20.0], [top, top], color=style.INK, linewidth=2.2, zorder=9,
               solid_capstyle="butt")  # fmt: skip

@@ -13,8 +13,8 @@ from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import RIVALS
-from scenarios.studies.fair import GATES, MEASURES, OTHERS, Crossing, losses, tried
-from scenarios.studies.shared.archive import MissingRunsError, missing_note
+from scenarios.studies.fair import GATES, MEASURES, OTHERS, Crossing, needed_losses, tried
+from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import Results, with_total_delay
 
 
@@ -37,17 +37,6 @@ def fair_figure(results: Results) -> Figure:
     title, looks = "Every controller on four arms, profile fair", map(style.look, RIVALS)
     plots.frame(figure, title, looks, note, ncols=4, marks=0.842)
     return figure
-
-
-def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
-    """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
-    known = {} if results.good.empty else losses(results.good)
-    if not known:
-        raise MissingRunsError(
-            "the store has no two demands at which DIM and another controller ran with two common "
-            f"seeds; make them with: {results.effort.command('fair')}"
-        )
-    return known
 
 
 def crossing_figure(results: Results) -> Figure:
@@ -102,29 +91,6 @@ def loss_table(results: Results) -> Table:
     )  # fmt: skip
 
 
-def answer(results: Results) -> str:
-    """The answer to the question that the paper leaves open."""
-    try:
-        known = needed_losses(results)
-    except MissingRunsError as error:
-        return f"From which demand on DIM loses is not known: {error}."
-    low, high = tried(known.values())
-    lines = []
-    for rival in OTHERS:
-        losing = []
-        for measure in MEASURES:
-            found = (str(known.get((measure, gate, rival), "not run")) for gate in GATES)
-            losing.append(f"{measure} {' → '.join(found)}")
-        lines.append(f"- {style.look(rival).label}: {'; '.join(losing)}")
-    return "\n".join([
-        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
-        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
-        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
-        "mean:\n",
-        *lines,
-    ])  # fmt: skip
-
-
 def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
     look = style.look(gate)
     ends = crossing.density, crossing.until, crossing.low, crossing.high
@@ -151,5 +117,4 @@ SECTION = Section(
         Item("losses", "demand from which on DIM loses", crossing_figure, ("fair",)),
         Item("losses-table", "losses in numbers", loss_table, ("fair",)),
     ),
-    answer,
 )

@@ -56,8 +56,5 @@ def _draw_lanes(axes: Axes, rows: pd.DataFrame) -> None:
 
 SECTION = Section(
     "Fairness",
-    (
-        Item("fairness", "fixed, rotating and longest-waiting priority", fairness_figure,
-             ("fairness",)),
-    ),
-)  # fmt: skip
+    (Item("fairness", "fixed, rotating and waiting priority", fairness_figure, ("fairness",)),),
+)

@@ -10,7 +10,7 @@ Lanes of different widths, or of one-way roads, take a curve of `minisim.junctio
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import compress, pairwise
@@ -19,11 +19,12 @@ from typing import Any, Literal
 import numpy as np
 
 from minisim.errors import InputError, instance, items, number, numbers
+from minisim.fields import Takes
 from minisim.junction.curves import Curve, join
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
 from minisim.junction.paths import ARC_SEGMENTS, Floats, Path, Way
 from minisim.junction.roads import Road
-from minisim.parameters import checked, declared, part, real, word
+from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
@@ -96,7 +97,7 @@ class Intersection:
     with two lanes of 3.2 m, SUMO's width, too.
     """
 
-    bearings: tuple[float, ...] = checked(
+    bearings: Reals[tuple[float, ...]] = checked(
         "of the arms, clockwise from true north", _bearings,
         f"3 … {len(ARM_NAMES)} numbers in [0, 360), ascending, {MIN_ANGLE:g} or more apart", "deg",
     )  # fmt: skip
@@ -117,11 +118,11 @@ class Intersection:
         "is the arcs",
         tuple, optional=True, default=None,
     )  # fmt: skip
-    roads: tuple[Road, ...] | None = checked(
+    roads: Takes[tuple[Road, ...] | None, Iterable[Road | Mapping[str, Any]] | None] = checked(
         "of the arms, where they differ; none if all are alike and two-way", _roads,
         "a Road per arm", optional=True, default=None,
     )  # fmt: skip
-    forbidden: tuple[str, ...] = checked(
+    forbidden: Takes[tuple[str, ...], Iterable[str]] = checked(
         "movements that no vehicle may take", _forbidden, "movements such as a2", default=()
     )
 

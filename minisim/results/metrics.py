@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from minisim.errors import InputError, MinisimError, choice, items, show
-from minisim.parameters import checked, declared, parameters, switch, text, word
+from minisim.parameters import Switch, checked, declared, parameters, switch, text, word
 from minisim.results.trips import Floats, Trips, queue_growth
 
 if TYPE_CHECKING:
@@ -75,8 +75,7 @@ class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
     The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
-    warm-up (`Run.counted`). A number that needs only trips is also measured for each lane,
-    movement and kind.
+    warm-up (`Run.counted`). A number that needs only trips also has a value per group of trips.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
@@ -87,9 +86,7 @@ class Metric:
     )  # fmt: skip
     unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
-    needs: str = word(
-        "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
-    )
+    needs: str = word("measured from", ("trips", "run", "trajectories", "counts"), default="run")
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",
@@ -98,7 +95,7 @@ class Metric:
     symbol: str = text("in equations", empty=True, default="")
     meaning: str = text("in one line", empty=True, default="")
     equation: str = text("with its source", empty=True, default="")
-    usual: bool = switch("whether every summary has it", default=False)
+    usual: Switch = switch("whether every summary has it", default=False)
 
     @property
     def grouped(self) -> bool:
@@ -138,7 +135,7 @@ class Metric:
     def _measured(self, subject: Run | Trips) -> Any:
         try:
             return self.of(subject)
-        except Exception as error:  # a caller's function may raise anything
+        except (Exception, SystemExit) as error:  # a caller's function may raise anything
             frames = traceback.extract_tb(error.__traceback__)[1:2]
             place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
             what = f" raised {type(error).__name__}: {error}{place}"

@@ -57,8 +57,7 @@ def summarise(
     """The usual numbers of a run, and the metrics asked for.
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
-    complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds, by kind
-    (`kinds`).
+    complete form. Trips are grouped by lane (`lanes`) and, if there are kinds, by kind (`kinds`).
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).

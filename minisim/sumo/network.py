@@ -49,8 +49,7 @@ def build_network(site: Site, folder: Path, home: Path) -> Network:
     """Write the network of the site's intersection into `folder`.
 
     With our arcs no vehicle has to give way: the hosted controller alone decides (`pass`, and no
-    place to wait inside the junction). Turns have the road's speed limit, since the host slows
-    vehicles down for them.
+    place to wait inside the junction). Turns have the road's limit: the host slows vehicles down.
 
     Raises:
         SumoError: netconvert refuses (the message is its own) or draws ways other than those given.

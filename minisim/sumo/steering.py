@@ -26,8 +26,7 @@ from minisim.sumo.messages import Job
 #: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
 #: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
 #: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
-#: of them shares neither lane nor exit with it. Meanwhile it follows the vehicle ahead into its
-#: exit by minisim's law.
+#: of them shares neither lane nor exit with it, and follows the one ahead by minisim's law.
 FOLLOWING, IGNORING = 2, 2 + 32
 
 #: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
@@ -125,10 +124,9 @@ class Follower(Steering):
         """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
         entry = self._law.entry
         self._inside = [car for car in self._inside if not car.cleared]
-        known = {car.id for car in self._inside}
-        self._inside += [
-            car for lane in lanes for car in lane if car.s >= entry and car.id not in known
-        ]
+        ids = {car.id for car in self._inside}
+        entered = (car for lane in lanes for car in lane if car.s >= entry)
+        self._inside += [car for car in entered if car.id not in ids]
         inside = {car.path for car in self._inside}
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
@@ -151,11 +149,9 @@ class Follower(Steering):
 
     def _merging(self, car: Car) -> float:
         """Closeness to the vehicle from another lane that takes the same exit before this car."""
-        mine, exit_arm = self._exit[car.path]
+        mine, arm = self._exit[car.path]
         before = takewhile(lambda other: other is not car, self._inside)
-        merging = [
-            it for it in before if it.lane != car.lane and self._exit[it.path][1] == exit_arm
-        ]
+        merging = [it for it in before if it.lane != car.lane and self._exit[it.path][1] == arm]
         if not merging:
             return 0.0
         ahead = merging[-1]

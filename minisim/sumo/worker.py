@@ -3,8 +3,7 @@
 libsumo holds one simulation per process, and a crash would take its caller down. So it has a
 process of its own, which knows no controllers. That process advances until a wake-up, sends a view
 and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
-SUMO does car following, integrates and finds collisions; `minisim.sumo.steering` tells it what else
-vehicles have to obey.
+SUMO follows, integrates and finds collisions; `minisim.sumo.steering` tells it what else to obey.
 """
 
 from __future__ import annotations

@@ -20,9 +20,7 @@ from scenarios.cli.shared.terminal import show_json, wrapped
     "[bold]Examples[/bold]\n\nminisim controllers dim\n\nminisim controllers mymodule:MyController"
 )
 def controllers(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="List the parameters of this one.")
-    ] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="List its parameters.")] = None,
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""

@@ -63,12 +63,8 @@ def crossval(
         option("Vehicle and speeds: fair, paper, as_run or as_run_signals.", "NAME",
                "--profile", "-p"),
     ] = None,
-    seeds: Annotated[
-        int | None, option("Runs per cell, 1 … 1000; 3 by default, 2 with --quick.")
-    ] = None,
-    horizon: Annotated[
-        float | None, option("Simulated time; 3600 by default, 300 with --quick.", "S")
-    ] = None,
+    seeds: Annotated[int | None, option("Runs per cell, 1 … 1000; 3, or 2 with --quick.")] = None,
+    horizon: Annotated[float | None, option("Of each run; 3600, or 300 with --quick.", "S")] = None,
     replay: Annotated[
         bool,
         option("Replay published runs: their arrivals, vehicles and controllers; compare with the "

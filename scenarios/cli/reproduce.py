@@ -29,18 +29,12 @@ from scenarios.studies import NAMES, study_named
 )
 def reproduce(
     out: options.Folder = Path("out"),
-    store: Annotated[
-        Path | None, option("Where the runs are kept; DIR/runs.sqlite by default.", "STORE")
-    ] = None,
-    seeds: Annotated[
-        int | None, option("Runs per case, at least 2; 10 by default, 2 with --quick.")
-    ] = None,
+    store: Annotated[Path | None, option("Keeps the runs; else DIR/runs.sqlite.", "STORE")] = None,
+    seeds: Annotated[int | None, option("Runs per case, 2 or more; 10, or 2 with --quick.")] = None,
     jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
-        option(
-            f"Only this study and its figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"
-        ),
+        option(f"Only this study, with figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"),
     ] = None,
     quick: Annotated[bool, option("A smoke test: two demands, 150 s.", None, "--quick")] = False,
 ) -> None:
@@ -71,9 +65,8 @@ def reproduce(
         if rows.outdated:
             typer.echo(f"minisim: {rows.outdated}", err=True)
         with bar("drawing") as progress:
-            files = write_report(
-                Archive(find_in(rows), effort), made, workers, folder, progress, parts=names
-            )
+            archive = Archive(find_in(rows), effort)
+            files = write_report(archive, made, workers, folder, progress, parts=names)
     typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
     if broken := sum(len(part.failed) for part in made):

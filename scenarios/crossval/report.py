@@ -38,10 +38,9 @@ def table(results: Sequence[Result]) -> pd.DataFrame:
     """One row per cell, lane and metric; a failed run has a row with its error.
 
     Columns: controller, scenario, arms, split, density [veh/h], profile, horizon_s, lane, metric;
-    host and seed of a failed run; seeds; trips, mean, half width of its 95 % interval and
+    host and seed of a failed run; seeds; trips, mean [s], half width of its 95 % interval and
     collisions for each host; `difference` (SUMO − minisim, paired by seed) with its `…_ci95`;
-    `ks`; `within`, the share of the trips that differ by less than 0.1 s; `published`; `error`.
-    Times in seconds.
+    `ks`; `within`, the share of trips that differ by less than 0.1 s; `published`; `error`.
     """
     import pandas as pd
 

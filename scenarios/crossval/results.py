@@ -72,8 +72,7 @@ class Result:
     def hosts_agree(self) -> bool | None:
         """Whether the hosts agree within the stated tolerances.
 
-        None if there is nothing to judge by: no seed was finished by both hosts, or no trip
-        ended in either.
+        None if there is nothing to judge by: no seed ended in both hosts, or no trip in either.
         """
         if not any(self.trips):
             return None

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from scenarios.paper import BASELINE_GRID, GRID, SERIES, Cell, controller_of, scenario
 from scenarios.recipe import Recipe
+from scenarios.studies.shared.paper_comparison import agreement
 from scenarios.studies.shared.study import Study
 
 
@@ -42,4 +43,5 @@ STUDY = Study(
     ),
     # It decides every 0.01 s, so that an hour costs some 20 s of CPU, and its runs differ little.
     {"v2ic": 3},
+    agreement,
 )

@@ -16,8 +16,7 @@
     scenario = { name = "custom", label = "skewed", bearings = [0, 80, 190, 260] }
     controller = { name = "dim", label = "west first", priorities = [1, 2, 3, 0] }
 
-Without `[[experiment]]` the file is one block. In a controller's table, all keys except `name` and
-`label` are its parameters.
+Without one, the file is a block. A controller's table has a name, a label and parameters.
 """
 
 from __future__ import annotations

@@ -20,8 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: Substitutes for characters that the terminal's encoding lacks: one for one, so that tables stay
-#: aligned.
+#: Substitutes for what the terminal's encoding lacks: one for one, so that tables stay aligned.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
 #: Shortest time between two lines of progress if stderr is not a terminal [s].

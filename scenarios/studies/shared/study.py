@@ -30,6 +30,8 @@ class Study:
     points: tuple[Point, ...]  # each once
     #: Series -> most seeds, if more would cost too much
     few: Mapping[str, int] = field(default_factory=dict)
+    #: Answers the question from the results, in a few sentences for the head of the report.
+    verdict: Callable[[Results], str] | None = None
     about_collisions: bool = False  # its figures show them, so the report does not list them
 
     def runs(

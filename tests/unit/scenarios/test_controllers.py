@@ -175,9 +175,7 @@ def test_a_registered_class_that_is_not_a_controller(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("value", ["no_such_module:Thing", "baselines:Thing"])
-def test_a_broken_package_is_named_when_it_is_asked_for(
-    monkeypatch: pytest.MonkeyPatch, value: str
-) -> None:
+def test_a_broken_package_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     plugin(monkeypatch, ("extra", value))
     assert controller_named("dim") == Dim()
     with pytest.raises(InputError, match="controller extra of package minisim-extra cannot be"):

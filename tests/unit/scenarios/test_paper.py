@@ -54,9 +54,6 @@ SUMO = {
 PARTS = Cell("balanced", 350, 3)
 
 
-# --- the grid --------------------------------------------------------------------------------
-
-
 def test_the_grids_are_every_published_run() -> None:
     table = reference()
     rows = table[table["metric"] == "travel_time_s"]
@@ -116,9 +113,6 @@ def test_runs_that_were_not_published(cell: Cell, message: str) -> None:
         published_arrivals("balanced", 100, 4)
     with pytest.raises(InputError, match="published junction"):
         published_ways(6)
-
-
-# --- what ran ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("controller", ["dim", "fts", "ats", "v2ic"])
@@ -182,9 +176,6 @@ def test_the_names_of_arms_decide_which_lane_is_first() -> None:
     assert {str(m) for m in winner(matrix, case, "lanes", "acbd")} == {"c1"}
     assert controller_of("4:1:4:1", 200, 4) == AsRunDim(names="acbd")
     assert controller_of("4:3:2:1", 200, 4) == AsRunDim()
-
-
-# --- replays -------------------------------------------------------------------------------------
 
 
 def means(cell: Cell, seed: int = 0) -> tuple[float, float]:

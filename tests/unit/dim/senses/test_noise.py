@@ -39,9 +39,8 @@ def intents(see: See, view: View, ego: int) -> dict[int, int]:
 
 def crowd(count: int, time: float = 0.0) -> View:
     """Vehicles that wait on four lanes, all turning left; for counting errors."""
-    return View(
-        time, tuple(seen(k, k * 4 // count, 1, 2.0 + k % (count // 4)) for k in range(count))
-    )
+    vehicles = (seen(k, k * 4 // count, 1, 2.0 + k % (count // 4)) for k in range(count))
+    return View(time, tuple(vehicles))
 
 
 def test_without_errors_the_runs_are_those_of_exact_perception() -> None:

@@ -90,9 +90,8 @@ def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
     tally = session(told({(1, 2): 1, (1, 4): 1}))
     assert show(tally, 0.0, seen(1, 0, 2, 2.1)) == "Go 1"
     assert tally.counts["false_grants"] == 0
-    assert "Hold 1" not in show(
-        tally, 0.1, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 2, 2.1)
-    )
+    three = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 2, 2.1)
+    assert "Hold 1" not in show(tally, 0.1, *three)
     assert tally.counts["false_grants"] == 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from typing import Any
@@ -90,10 +91,7 @@ def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
         (Metric("m", lambda run: "5"), "metric 'm' must give one finite number or None, got '5'"),
         (Metric("m", lambda run: math.inf), "metric 'm' must give one finite number"),
         (Metric("m", lambda run: np.zeros(3)), 'got array.*; per="trip" takes an array'),
-        (
-            Metric("m", lambda run: 1.0, per="trip"),
-            "must give one finite number per trip, an array",
-        ),
+        (Metric("m", lambda run: 1.0, per="trip"), "must give one finite number per trip, an arr"),
         (Metric("m", lambda run: run.trips, per="trip"), "metric 'm' must give one finite number"),
         (
             Metric("m", lambda run: np.full(len(run.columns.lane), np.inf), per="trip"),
@@ -133,6 +131,7 @@ def test_an_error_in_a_metric_tells_which_and_where(run: Run) -> None:
     for of, what in (
         (lambda run: 1 / 0, r"ZeroDivisionError: division by zero \(test_metrics.py, line \d+\)"),
         (lambda run: run.trips["dely"], r"KeyError: 'dely' \(test_metrics.py, line \d+\)"),
+        (lambda run: sys.exit("enough"), r"SystemExit: enough \(test_metrics.py, line \d+\)"),
         (math.sqrt, "TypeError: must be real number, not Run"),
     ):
         with pytest.raises(InputError, match=f"^metric 'broken' raised {what}$"):

@@ -65,9 +65,7 @@ def swept(folder: Path, capsys: Captured, text: str, code: int = 0) -> str:
     return capsys.readouterr().out
 
 
-def test_the_table_shows_what_was_asked_for_and_tells_cells_apart(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_the_table_shows_what_tells_cells_apart(tmp_path: Path, capsys: Captured) -> None:
     asked = 'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
     text = f'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n{asked}'
     lines = swept(tmp_path, capsys, text).splitlines()
