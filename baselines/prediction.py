@@ -46,7 +46,8 @@ class Course(NamedTuple):
 
     crossing: float  #: from entry to exit [m]
     turn: float  #: highest speed inside the junction [m/s]
-    limit: float  #: and outside [m/s]
+    before: float  #: before it [m/s]
+    behind: float  #: and behind it [m/s]
     end: float  #: where a vehicle has arrived [m]
     exit_arm: int  #: index of the arm that it leaves by
 
@@ -55,11 +56,12 @@ def courses(site: Site) -> tuple[Course, ...]:
     """The courses of all movements of a site."""
     junction, margin = site.intersection, law_of(site).margin
     turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
-    limit = site.speed_limit
-    return tuple(
-        Course(p.crossing, min(limit, turn), limit, p.length - margin - p.entry, p.exit_arm)
-        for p, turn in zip(junction.paths, turns, strict=True)
-    )
+    made = []
+    for p, turn in zip(junction.paths, turns, strict=True):
+        before, behind = site.limit(p.movement.origin), site.limit(p.exit_arm)
+        end = p.length - margin - p.entry
+        made.append(Course(p.crossing, min(before, turn), before, behind, end, p.exit_arm))
+    return tuple(made)
 
 
 class Leader(NamedTuple):
@@ -164,12 +166,15 @@ def _drive(
                             behind_it = room_behind(rear - s, exit_lane.v[j, k], b_ahead, me, law)
                             room = min(room, behind_it)
                     break
-        v0 = course.turn if 0.0 <= s < course.crossing else course.limit
+        v0 = course.before if s < 0.0 else course.turn if s < course.crossing else course.behind
         acc = within(v, follow(v, v0, max(z, z_exit), me, law), v0, law)
         if z_exit > z and acc < -me.b:
             hard = True
         if s < 0.0 and braking_begins(v, -s, me, law):
             acc = min(acc, slow_down(v, acc, course.turn, -s, me, law))
+        left = course.crossing - s
+        if left > 0.0 and course.behind < course.turn and braking_begins(v, left, me, law):
+            acc = min(acc, slow_down(v, acc, course.behind, left, me, law))
         if short_of(room, v, v + acc * law.dt, me, law):
             acc = min(acc, keep_room(v, room, me, law))
         acc = max(acc, -me.b_max)

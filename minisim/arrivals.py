@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import InputError, number, numbers, show
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, Bools
 from minisim.parameters import checked, declared, real, word
 from minisim.streams import stream
 
@@ -93,13 +93,22 @@ class Arrivals:
             self.time[here] - start, self.lane[here], self.manoeuvre[here], factors, types
         )
 
-    def check(self, n: int) -> None:
-        """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
+    def check(self, n: int, allowed: Bools | None = None) -> None:
+        """Raise `InputError` for a lane or manoeuvre that does not exist with n arms.
+
+        Or for one that no vehicle may take there, if `allowed` is given, shape (n, n−1).
+        """
         for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
             name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
             raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
         for bad in self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)].tolist():
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
+        if allowed is not None:
+            for bad in np.flatnonzero(~allowed[self.lane, self.manoeuvre - 1]).tolist():
+                raise InputError(
+                    f"the vehicle of {self.time[bad]:g} s takes {ARM_NAMES[self.lane[bad]]}"
+                    f"{self.manoeuvre[bad]}, which is forbidden here or against a one-way road"
+                )
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
         """Mean inflow of each lane over the first `horizon` seconds [veh/h]."""
@@ -145,7 +154,8 @@ class Demand:
     """
 
     density: float = real(
-        "mean inflow per lane; with a split, the mean over all lanes", "veh/h/lane",
+        "mean inflow per lane that vehicles may come on; with a split, the mean over these",
+        "veh/h/lane",
         low=0, high=MAX_DENSITY,
     )  # fmt: skip
     split: Shares = checked(
@@ -153,7 +163,7 @@ class Demand:
         partial(read_shares, equal=BALANCED), f"shares such as 4:3:2:1 | {BALANCED}", default=None,
     )  # fmt: skip
     turns: Shares = checked(
-        "shares of the manoeuvres 1 … n−1, the same on every lane",
+        "shares of the manoeuvres 1 … n−1, the same on every lane, among those allowed there",
         partial(read_shares, equal=UNIFORM), f"shares such as 1:2:1 | {UNIFORM}", default=None,
     )  # fmt: skip
     model: str = word(
@@ -162,10 +172,14 @@ class Demand:
     )  # fmt: skip
     min_headway: float = real("of the shifted model", "s", default=1.5, low=0, high=60)
 
-    def rates(self, n: int) -> tuple[float, ...]:
-        """Mean inflow of each of n lanes [veh/h]."""
+    def rates(self, n: int, allowed: Bools | None = None) -> tuple[float, ...]:
+        """Mean inflow of each of n lanes [veh/h]; 0 where none of the manoeuvres is `allowed`."""
         shares = _shares("split", self.split, n, "lanes")
-        rates = tuple(self.density * n * share for share in shares)
+        used = n
+        if allowed is not None:
+            lanes = np.asarray(allowed.any(axis=1))
+            shares, used = _open_shares(shares, lanes, even=self.split is None), int(lanes.sum())
+        rates = tuple(self.density * used * share for share in shares)
         if max(rates) > MAX_DENSITY:
             most = f"at most {MAX_DENSITY:g} are allowed"
             raise InputError(f"the split gives a lane {max(rates):g} veh/h; {most}")
@@ -175,8 +189,8 @@ class Demand:
             )
         return rates
 
-    def draw(self, n: int, duration: float, seed: int) -> Arrivals:
-        """Draw the arrivals on n lanes over `duration` seconds.
+    def draw(self, n: int, duration: float, seed: int, allowed: Bools | None = None) -> Arrivals:
+        """Draw the arrivals on n lanes over `duration` seconds, on manoeuvres that are `allowed`.
 
         Each random number belongs to one lane and one second or vehicle, so a longer duration only
         adds arrivals, and a lane's arrivals do not depend on the rates of the others.
@@ -187,7 +201,7 @@ class Demand:
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         turns = _shares("turns", self.turns, n - 1, "manoeuvres")
-        rates = np.array(self.rates(n)) / 3600.0
+        rates = np.array(self.rates(n, allowed)) / 3600.0
         rng = stream(seed, "arrivals")
         if self.model == "poisson":
             time, lane = _counted(rates, duration, rng)
@@ -196,9 +210,9 @@ class Demand:
             time, lane = _spaced(rates, shift, duration, rng)
         rank = ranks(lane)
         draws = stream(seed, "manoeuvres").random((rank.max(initial=-1) + 1, n))
-        bounds = np.cumsum(turns)
-        manoeuvre = (bounds / bounds[-1]).searchsorted(draws[rank, lane], side="right") + 1
-        return Arrivals(time, lane, manoeuvre)
+        bounds = np.cumsum(_open_turns(np.tile(turns, (n, 1)), allowed), axis=1)
+        bounds = (bounds / bounds[:, -1:])[lane]
+        return Arrivals(time, lane, (bounds <= draws[rank, lane, None]).sum(axis=1) + 1)
 
 
 def _counted(rates: Floats, duration: float, rng: np.random.Generator) -> tuple[Floats, Ints]:
@@ -249,6 +263,30 @@ def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, .
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     return tuple(share / sum(shares) for share in shares)
+
+
+def _open_shares(shares: tuple[float, ...], lanes: Bools, *, even: bool) -> tuple[float, ...]:
+    """Shares of the lanes that vehicles may come on; `even` shares are divided among these."""
+    for lane in np.flatnonzero(~lanes & (np.array(shares) > 0.0)).tolist():
+        if not even:
+            raise InputError(
+                f"split gives lane {ARM_NAMES[lane]} a share, but no vehicle may come from there: "
+                "its share must be 0"
+            )
+    return tuple(
+        (1.0 / int(lanes.sum()) if even else share) * used
+        for share, used in zip(shares, lanes.tolist(), strict=True)
+    )
+
+
+def _open_turns(turns: Floats, allowed: Bools | None) -> Floats:
+    """Shares of the manoeuvres of each lane, shape (n, n−1), without those not allowed."""
+    if allowed is None:
+        return turns
+    kept = np.where(allowed, turns, 0.0)
+    for lane in np.flatnonzero(allowed.any(axis=1) & (kept.sum(axis=1) == 0.0)).tolist():
+        raise InputError(f"turns leave lane {ARM_NAMES[lane]} none of the manoeuvres allowed there")
+    return np.where(allowed.any(axis=1, keepdims=True), kept, 1.0)  # no vehicle draws the latter
 
 
 def _column(name: str, value: npt.ArrayLike, dtype: type) -> npt.NDArray[np.generic]:

@@ -56,10 +56,14 @@ class Site:
 
     intersection: Intersection = part("its geometry", Intersection)
     fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
-    speed_limit: float = real("of the roads", "m/s", above=0, high=100)
+    speed_limit: float = real("of the roads, the highest one", "m/s", above=0, high=100)
     demand: Reals[tuple[float, ...]] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
+    limits: Reals[tuple[float, ...]] = reals(
+        "of each arm's road; by default its own in the intersection, or else `speed_limit`",
+        "m/s", default=(),
+    )  # fmt: skip
 
     @property
     def vehicle(self) -> VehicleType:
@@ -83,13 +87,19 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
+        self._set_limits()
+        if self.intersection.roads is not None and self.vehicle.sumo is not None:
+            raise InputError(
+                "vehicles that keep to SUMO's rules drive on roads that are all alike; leave out "
+                "roads, or take another profile, such as fair"
+            )
         self.fleet.check(self.intersection.n)
-        room = self.intersection.approach_length
+        room = self.intersection.shortest_approach
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
                 f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
                 f"{room:g} m; arm_length must be more than "
-                f"{self.intersection.arm_length - room + needed:g} m"
+                f"{self.intersection.junction_radius + needed:g} m"
             )
         if entry_room(self.intersection, self.fleet) <= 0.0:
             tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
@@ -99,6 +109,21 @@ class Site:
                 f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
                 "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
+
+    def limit(self, arm: int) -> float:
+        """The limit of an arm's road [m/s], before the junction and after it."""
+        return self.limits[arm] if self.limits else self.speed_limit
+
+    def _set_limits(self) -> None:
+        roads, n = self.intersection.roads or (), self.intersection.n
+        if not self.limits and any(road.speed_limit for road in roads):
+            limits = tuple(road.speed_limit or self.speed_limit for road in roads)
+            object.__setattr__(self, "limits", limits)
+            object.__setattr__(self, "speed_limit", max(limits))
+        if self.limits and len(self.limits) != n:
+            raise InputError(f"limits must be one per arm, {n} numbers, got {self.limits}")
+        for limit in self.limits:
+            number("limits [m/s]", limit, above=0, high=self.speed_limit)
 
     def period(self, name: str, seconds: float) -> float:
         """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""

@@ -15,7 +15,9 @@ from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
 from minisim.junction.geometry import Intersection
+from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
+from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
@@ -42,6 +44,8 @@ class Options(TypedDict, total=False):
     junction_radius: float
     arm_length: float
     ways: tuple[Way, ...] | None
+    roads: Sequence[Road] | Mapping[str, Any] | None
+    forbidden: Sequence[str]
     split: str | Sequence[float] | None
     turns: str | Sequence[float] | None
     model: str
@@ -118,7 +122,8 @@ def from_bearings(
     """A junction with arms at these bearings [degrees clockwise from north].
 
     `InputError` for an unknown keyword (with the nearest one), arms closer than 30°, an unknown
-    profile, impossible demand, a demand beside recorded arrivals, or a horizon ≤ 0.
+    profile, impossible demand, a demand beside recorded arrivals, or a horizon ≤ 0. `roads` may be
+    a mapping of arms to roads, such as `{"b": Road(traffic="in")}`; the others are as usual.
     """
     given: dict[str, Any] = {"name": "custom", **options}
     for key in given:
@@ -134,12 +139,15 @@ def from_bearings(
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
     unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
+    bearings = numbers("bearings", bearings)
+    if isinstance(given.get("roads"), Mapping):
+        given["roads"] = _roads(given["roads"], len(bearings))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in _PARTS
     )
     made = Scenario(
-        intersection=Intersection(bearings=numbers("bearings", bearings), **geometry),
+        intersection=Intersection(bearings=bearings, **geometry),
         demand=Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
@@ -182,6 +190,12 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     )
 
 
+def _roads(given: Mapping[str, Any], n: int) -> tuple[Any, ...]:
+    for arm in given:
+        choice("arm in roads", arm, ARM_NAMES[:n])
+    return tuple(given.get(arm, Road()) for arm in ARM_NAMES[:n])
+
+
 def _regular(name: str, n: int, density: float | None, options: Mapping[str, Any]) -> Scenario:
     profile = profile_named(options.get("profile", "paper"))
     if profile in PUBLISHED_PROFILES and _is_published(n, options):
@@ -196,6 +210,6 @@ def _is_published(n: int, options: Mapping[str, Any]) -> bool:
     return (
         n in PUBLISHED_ARMS
         and options.get("side", "left") == "left"
-        and not {"lane_width", "arm_length"} & set(options)
+        and not {"lane_width", "arm_length", "roads", "forbidden"} & set(options)
         and radius == (PUBLISHED_RADII[5] if n == 5 else None)
     )

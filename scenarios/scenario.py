@@ -37,12 +37,13 @@ class Scenario:
     def __post_init__(self) -> None:
         number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
-        self.demand.rates(n)
+        allowed = self.intersection.allowed_by_lane
+        self.demand.rates(n, allowed)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
         self.vehicles.check(n)
         if self.recorded is not None:
-            self.recorded.check(n)
+            self.recorded.check(n, allowed)
             if self.recorded.type is not None:
                 self.vehicles.indices(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
@@ -70,7 +71,9 @@ class Scenario:
     @property
     def density(self) -> float:
         """Mean inflow per lane [veh/h], as demanded or as recorded."""
-        return self.demand.density if self.recorded is None else sum(self.rates) / len(self.rates)
+        if self.recorded is None:
+            return self.demand.density
+        return sum(self.rates) / len(self.intersection.approaches)
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -78,7 +81,7 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        return self.demand.rates(n)
+        return self.demand.rates(n, self.intersection.allowed_by_lane)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
@@ -95,4 +98,5 @@ class Scenario:
         """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
             return self.recorded.between(0.0, self.horizon)
-        return self.demand.draw(self.intersection.n, self.horizon, seed)
+        junction = self.intersection
+        return self.demand.draw(junction.n, self.horizon, seed, junction.allowed_by_lane)

@@ -20,17 +20,19 @@ from typing import Literal
 
 from minisim.arrivals import Demand
 from minisim.control import Controller
-from minisim.errors import MissingExtraError
+from minisim.errors import InputError, MissingExtraError
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import entry_room
 from minisim.junction.geometry import MIN_ANGLE, Intersection
+from minisim.junction.movements import movements_of
+from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
 try:
-    from hypothesis import assume
+    from hypothesis import assume, reject
     from hypothesis import strategies as st
 except ImportError as error:
     raise MissingExtraError("strategies need hypothesis: pip install 'minisim[testing]'") from error
@@ -63,6 +65,41 @@ def intersections(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> Inte
     angles = draw(bearings(min_arms, max_arms))
     made = Intersection(angles, side=draw(st.sampled_from(SIDES)), lane_width=lane_width)
     return replace(made, junction_radius=made.junction_radius * widened)
+
+
+@st.composite
+def roads(draw: st.DrawFn, n: int) -> tuple[Road, ...]:
+    """Roads of n arms: own lengths, limits and widths, some of them one-way."""
+    maybe = {
+        "length": st.sampled_from([None, 90.0, 250.0]),
+        "speed_limit": st.sampled_from([None, 3.0, 8.0, 20.0]),
+        "lane_width": st.sampled_from([None, 2.8, 4.0]),
+        "traffic": st.sampled_from(["both", "both", "in", "out"]),
+    }
+    made = st.builds(Road, **maybe)
+    return tuple(draw(st.lists(made, min_size=n, max_size=n)))
+
+
+@st.composite
+def uneven(draw: st.DrawFn, max_density: float = 250.0) -> Scenario:
+    """Short scenarios on junctions whose roads differ, and where some turns are forbidden."""
+    angles = draw(bearings(max_arms=5))
+    own = draw(roads(len(angles)))
+    names = movements_of(len(angles)).names
+    try:
+        intersection = Intersection(
+            angles, side=draw(st.sampled_from(SIDES)), arm_length=150.0, roads=own,
+            forbidden=tuple(draw(st.sets(st.sampled_from(names), max_size=3))),
+        )  # fmt: skip
+        density = draw(floats(20.0, max_density))
+        made = Scenario(
+            name="uneven", intersection=intersection, demand=Demand(density=density),
+            profile=draw(st.sampled_from([PAPER, FAIR])), horizon=120.0,
+        )  # fmt: skip
+        made.site()
+    except InputError:  # nothing may enter or leave, or a path is too tight
+        reject()
+    return made
 
 
 @st.composite

@@ -30,7 +30,7 @@ class Collision(NamedTuple):
     time: float  #: [s]
     vehicles: tuple[int, int]  #: their ids (rows of the trip table), the smaller one first
     movements: tuple[str, str]  #: of both, such as ("a2", "c3")
-    positions: tuple[float, float]  #: front bumpers, from the road entry [m]
+    positions: tuple[float, float]  #: `s` of both front bumpers [m], see `minisim.junction.paths`
     speeds: tuple[float, float]  #: [m/s]
 
     def __str__(self) -> str:

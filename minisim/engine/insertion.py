@@ -30,8 +30,8 @@ def insert(
             continue
         if cruise is not None and blocked(vehicles, road, law, cruise, lane):
             continue
-        mine = road.types[vehicles[i]["type"]]
-        s, p = mine.length + law.margin, vehicles[i]["path"]
+        mine, p = road.types[vehicles[i]["type"]], vehicles[i]["path"]
+        s = road.ends[p, 3] + mine.length + law.margin
         section = 0
         while s >= road.section_start[p, section + 1]:
             section += 1

@@ -40,7 +40,7 @@ VEHICLE = np.dtype(
         ("b_max", np.float64),  # the most that its brakes can do [m/s²]
         ("factor", np.float64),  # the driver's factor on the speed limit
         ("status", np.int64),
-        ("s", np.float64),  # front bumper, from the road entry [m]
+        ("s", np.float64),  # front bumper on its path [m], see `minisim.junction.paths`
         ("v", np.float64),  # [m/s]
         ("a", np.float64),  # of the step just taken [m/s²]
         ("section", np.int64),  # of the speed profile
@@ -87,7 +87,9 @@ OBSERVED = np.dtype([(name, _TYPES[kind]) for name, kind in get_type_hints(Obser
 class Road(NamedTuple):
     """The paths as arrays; p counts movements, k sections of the speed profile."""
 
-    ends: Floats  #: (p, 3): `s` of the junction exit and of the road's end [m], index of exit arm
+    #: (p, 4): `s` of the junction exit and of the road's end [m], index of exit arm, `s` of the
+    #: road's beginning [m]
+    ends: Floats
     shape: Floats  #: (p, ARC_SEGMENTS + 1, 2): polyline from entry to exit [m]
     headings: Floats  #: (p, 4): unit vectors in (x, y) and out (x, y)
     section_start: Floats  #: (p, k) [m], infinite past the last section
@@ -103,13 +105,13 @@ def build_road(site: Site, plan: Plan) -> Road:
     profiles = [_speed_profile(path, site, plan) for path in paths]
     width = max(len(profile) for profile in profiles) + 1
     start = np.full((len(paths), width), np.inf)
-    speed = np.full((len(paths), width), site.speed_limit)
+    speed = np.full((len(paths), width), site.speed_limit)  # of sections that never begin
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
     marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
     return Road(
-        ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
+        ends=np.array([(p.exit, p.length, float(p.exit_arm), p.start) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
@@ -129,19 +131,19 @@ def _types(site: Site) -> Any:
 
 def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
     """Piecewise-constant limit along a path: ascending (start [m], speed [m/s])."""
-    road = site.speed_limit
-    turn = min(road, site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION))
-    stretches = [(path.entry, path.exit, turn)]
+    before, behind = site.limit(path.movement.origin), site.limit(path.exit_arm)
+    turn = site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION)
+    stretches = [(0.0, path.exit, before), (path.entry, path.exit, turn)]
+    stretches += [(path.exit, np.inf, behind)]
     stretches += [
         (path.entry - m.start, path.entry - m.end, m.speed)
         for m in plan.markings
         if m.speed is not None
     ]
-    edges = sorted({0.0, *(max(s, 0.0) for start, end, _ in stretches for s in (start, end))})
+    edges = sorted({max(s, 0.0) for *ends, _ in stretches for s in ends if s < np.inf})
     profile: list[tuple[float, float]] = []
     for edge in edges:
-        inside = [speed for start, end, speed in stretches if start <= edge < end]
-        limit = min([road, *inside])
+        limit = min(speed for start, end, speed in stretches if start <= edge < end)
         if not profile or profile[-1][1] != limit:
             profile.append((edge, limit))
     return profile

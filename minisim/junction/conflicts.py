@@ -102,11 +102,13 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     a vehicle waiting beside that lane.
     """
     entry, movements = intersection.approach_length, intersection.movements
-    firsts = [intersection.paths[movements.rows[arm][1]] for arm in range(intersection.n)]
+    arms, allowed = intersection.approaches, intersection.allowed
+    firsts = [intersection.paths[movements.rows[arm][1]] for arm in arms]
     bodies_held = [[path.bodies(entry, it) for it in vehicles.types] for path in firsts]
     held = np.array([shapely.MultiPolygon([(c, ()) for c in four]) for four in bodies_held])
     distance = shapely.distance(corridors(intersection, vehicles)[:, None], held[None, :])
-    return float(distance[movements.origins[:, None] != np.arange(intersection.n)].min())
+    others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
+    return float(distance[others].min(initial=math.inf))
 
 
 @lru_cache(maxsize=256)

@@ -133,7 +133,7 @@ def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple
     """Each row's lane, named as in SUMO, and the position on it [m]."""
     paths = site.intersection.paths
     names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
-    starts = np.array([(0.0, p.entry, p.exit) for p in paths])
+    starts = np.array([(p.start, p.entry, p.exit) for p in paths])
     section = (s[:, None] >= starts[movement, 1:]).sum(axis=1)
     return names[movement, section].tolist(), s - starts[movement, section]
 

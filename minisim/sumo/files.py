@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ def _vehicle_type(kind: VehicleType, limit: float, model: str) -> dict[str, obje
 def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | None) -> Iterator[str]:
     for kind in site.types:
         yield tag("vType", _vehicle_type(kind, site.speed_limit, model))
-    for path in site.intersection.paths:
+    for path in compress(site.intersection.paths, site.intersection.allowed):
         edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
         yield tag("route", {"id": path.movement, "edges": edges})
     movements = site.intersection.movements

@@ -51,7 +51,7 @@ class Worker:
         )
         self._limits = limits(job)
         self._marks = road.marks.tolist()
-        self._exit, self._end = road.ends[:, 0].tolist(), road.ends[:, 1].tolist()
+        self._exit, self._end, _, self._start = road.ends.T.tolist()
         self._stretch = [
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
@@ -165,7 +165,7 @@ class Worker:
     def _depart(self, car: Car) -> None:
         law = self._job.law
         car.present, car.seen = True, self._tick
-        car.s = car.traits.length + law.margin
+        car.s = self._start[car.path] + car.traits.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         if car.v > law.depart_speed:  # SUMO was told "max", since it never lowers a given speed
             car.v = law.depart_speed

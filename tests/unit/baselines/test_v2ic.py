@@ -55,11 +55,11 @@ def test_advice_is_where_uniform_braking_ends_within_0_and_the_limit(
 
 def test_leaving_times_are_distance_by_speed_up_to_a_cap() -> None:
     serving = session()
-    assert serving.leaving_time(140.0, 14.0, 0.0, 2.6) == pytest.approx(10.0, abs=1e-4)
+    assert serving.leaving_time(140.0, 14.0, 0.0, 2.6, 14.0) == pytest.approx(10.0, abs=1e-4)
     from_rest = time_to_cover(20.0, 0.0, SITE.vehicle.acceleration, 14.0)
-    assert serving.leaving_time(20.0, 0.0, 0.0, 2.6) == pytest.approx(from_rest)
-    assert serving.leaving_time(20.0, 0.0, 7.0, 2.6) == pytest.approx(7.0 + from_rest)
-    assert serving.leaving_time(0.0, 14.0, 0.0, 2.6) > 0.0
+    assert serving.leaving_time(20.0, 0.0, 0.0, 2.6, 14.0) == pytest.approx(from_rest)
+    assert serving.leaving_time(20.0, 0.0, 7.0, 2.6, 14.0) == pytest.approx(7.0 + from_rest)
+    assert serving.leaving_time(0.0, 14.0, 0.0, 2.6, 14.0) > 0.0
 
 
 def test_the_first_goes_and_a_later_one_in_conflict_is_advised() -> None:
