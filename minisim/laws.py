@@ -190,6 +190,20 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
 
 
 @njit_inline
+def drive(v: float, limit: float, advice: float, z: float, law: Law) -> float:
+    """The acceleration that the law gives at a speed limit and an advised speed.
+
+    A vehicle that is too fast for the advice brakes at b at most, unless its leader alone asks for
+    more: the IDM would add both.
+    """
+    acc = within(v, follow(v, limit, z, law), limit, law)
+    if advice < limit:
+        told = within(v, follow(v, advice, z, law), advice, law)
+        acc = min(acc, max(told, -law.b))
+    return acc
+
+
+@njit_inline
 def within(v: float, acc: float, limit: float, law: Law) -> float:
     """`acc`, unless a step of it would take a vehicle past its speed limit.
 
@@ -247,7 +261,8 @@ def hold(v: float, s: float, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
     The vehicle brakes comfortably for its hold line, no earlier than it must. If that does not
-    suffice, it brakes as hard as it must to stop before the junction.
+    suffice, it brakes comfortably to stop before the junction, and if that does not, as hard as it
+    must.
     """
     to_line = law.hold - s
     if law.sumo and law.model == KRAUSS:
@@ -260,10 +275,10 @@ def hold(v: float, s: float, law: Law) -> float:
             return 0.0
         v_new = speed_towards(v, 0.0, distance, law.b, law.dt)
         return (v_new - v) / law.dt if v_new > 0.0 else -v * v / (2.0 * max(distance, 1e-6))
-    if v * v <= 2.0 * law.b * to_line:
+    to_junction = law.entry - s
+    if v * v <= 2.0 * law.b * to_junction:
         return -law.b
-    to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
-    return -max(law.b, v * v / (2.0 * to_junction))
+    return -v * v / (2.0 * max(to_junction - STOP_MARGIN, 1e-6))
 
 
 @njit
@@ -284,6 +299,6 @@ def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float
     if needed <= distance:
         v_new = stepwise_towards(0.0, distance, b, dt) if distance >= STILL else 0.0
         return (v_new - v) / dt
-    if needed <= to_line:
+    if needed <= to_entry:
         return -b
-    return -max(b, v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6)))
+    return -v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6))

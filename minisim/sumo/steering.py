@@ -174,7 +174,8 @@ class Follower(Steering):
         law = self._law
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
-        v0 = min(speeds[section] * car.factor, car.advice)
+        limit = speeds[section] * car.factor
+        v0 = min(limit, car.advice)
         k = section + 1
         slower = laws.braking_begins(v, starts[k] - s, law)
         held = held and near(v, law.hold - s, law)
@@ -184,8 +185,8 @@ class Follower(Steering):
         if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
             super().release(car)
             return
-        free = laws.follow(v, v0, 0.0, law)
-        acc = laws.follow(v, v0, z, law)
+        free = laws.drive(v, limit, car.advice, 0.0, law)
+        acc = laws.drive(v, limit, car.advice, z, law)
         while laws.braking_begins(v, starts[k] - s, law):
             acc = min(acc, laws.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
             k += 1
@@ -194,7 +195,8 @@ class Follower(Steering):
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
         if acc < free or must_slow:
-            acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), law))
+            z = max(z, self._leading(car, lane))
+            acc = min(acc, laws.drive(v, limit, car.advice, z, law))
             self.command(car, v + max(acc, -law.b_max) * law.dt)
         else:
             super().release(car)
