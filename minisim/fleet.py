@@ -1,0 +1,258 @@
+"""Fleets: vehicle types with their shares, ready types, and passenger car units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from minisim.errors import InputError, choice, instance, number, numbers, show
+from minisim.junction.movements import ARM_NAMES
+from minisim.parameters import Takes, checked, declared
+from minisim.streams import Draws
+from minisim.vehicle import CruiseVehicle, VehicleType
+
+Ints = npt.NDArray[np.int64]
+
+#: Shares may miss 1 by this much, through rounding.
+ROUNDING = 1e-6
+
+#: Sizes of vehicles on Indian roads (Chandra, Kumar 2003, Journal of Transportation Engineering
+#: 129:155, table 1). What they can do is SUMO's default for the class (page "Vehicle Type Parameter
+#: Defaults"), with three exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
+#: a vehicle whose comfortable braking is 10 m/s², so it drives like a car. There is no class for
+#: auto-rickshaws: their acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
+#: Moratuwa, handle 123/19055), their brakes are those of heavy vehicles.
+_INDIAN = (
+    VehicleType(name="motorcycle", length=1.87, width=0.64),
+    VehicleType(
+        name="auto-rickshaw", length=3.2, width=1.4,
+        acceleration=1.88, deceleration=4.0, max_deceleration=7.0,
+    ),
+    VehicleType(name="car", length=3.72, width=1.44),
+    VehicleType(name="lcv", length=6.1, width=2.1),
+    VehicleType(
+        name="bus", length=10.1, width=2.43,
+        acceleration=1.2, deceleration=4.0, max_deceleration=7.0,
+    ),
+    VehicleType(
+        name="truck", length=7.5, width=2.35,
+        acceleration=1.3, deceleration=4.0, max_deceleration=7.0,
+    ),
+)  # fmt: skip
+
+#: SUMO's defaults for its vehicle classes, read from SUMO 1.28 itself. Its motorcycle, moped and
+#: bicycle are missing: the IDM asks for more than their brakes can do, or they share lanes.
+_SUMO = (
+    VehicleType(name="sumo-passenger"),
+    VehicleType(name="sumo-delivery", length=6.5, width=2.16),
+    VehicleType(
+        name="sumo-bus", length=12.0, width=2.5,
+        acceleration=1.2, deceleration=4.0, max_deceleration=7.0,
+    ),
+    VehicleType(
+        name="sumo-coach", length=14.0, width=2.6,
+        acceleration=2.0, deceleration=4.0, max_deceleration=7.0,
+    ),
+    VehicleType(
+        name="sumo-truck", length=7.1, width=2.4,
+        acceleration=1.3, deceleration=4.0, max_deceleration=7.0,
+    ),
+    VehicleType(
+        name="sumo-trailer", length=16.5, width=2.55,
+        acceleration=1.1, deceleration=4.0, max_deceleration=7.0,
+    ),
+)  # fmt: skip
+
+#: The ready types by name.
+TYPES: Mapping[str, VehicleType] = {it.name: it for it in (*_INDIAN, *_SUMO)}
+
+
+def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
+    types = tuple(value) if isinstance(value, list | tuple) else (value,)
+    for it in types:
+        instance(title, it, VehicleType)
+    if not types:
+        raise InputError(f"{title}: a fleet needs at least one type")
+    names = [it.name for it in types]
+    if again := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{title}: the name {show(again[0])} stands for two types")
+    if len(types) > 1 and any(isinstance(it, CruiseVehicle) or it.sumo for it in types):
+        raise InputError(f"{title}: vehicles that drive like SUMO's (sumo=…) cannot be mixed")
+    if len({it.model for it in types}) > 1:
+        raise InputError(f"{title}: all need the same car-following model")
+    return types
+
+
+def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
+    rows = value if isinstance(value, list | tuple) else (value,)
+    return tuple(
+        numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
+        for i, row in enumerate(rows)
+    )
+
+
+@declared
+class Fleet:
+    """Which types of vehicles drive, and how many of each.
+
+    A vehicle's type is drawn by its lane and its place there, so it depends on nothing
+    else.
+    """
+
+    types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(
+        "of vehicles", _types, "VehicleTypes of one model"
+    )
+    shares: Takes[
+        tuple[tuple[float, ...], ...], float | Sequence[float | Sequence[float]]
+    ] = checked(
+        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers ≥ 0",
+        default=((1.0,),),
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        if len(self.shares) != len(self.types):
+            raise InputError(f"{len(self.types)} types need as many shares, got {self.shares}")
+        counts = {len(row) for row in self.shares}
+        if len(counts - {1}) > 1:
+            raise InputError(f"shares by lane need a number per lane, got {self.shares}")
+        for lane in range(max(counts)):
+            for share in (row := self.of_lane(lane)):
+                number("share of a type", share, low=0, high=1)
+            if abs(sum(row) - 1.0) > ROUNDING:
+                where = f" on lane {ARM_NAMES[lane]}" if max(counts) > 1 else ""
+                given = ", ".join(
+                    f"{it.name}: {x:g}" for it, x in zip(self.types, row, strict=True)
+                )
+                raise InputError(f"shares{where} must sum to 1, got {sum(row):g} ({given})")
+
+    def of_lane(self, lane: int) -> tuple[float, ...]:
+        """The shares of the types on a lane."""
+        return tuple(row[min(lane, len(row) - 1)] for row in self.shares)
+
+    def check(self, n: int) -> None:
+        """Raise `InputError` for shares by lane unless there are `n` lanes."""
+        for row in self.shares:
+            if len(row) not in (1, n):
+                raise InputError(f"the fleet has shares for {len(row)} lanes, the junction has {n}")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the types."""
+        return tuple(it.name for it in self.types)
+
+    @cached_property
+    def worst(self) -> VehicleType:
+        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
+
+        With one type it is that type.
+        """
+        first, *others = self.types
+        if not others:
+            return first
+        least = ("acceleration", "deceleration", "max_deceleration")
+        most = ("length", "width", "headway", "min_gap", "speed_deviation")
+        bound = {key: min(getattr(it, key) for it in self.types) for key in least}
+        bound |= {key: max(getattr(it, key) for it in self.types) for key in most}
+        return replace(first, name="the worst of the fleet", **bound)
+
+    def drawn(self, lane: Ints, rank: Ints, seed: int) -> Ints:
+        """Index of the type of each vehicle, shape (k,), by its lane and its place there."""
+        if len(self.types) == 1:
+            return np.zeros(len(lane), int)
+        draws = Draws(seed, "types")
+        bounds = [np.cumsum(self.of_lane(i)) for i in range(lane.max(initial=0) + 1)]
+        last = len(self.types) - 1
+        return np.array([
+            min(int(bounds[i].searchsorted(draws.uniform(i, r), side="right")), last)
+            for i, r in zip(lane.tolist(), rank.tolist(), strict=True)
+        ], int)  # fmt: skip
+
+    def indices(self, names: npt.NDArray[np.str_]) -> Ints:
+        """The indices of named types; `InputError` for a name that is not in the fleet."""
+        known = {name: k for k, name in enumerate(self.names)}
+        return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
+
+
+def fleet_named(value: Any, base: VehicleType) -> Fleet:
+    """The fleet that a value means; its vehicles follow others by the law of `base`.
+
+    Args:
+        value: a Fleet or VehicleType, kept unchanged; or the shares of `TYPES`, as a table such as
+            `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
+            such as "car:0.8,bus:0.2".
+        base: its law drives the vehicles of a table or text.
+
+    Raises:
+        InputError: an unknown type (with the nearest), shares that do not sum to 1, or a `base`
+            under cruise control or with SUMO's rules.
+    """
+    if isinstance(value, Fleet):
+        return value
+    if isinstance(value, VehicleType):
+        return Fleet((value,))
+    wanted = "shares of vehicle types such as car:0.8,bus:0.2"
+    if isinstance(value, str):
+        pairs = [part.rpartition(":") for part in value.split(",")]
+        try:
+            value = {name.strip(): float(share) for name, _, share in pairs}
+        except ValueError:
+            raise InputError(f"fleet must be {wanted}, got {show(value)}") from None
+        if len(value) < len(pairs):
+            raise InputError("fleet names a vehicle type twice")
+    if not isinstance(value, Mapping) or not value:
+        raise InputError(f"fleet must be {wanted}, got {show(value)}")
+    if base.sumo is not None:
+        raise InputError("a fleet needs the profile paper or fair, not with SUMO's vehicles")
+    types = [TYPES[choice("vehicle type", name, TYPES)] for name in value]
+    return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
+
+
+#: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
+#: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
+#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and has no
+#: motorcycles or auto-rickshaws.
+PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "IRC:106": {
+        "motorcycle": (0.5, 0.75), "auto-rickshaw": (1.2, 2.0), "car": (1.0, 1.0),
+        "lcv": (1.4, 2.0), "bus": (2.2, 3.7), "truck": (2.2, 3.7),
+    },
+    "IRC:64": {
+        "motorcycle": (0.5, 0.5), "auto-rickshaw": (1.0, 1.0), "car": (1.0, 1.0),
+        "lcv": (1.5, 1.5), "bus": (3.0, 3.0), "truck": (3.0, 3.0),
+    },
+    "HCM": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
+}  # fmt: skip
+
+#: SUMO's classes count as the types that they stand for.
+_ALIKE = {
+    "sumo-passenger": "car", "sumo-delivery": "lcv", "sumo-bus": "bus", "sumo-coach": "bus",
+    "sumo-truck": "truck", "sumo-trailer": "truck",
+}  # fmt: skip
+
+
+def pcu_factors(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> tuple[float, ...]:
+    """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
+
+    Where a source has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
+    interpolated. Raises `InputError` for a source or a type without a factor.
+    """
+    table = PCU[choice("source of passenger car units", source, PCU)]
+    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
+    if len(fleet.types) == 1:  # the unit is defined by cars alone
+        return (1.0,)
+    kinds = [_ALIKE.get(name, name) for name in fleet.names]
+    rows = [table[choice(f"vehicle type in {source}", kind, table)] for kind in kinds]
+    return tuple(
+        float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)
+    )
+
+
+def mean_pcu(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> float:
+    """Passenger car units of the mean vehicle, over `n` lanes with the same inflow."""
+    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
+    return float(np.dot(pcu_factors(fleet, source, n), shares))
