@@ -201,6 +201,20 @@ def follow(v: float, v0: float, z: float, me: Traits, law: Law) -> float:
 
 
 @njit_inline
+def drive(v: float, limit: float, advice: float, z: float, me: Traits, law: Law) -> float:
+    """The acceleration that the law gives at a speed limit and an advised speed.
+
+    A vehicle that is too fast for the advice brakes at b at most, unless its leader alone asks for
+    more: the IDM would add both.
+    """
+    acc = within(v, follow(v, limit, z, me, law), limit, law)
+    if advice < limit:
+        told = within(v, follow(v, advice, z, me, law), advice, law)
+        acc = min(acc, max(told, -me.b))
+    return acc
+
+
+@njit_inline
 def within(v: float, acc: float, limit: float, law: Law) -> float:
     """`acc`, unless a step of it would take a vehicle past its speed limit.
 
@@ -258,7 +272,8 @@ def hold(v: float, s: float, me: Traits, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
     The vehicle brakes comfortably for its hold line, no earlier than it must. If that does not
-    suffice, it brakes as hard as it must to stop before the junction.
+    suffice, it brakes comfortably to stop before the junction, and if that does not, as hard as it
+    must.
     """
     to_line = law.hold - s
     if law.sumo and law.model == KRAUSS:
@@ -271,10 +286,10 @@ def hold(v: float, s: float, me: Traits, law: Law) -> float:
             return 0.0
         v_new = speed_towards(v, 0.0, distance, me.b, law.dt)
         return (v_new - v) / law.dt if v_new > 0.0 else -v * v / (2.0 * max(distance, 1e-6))
-    if v * v <= 2.0 * me.b * to_line:
+    to_junction = law.entry - s
+    if v * v <= 2.0 * me.b * to_junction:
         return -me.b
-    to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
-    return -max(me.b, v * v / (2.0 * to_junction))
+    return -v * v / (2.0 * max(to_junction - STOP_MARGIN, 1e-6))
 
 
 @njit
@@ -297,6 +312,6 @@ def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float
     if needed <= distance:
         v_new = stepwise_towards(0.0, distance, b, dt) if distance >= STILL else 0.0
         return (v_new - v) / dt
-    if needed <= to_line:
+    if needed <= to_entry:
         return -b
-    return -max(b, v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6)))
+    return -v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6))

@@ -49,14 +49,18 @@ class Frames:
         self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
         human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
         self.human = human[frame["vehicle"].to_numpy()]
+        harmed = np.full(len(human), np.inf)
+        for collision in run.collisions:
+            for vehicle in collision.vehicles:
+                harmed[vehicle] = min(harmed[vehicle], collision.time)
+        self.harmed = harmed[frame["vehicle"].to_numpy()]
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
         shown, first = np.unique(ticks, return_index=True)
         bounds = np.append(first, len(ticks)).tolist()
         parts = [slice(*ends) for ends in pairwise(bounds)]
         self._steps: dict[int, slice] = dict(zip(shown.tolist(), parts, strict=True))
         self.busiest = float(shown[int(np.argmax(np.diff(bounds)))] * site.dt)
-        crashed = np.isin(frame["vehicle"], [v for c in run.collisions for v in c.vehicles])
-        gone = frame[(self.s > clear) & ~crashed].groupby("vehicle")["time_s"].min()
+        gone = frame[(self.s > clear) & np.isinf(self.harmed)].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
@@ -117,6 +121,15 @@ class Frames:
             shapes = lamp - np.stack([behind, sides * half], axis=-1)[:, None]
             lamps += list(drawing.place(shapes, self.x[rows], self.y[rows], self.angle[rows]))
         return lamps
+
+    def crossed_out(self, rows: Rows, time: float) -> list[Floats]:
+        """Two strokes across each of these vehicles that has collided."""
+        vehicle = self.run.site.vehicle
+        half = vehicle.width / 2.0
+        rows = rows[self.harmed[rows] <= time + self.run.site.dt / 2.0]
+        where = (self.x[rows], self.y[rows], self.angle[rows])
+        strokes = (np.array([(0.0, y), (-vehicle.length, -y)]) for y in (half, -half))
+        return [stroke for shape in strokes for stroke in drawing.place(shape, *where)]
 
     def crashes(self, time: float) -> list[Floats]:
         """A ring around each recent collision."""

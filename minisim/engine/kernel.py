@@ -22,13 +22,12 @@ from minisim.laws import (
     Law,
     braking_begins,
     closeness,
-    follow,
+    drive,
     hold,
     keep_room,
     room_behind,
     short_of,
     slow_down,
-    within,
 )
 
 #: Reasons to return, as bits.
@@ -168,7 +167,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
 
             section, factor = me["section"], me["factor"]
             limit = speed[p, section] * factor
-            acc = within(v, follow(v, min(limit, me["advice"]), z, mine, law), limit, law)
+            acc = drive(v, limit, me["advice"], z, mine, law)
             k = section + 1
             while braking_begins(v, start[p, k] - s, mine, law):
                 lower = speed[p, k] * factor

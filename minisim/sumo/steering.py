@@ -172,7 +172,8 @@ class Follower(Steering):
         law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
-        v0 = min(speeds[section] * car.factor, car.advice)
+        limit = speeds[section] * car.factor
+        v0 = min(limit, car.advice)
         k = section + 1
         slower = laws.braking_begins(v, starts[k] - s, me, law)
         held = held and near(v, law.hold - s, me, law)
@@ -182,8 +183,8 @@ class Follower(Steering):
         if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
             super().release(car)
             return
-        free = laws.follow(v, v0, 0.0, me, law)
-        acc = laws.follow(v, v0, z, me, law)
+        free = laws.drive(v, limit, car.advice, 0.0, me, law)
+        acc = laws.drive(v, limit, car.advice, z, me, law)
         while laws.braking_begins(v, starts[k] - s, me, law):
             lower = speeds[k] * car.factor
             acc = min(acc, laws.slow_down(v, acc, lower, starts[k] - s, me, law))
@@ -193,7 +194,8 @@ class Follower(Steering):
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
         if acc < free or must_slow:
-            acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), me, law))
+            z = max(z, self._leading(car, lane))
+            acc = min(acc, laws.drive(v, limit, car.advice, z, me, law))
             self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
             super().release(car)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import pytest
 
@@ -11,7 +12,9 @@ from minisim.laws import (
     Law,
     build_law,
     closeness,
+    drive,
     follow,
+    hold,
     insertable,
     room_behind,
     stop_at_line,
@@ -54,6 +57,31 @@ def test_a_vehicle_ahead_counts_more_the_closer_it_is(model: str) -> None:
 @pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
 def test_a_desired_speed_of_zero_is_comfortable_braking(model: str) -> None:
     assert follow(10.0, 0.0, 0.0, CAR, law(model)) == pytest.approx(-4.5)
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+def test_advice_adds_nothing_to_hard_braking_for_a_leader(model: str) -> None:
+    """The IDM would add both: V2I-C's vehicles braked at 8.7 m/s² behind leaders 17 m ahead."""
+    for v, advice, gap in product((2.0, 7.0, 14.0), (0.0, 1.0, 6.5, 13.0), (5.0, 17.0, 40.0)):
+        z = closeness(v, gap, 2.5, CAR, law(model))
+        acc, alone = (drive(v, 14.0, told, z, CAR, law(model)) for told in (advice, math.inf))
+        assert min(alone, -4.5) <= acc <= alone
+        assert acc <= max(follow(v, advice, 0.0, CAR, law(model)), -4.5) + 1e-9
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+def test_no_step_passes_an_advised_speed(model: str) -> None:
+    coarse = law(model)._replace(dt=0.5)
+    for v, advice in ((0.0, 0.5), (0.3, 0.5), (1.5, 2.0), (3.9, 4.0)):
+        assert v + 0.5 * drive(v, 14.0, advice, 0.0, CAR, coarse) <= advice + 1e-9
+
+
+@pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
+def test_a_vehicle_that_rolled_off_and_is_held_again_brakes_comfortably(model: str) -> None:
+    """0.2 m before the junction at 0.5 m/s, it braked with all that its brakes had."""
+    held = law(model)
+    assert hold(0.5, held.entry - 0.2, CAR, held) == pytest.approx(-4.5)
+    assert hold(3.0, held.entry - 0.6, CAR, held) < -9.0, "it could not stop in time"
 
 
 @pytest.mark.parametrize("name", MODELS)
