@@ -11,6 +11,6 @@ Networks are read as they are; an extract of OpenStreetMap goes through netconve
 
 from __future__ import annotations
 
-from minisim.town.surveying import Survey, read_junction, survey
+from minisim.town.surveying import Survey, read_junction, survey, survey_of
 
-__all__ = ["Survey", "read_junction", "survey"]
+__all__ = ["Survey", "read_junction", "survey", "survey_of"]

@@ -45,6 +45,11 @@ class Survey(NamedTuple):
     misfit: float = 0.0  #: largest distance of a lane near the junction from its modelled lane [m]
 
     @property
+    def single(self) -> bool:
+        """Whether it has 3 or more arms, and one lane for cars per direction on each."""
+        return len(self.arms) >= 3 and all(it.lanes == 1 for arm in self.arms for it in arm.edges)
+
+    @property
     def verdict(self) -> str:
         """All of that in a line."""
         if self.intersection is None:
@@ -54,6 +59,16 @@ class Survey(NamedTuple):
 
 def read_junction(path: AnyPath, node: str | None = None, side: str | None = None) -> Intersection:
     """The intersection at a node of a network or of an extract of OpenStreetMap.
+
+    Arguments and errors are those of `survey_of`.
+    """
+    made = survey_of(path, node, side).intersection
+    assert made is not None
+    return made
+
+
+def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -> Survey:
+    """What the simulator makes of a node that it can say.
 
     Args:
         path: SUMO's network (.net.xml, perhaps packed by gzip), or an extract (.osm).
@@ -89,7 +104,7 @@ def read_junction(path: AnyPath, node: str | None = None, side: str | None = Non
         found = possible[0]
     if found.intersection is None:
         raise InputError(f"node {found.node.id} of {path} cannot be read: {found.problem}")
-    return found.intersection
+    return found
 
 
 def survey(path: AnyPath, side: str | None = None) -> tuple[Survey, ...]:
@@ -127,7 +142,8 @@ def survey_node(town: Town, node: str) -> Survey:
     """What the simulator makes of one node."""
     place, arms = town.nodes[node], arms_of(town, node)
     if len(arms) < 3:
-        return Survey(place, tuple(arms), None, f"{len(arms)} arms for cars; 3 or more are needed")
+        problem = f"{len(arms) or 'no'} arm{'s' * (len(arms) != 1)} for cars; 3 are needed"
+        return Survey(place, tuple(arms), None, problem)
     if len(arms) > len(ARM_NAMES):
         return Survey(place, tuple(arms), None, f"{len(arms)} arms; at most {len(ARM_NAMES)}")
     centre = centre_of(place, arms)
@@ -165,7 +181,7 @@ def _modelled(
     short = [
         f"{name} ({_reach(town, arm):.0f} m)"
         for name, arm in zip(ARM_NAMES, arms, strict=False)
-        if _reach(town, arm) < SHORTEST
+        if _reach(town, arm) < SHORTEST - 0.5
     ]
     if short:
         notes.append(f"roads lengthened to {SHORTEST:g} m: {', '.join(short)}")

@@ -34,8 +34,9 @@ def animate(
     split: options.Split = None,
     turns: options.Turns = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
@@ -57,7 +58,7 @@ def animate(
     frame_times(begin, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
-        profile=profile, side=side, horizon=horizon,
+        profile=profile, side=side, node=node, horizon=horizon,
     )  # fmt: skip
     who = controller_named(controller, profile)
     recipe = Recipe(junction, who, seed, humans, on_collision="record")

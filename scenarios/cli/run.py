@@ -34,8 +34,9 @@ def run(
     split: options.Split = None,
     turns: options.Turns = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     warmup: Annotated[float, option("Measure nothing before it.", "S")] = 0.0,
@@ -86,7 +87,7 @@ def run(
         raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
-        profile=profile, side=side, horizon=horizon, warmup=warmup,
+        profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans,

@@ -26,7 +26,8 @@ def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> A
 
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom.")
+    str,
+    typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom; or a file."),
 ]
 ControllerName = Annotated[
     str, option("What decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
@@ -40,7 +41,8 @@ Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
+Side = Annotated[str | None, option("Of the traffic: left (the default) or right.", "SIDE")]
+Node = Annotated[str | None, option("Of a town's network; see minisim junction.", "ID")]
 Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
