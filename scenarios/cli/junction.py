@@ -23,9 +23,9 @@ _KMH = 3.6
 
 
 @app.command(
-    epilog="A network of SUMO (.net.xml, perhaps .gz), or an extract of OpenStreetMap (.osm), which "
-    "netconvert reads (extra sumo). A junction of one lane per direction on 3 or more arms can be "
-    "simulated.\n\n[bold]Examples[/bold]\n\n"
+    epilog="Reads a network of SUMO (.net.xml, perhaps .gz), or an extract of OpenStreetMap, which "
+    "netconvert reads (extra sumo). Junctions of 3 or more arms, one lane per direction, can "
+    "be simulated.\n\n[bold]Examples[/bold]\n\n"
     "minisim junction town.net.xml --list\n\n"
     "minisim junction town.net.xml --node 252016277 --save junction.toml\n\n"
     "minisim run junction.toml -d 150\n\nminisim run town.net.xml --node 252016277 -d 150"
