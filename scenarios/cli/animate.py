@@ -36,9 +36,10 @@ def animate(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
     lane_width: options.LaneWidth = None,
+    node: options.Node = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
@@ -61,7 +62,7 @@ def animate(
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon,
+        profile=profile, side=side, node=node, horizon=horizon,
     )  # fmt: skip
     who = controller_named(controller, profile)
     recipe = Recipe(junction, who, seed, humans, on_collision="record")

@@ -44,7 +44,9 @@ def crossval(
     context: typer.Context,
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENARIO]...", help="three-way, four-way, five-way or N-way."),
+        typer.Argument(
+            metavar="[SCENARIO]...", help="three-way, four-way, five-way, N-way, or a file."
+        ),
     ] = None,
     controller: Annotated[
         list[str] | None,
@@ -70,6 +72,7 @@ def crossval(
         option("Replay published runs: their arrivals, vehicles and controllers; compare with the "
                "paper too. With another --profile only the arrivals are theirs.", None, "--replay"),
     ] = False,
+    node: options.Node = None,
     jobs: options.Jobs = None,
     out: options.Folder = Path("out/crossval"),
     quick: options.Quick = False,
@@ -93,10 +96,12 @@ def crossval(
     if replay:
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
+        if node is not None:
+            raise InputError("--node does not go with --replay: published junctions are no towns'")
         cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon)
     else:
         profile = "fair" if profile is None else profile
-        make = partial(scenario_named, profile=profile, horizon=horizon)
+        make = partial(scenario_named, node=node, profile=profile, horizon=horizon)
         cells = product(scenarios or ["four-way"], splits, who, densities)
         cases = [Case(make(name, density=q, split=shares), it) for name, shares, it, q in cells]
     count = (2 if quick else 3) if seeds is None else integer("--seeds", seeds, low=1, high=1000)

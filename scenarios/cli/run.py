@@ -36,9 +36,10 @@ def run(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
     lane_width: options.LaneWidth = None,
+    node: options.Node = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     warmup: Annotated[float, option("Measure only after this.", "S")] = 0.0,
@@ -90,7 +91,7 @@ def run(
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon, warmup=warmup,
+        profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans,
