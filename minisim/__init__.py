@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 from minisim.version import __version__
 
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals, Demand
+    from minisim.arrivals import Arrivals
+    from minisim.demand import Demand, DemandProfile, Period
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
     from minisim.vehicle import VehicleType
 
 _NAMES = {
-    "minisim.arrivals": ("Arrivals", "Demand"),
+    "minisim.arrivals": ("Arrivals",),
+    "minisim.demand": ("Demand", "DemandProfile", "Period"),
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
@@ -41,9 +43,11 @@ _NAMES = {
 __all__ = [
     "Arrivals",
     "Demand",
+    "DemandProfile",
     "Intersection",
     "MinisimError",
     "Movement",
+    "Period",
     "Run",
     "Simulation",
     "VehicleType",

@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
 Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
-`streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the engine, the
-hosts or the results; `make lint` checks this.
+`streams`, `inflow`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
+engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from minisim.errors import InputError, instance, number, printable
+from minisim.inflow import Inflow
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
@@ -45,9 +46,13 @@ class Site:
     intersection: Intersection = part("its geometry", Intersection)
     vehicle: VehicleType = part("the vehicles' type", VehicleType)
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
-    demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
+    demand: tuple[float, ...] = reals("expected inflow of each lane, mean over the run", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
+    inflow: Inflow | None = part(
+        "expected by time of the run; none if it is always `demand`", Inflow,
+        optional=True, default=None,
+    )  # fmt: skip
 
     @property
     def looks_out(self) -> bool:
@@ -61,6 +66,8 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
+        if self.inflow is not None and len(self.inflow.rates[0]) != self.intersection.n:
+            raise InputError(f"inflow must have {self.intersection.n} lanes, got {self.inflow}")
         room = self.intersection.approach_length
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
@@ -74,6 +81,10 @@ class Site:
                 f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
                 "touch another that waits beside it"
             )
+
+    def expected(self, start: float, end: float) -> tuple[float, ...]:
+        """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
+        return self.demand if self.inflow is None else self.inflow.mean(start, end)
 
     @cached_property
     def conflicts(self) -> Bools:

@@ -14,6 +14,7 @@ AXES: dict[str, Any] = {
     "turns": "uniform",
     "density": 350.0,
     "arrivals": None,
+    "demand": None,
     "controller": "dim",
     "humans": 0.0,
     "seeds": 10,
@@ -21,7 +22,7 @@ AXES: dict[str, Any] = {
 
 #: Key with one value for a block -> its default.
 SINGLE: dict[str, Any] = {
-    "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+    "horizon": None, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
     "metrics": (), "start": None,
 }  # fmt: skip
 

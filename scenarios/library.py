@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.demand import Demand, DemandProfile, Turns
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Way
@@ -31,7 +32,8 @@ class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
     A profile may be given by name, and shares of lanes (`split`) and of manoeuvres (`turns`) as
-    numbers or as a text such as "4:3:2:1".
+    numbers or as a text such as "4:3:2:1". A `demand` by time of day replaces all that says how
+    many vehicles come; a run of it lasts until its end, unless there is a `horizon`.
     """
 
     name: str
@@ -41,19 +43,20 @@ class Options(TypedDict, total=False):
     arm_length: float
     ways: tuple[Way, ...] | None
     split: str | Sequence[float] | None
-    turns: str | Sequence[float] | None
+    turns: Turns
     model: str
     min_headway: float
     profile: str | Profile
     horizon: float
     warmup: float
     recorded: Arrivals | None
+    demand: DemandProfile
 
 
 #: Mean inflow per lane by default [veh/h].
 DENSITY = 350.0
 
-#: Keywords that recorded arrivals replace.
+#: Keywords that recorded arrivals replace, and a demand by time of day.
 DRAWN = ("density", "split", "turns", "model", "min_headway")
 
 _PARTS = (Intersection, Demand, Scenario)
@@ -117,9 +120,10 @@ def from_bearings(
         choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     if density is not None:
         given["density"] = density
-    clash = [key for key in DRAWN if key in given]
-    if given.get("recorded") is not None and clash:
-        raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
+    for whole in ("recorded", "demand"):
+        if given.get(whole) is not None:
+            refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
+    day = given.pop("demand", None)
     if "min_headway" in given and given.get("model") != "shifted":
         raise InputError("min_headway goes with the model 'shifted'")
     given["profile"] = profile_named(given.get("profile", "paper"))
@@ -127,11 +131,20 @@ def from_bearings(
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in _PARTS
     )
+    if day is not None:
+        instance("demand", day, DemandProfile)
+        rest = {"horizon": day.duration, **rest}
     return Scenario(
         intersection=Intersection(bearings=numbers("bearings", bearings), **geometry),
-        demand=Demand(**{"density": DENSITY, **demand}),
+        demand=day or Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
+
+
+def refuse_beside(whole: str, others: Iterable[str]) -> None:
+    """Raise `InputError` for other options beside one that replaces them."""
+    if clash := [other for other in others if other != whole]:
+        raise InputError(f"{whole} replaces {', '.join(clash)}; give one or the other")
 
 
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:

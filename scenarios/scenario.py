@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.clock import clock
 from minisim.control import Site
+from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, number
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
-from minisim.recorded import clock
 from scenarios.profiles import PAPER, Profile
 
 
@@ -17,7 +18,7 @@ class Scenario:
 
     name: str = text('such as "four-way"', label="scenario name")
     intersection: Intersection = part("the geometry", Intersection)
-    demand: Demand = part("what to draw arrivals from", Demand)
+    demand: Demand | DemandProfile = part("what to draw arrivals from", (Demand, DemandProfile))
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
@@ -33,9 +34,7 @@ class Scenario:
     def __post_init__(self) -> None:
         number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
-        self.demand.rates(n)
-        if self.demand.turns is not None and len(self.demand.turns) != n - 1:
-            raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        self.demand.check(n, self.horizon)
         if self.recorded is not None:
             self.recorded.check(n)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
@@ -58,7 +57,9 @@ class Scenario:
     @property
     def density(self) -> float:
         """Mean inflow per lane [veh/h], as demanded or as recorded."""
-        return self.demand.density if self.recorded is None else sum(self.rates) / len(self.rates)
+        if self.recorded is None and isinstance(self.demand, Demand):
+            return self.demand.density
+        return sum(self.rates) / len(self.rates)
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -66,10 +67,11 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        return self.demand.rates(n)
+        return self.demand.inflow(n).mean(0.0, self.horizon)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
+        varies = self.recorded is None and isinstance(self.demand, DemandProfile)
         return Site(
             intersection=self.intersection,
             vehicle=self.profile.vehicle,
@@ -77,6 +79,7 @@ class Scenario:
             demand=self.rates,
             dt=self.profile.dt,
             seed=seed,
+            inflow=self.demand.inflow(self.intersection.n) if varies else None,
         )
 
     def arrivals(self, seed: int) -> Arrivals:

@@ -87,8 +87,8 @@ def sweep(
     ] = None,
 ) -> None:
     """Run many experiments over seeds, and keep the results; stored runs are not repeated."""
-    from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
+    from minisim.inflow import MAX_TIME
     from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.sweep.cells import cells
     from scenarios.sweep.cluster import cluster

@@ -48,7 +48,7 @@ ProfileName = Annotated[
 Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
 Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
-Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
+Horizon = Annotated[float | None, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
     typer.Option(
@@ -75,8 +75,14 @@ Arrivals = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
+DemandFile = Annotated[
+    Path | None,
+    option("Draw from these rates by time of day.", "FILE", "--demand", parser=_file_name,
+           rich_help_panel=FILES),
+]  # fmt: skip
+
 Start = Annotated[
-    str | None, option("Begin at this time in the table.", "07:00", rich_help_panel=FILES)
+    str | None, option("Begin at this time of the file.", "07:00", rich_help_panel=FILES)
 ]
 
 
@@ -98,18 +104,24 @@ def build_scenario(
     bearings: str | None,
     arrivals: Path | None = None,
     start: str | None = None,
+    demand: Path | None = None,
     **options: Any,
 ) -> Scenario:
     """The scenario that the options describe; None is an option not given."""
+    from minisim.demandfile import read_demand
     from minisim.recorded import read_arrivals
-    from scenarios.library import scenario_named
+    from scenarios.library import refuse_beside, scenario_named
 
     given = {key: value for key, value in options.items() if value is not None}
-    clash = [f"--{key}" for key in ("density", "split", "turns") if key in given]
-    if arrivals is not None and clash:
-        raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
-    if arrivals is None and start is not None:
-        raise InputError("--start goes with --arrivals: it is a time in the table")
+    drawn = [f"--{key}" for key in ("density", "split", "turns") if key in given]
+    if demand is not None:
+        refuse_beside("--demand", drawn)
+        given["demand"] = read_demand(demand, start)
+        drawn = ["--demand"]
+    if arrivals is not None:
+        refuse_beside("--arrivals", drawn)
+    elif demand is None and start is not None:
+        raise InputError("--start goes with --arrivals or --demand: it is a time of day there")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if arrivals is None:
         return made

@@ -362,6 +362,24 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
         assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
 
 
+def test_a_run_draws_from_demand_by_time_of_day(capsys: Captured, tmp_path: Path) -> None:
+    day = tmp_path / "day.toml"
+    quarter = '[[period]]\nstart = "07:{}"\nend = "07:{}"\nrates = [{}, 0, 0]\nturns = "1:0"\n'
+    day.write_text(quarter.format("00", "15", 800) + quarter.format("15", "20", 0))
+    run = ("run", "three-way", "--demand", str(day), "--no-safety")
+    whole = answer(capsys, *run, "--by", "movement")
+    assert whole["horizon_s"] == 1200.0
+    assert whole["density"] == pytest.approx(200)
+    assert whole["trips"] == whole["movements"]["a1"]["trips"] == 200
+    assert answer(capsys, *run, "--start", "07:15")["trips"] == 0
+    assert answer(capsys, *run, "--horizon", "450")["trips"] == 91
+    assert "before the run of 3600 s" in fails(capsys, *run, "--horizon", "3600")
+    assert "--demand replaces --density" in fails(capsys, *run, "-d", "350")
+    assert "--arrivals replaces --demand" in fails(capsys, *run, "--arrivals", "x.csv")
+    film = ("animate", "three-way", "--demand", str(day), "-o", str(tmp_path / "film.gif"))
+    assert "--from [s] must be at least 0 and below 1200" in fails(capsys, *film, "--from", "1200")
+
+
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
     what = "animate four-way --from 60 --seconds 2 --fps 5 --density 400 -o"
