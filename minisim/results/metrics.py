@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
     "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
-    "movements", "pairs", "profile", "recipe", "runs", "scenario", "seed", "side", "split",
-    "too_short", "turns", "vehicle", "version", "warmup_s",
+    "movements", "pairs", "profile", "recipe", "runs", "scenario", "seed", "side", "spillback_s",
+    "split", "too_short", "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
 
 #: What trips can be grouped by -> the groups' key in a summary.

@@ -20,6 +20,7 @@ from minisim.results.metrics import (
     Metric,
     asked_metrics,
 )  # fmt: skip
+from minisim.results.spillback import spillback
 from minisim.results.trips import Ints, Trips
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ def summarise(
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
     complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds, by kind
-    (`kinds`).
+    (`kinds`). `spillback_s`, of each lane and of all, is when a queue first reached the end of its
+    road (`minisim.results.spillback`), None if none did.
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
@@ -71,6 +73,7 @@ def summarise(
     not recorded, a metric whose function raises or returns the wrong type or shape, or a count of
     the controller's with the name of another number.
     """
+    full = spillback(run.columns, run.site.vehicle, float(run.scenario.warmup))
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
@@ -80,7 +83,9 @@ def summarise(
     complete = summary.pop("complete")
     for key in ("lanes", *(["kinds"] if run.kinds else []), *keys):
         summary[key] = {name: measured.of(rows) for name, rows in _groups(run, key).items()}
-    summary["complete"] = complete
+    for lane, name in enumerate(summary["lanes"]):
+        summary["lanes"][name]["spillback_s"] = full.get(lane)
+    summary |= {"complete": complete, "spillback_s": min(full.values(), default=None)}
     summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":

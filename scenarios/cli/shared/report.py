@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
-from minisim.results.show import conditions
+from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS
 
@@ -40,6 +40,8 @@ def run_parts(
     what = f"{summary['scenario']}, {summary['controller']}"
     yield Text.assemble((what, "bold"), f": {conditions(summary)}")
     yield _run_table(summary, metrics, by)
+    if told := spilled(summary):
+        yield Text(f"  {told}", "yellow")
     yield _safety(summary)
     if counts:
         yield Text("  " + "   ".join(_counted(name, value) for name, value in counts.items()))
@@ -135,6 +137,7 @@ def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
         unfinished = f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–"
         collisions = Text(f"{cell['collisions']:.0f}", "bold red" if cell["collisions"] else "")
         unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
+        unsettled += f"{', ' * bool(unsettled)}spill-back" if cell["spillback"] else ""
         table.add_row(*named, *means, unfinished, collisions, Text(unsettled, "yellow"))
     return table
 
@@ -146,6 +149,8 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
         f"simulate {FILLING:g} travel times or more.",
         "growing": "growing: queues had not settled by the horizon; a mean delay there says how "
         "long was simulated.",
+        "spillback": "spill-back: in a run or more, a queue reached the end of its road; vehicles "
+        "then wait before it (departure delay), not on it.",
     }
     notes = [text for key, text in meanings.items() if key in cells and cells[key].eq(True).any()]
     text = Text("\n").join(Text(f"  {note}") for note in (*notes, *_capped(experiments)))

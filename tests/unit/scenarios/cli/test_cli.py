@@ -370,7 +370,7 @@ def test_a_run_draws_from_demand_by_time_of_day(capsys: Captured, tmp_path: Path
     whole = answer(capsys, *run, "--by", "movement")
     assert whole["horizon_s"] == 1200.0
     assert whole["density"] == pytest.approx(200)
-    assert whole["trips"] == whole["movements"]["a1"]["trips"] == 200
+    assert whole["trips"] == whole["movements"]["a1"]["trips"] == 206
     assert answer(capsys, *run, "--start", "07:15")["trips"] == 0
     assert answer(capsys, *run, "--horizon", "450")["trips"] == 91
     assert "before the run of 3600 s" in fails(capsys, *run, "--horizon", "3600")
