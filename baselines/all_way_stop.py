@@ -35,11 +35,8 @@ class AllWayStop:
 
     name = Name("all-way-stop")
 
-    # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
-    # safety measures (device SSM, MDRAC).
-    reaction: float = real(
-        "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
-    )
+    # SUMO's `jmAllwayStopWait`, by default a single step; 1 s is SUMO's reaction time (SSM, MDRAC).
+    reaction: float = real("how long a driver stands", "s", low=0, high=60, default=1.0)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""
@@ -72,7 +69,7 @@ class AllWayStopSession:
         heads = self._heads(view)
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
-        # A moving head can stand as soon as comfortable braking has stopped it.
+        # A moving head can be standing once comfortable braking has stopped it.
         moving = [v.speed for v in heads if v.id not in self._standing]
         looks = [view.time + (speed - HALTING) / self._vehicle.deceleration for speed in moving]
         queue = [v for v in heads if v.id in self._standing]

@@ -1,8 +1,7 @@
-"""Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
+"""Where a vehicle will be, step by step, if it drives on as hosts move vehicles that are alike.
 
-It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.laws`). Positions are distances past the
-junction entry, negative before it.
+By the run's own law (`minisim.laws`) it follows the vehicles ahead in its lane, and those that
+enter its exit lane first. Their motion is known. Positions count from the junction entry.
 """
 
 from __future__ import annotations
@@ -93,8 +92,7 @@ def predict(
 ) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    `lane` holds the vehicles ahead in its lane, nearest first; `exit_lane` those that enter its
-    exit lane before it, in this order.
+    `lane` holds the vehicles ahead, nearest first; `exit_lane` those that enter that lane earlier.
     """
     ahead = _stacked(lane, [leader.until for leader in lane])
     entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])

@@ -12,18 +12,17 @@ The protocol:
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
   their grants, so a later grant never slows down an earlier one. The law lets a vehicle in the
-  junction follow the one before it into the exit lane as if both were on one arc. A passage on
+  junction follow the one ahead of it into the exit lane as if both were on one arc. A passage on
   which it brakes harder than is comfortable for that vehicle is refused.
 - A refused vehicle drives up to its stop line and slows down as late as is comfortable. Refused
   requests are considered again every `period`, in the order in which they were first made.
 
 Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
-their predictions, and predicts anew where they differ. A holder whose new passage no longer fits
+their predictions, and predicts again where they differ. A holder whose new passage no longer fits
 loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
-old; `buffer` covers it. Predictions come true in minisim for vehicles that are alike and follow a
-known law; all others are refused.
+old; `buffer` covers it. Vehicles that differ or follow an unknown law are refused.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ class Reservation:
     # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
     reach: float | None = real(
-        "how far before the junction vehicles ask; none is the stopping distance at the limit and "
+        "how far before the junction vehicles ask; none means stopping distance at the limit and "
         "a period's way: as late as possible without slowing down for a refusal", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
@@ -78,12 +77,13 @@ class Reservation:
         "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
         low=0, high=10, default=0.5,
     )  # fmt: skip
-    period: float = real(
-        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
-    )
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
     def start(self, site: Site) -> ReservationSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted.
+
+        A period below the host's step is refused, too.
+        """
         self.covers.check(self.name, site.vehicle)
         return ReservationSession(self, site)
 
@@ -130,16 +130,14 @@ class Manager:
         self._law = law_of(site)
         self._ways = courses(site)
         zones = conflict_zones(site.intersection, site.vehicle).tolist()
-        self._zones = [
-            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
-        ]
+        self._zones = [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
         self._rows = site.intersection.movements.rows
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int) -> Slot | None:
-        """A vehicle's passage behind the holders before it in both lanes; None if it hits one."""
+        """A vehicle's passage behind the holders ahead of it in both lanes; None if it hits one."""
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]
@@ -196,7 +194,7 @@ class ReservationSession:
             reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
         reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._dt = site.dt
         self._brakes = site.vehicle.deceleration
         self._requests: dict[int, None] = {}  # in the order of first requests

@@ -40,15 +40,14 @@ class V2IC:
         low=1, high=2000, default=200.0,
     )  # fmt: skip
     # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
-    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), at an eighth of the
-    # work.
+    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), for 1/8 of the work.
     period: float = real(
         "time between two pieces of advice while any vehicle waits", "s",
         low=0.01, high=10, default=1.0,
     )  # fmt: skip
 
     def start(self, site: Site) -> V2ICSession:
-        """Begin a run."""
+        """Begin a run; raises `InputError` for a period below the host's step."""
         return V2ICSession(self, site)
 
 
@@ -88,7 +87,7 @@ class V2ICSession:
         paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._rows = site.intersection.movements.rows
         self._limit = site.speed_limit
         self._acceleration = site.vehicle.acceleration

@@ -1,8 +1,7 @@
 """The safety monitor: a vehicle's last resort when others do not do what it thinks they intend.
 
 The decision protects vehicles that read the others' intents correctly. A monitor does not decide.
-It belongs to one vehicle, uses what that vehicle sees, and watches the others that cross or can no
-longer stop:
+It uses what its vehicle sees, and watches the others that cross or can no longer stop:
 
 - *What another may do*: the intent that was read, as long as the motion does not contradict it.
   If the other leaves every path of that reading, or was read differently before, it may do whatever
@@ -16,10 +15,9 @@ Vehicles that cross by unanimous decisions are in harmony (proved in `dim.proofs
 exact perception and `commit="stoppable"` a monitor never brakes, and a run is the same without it.
 
 Two vehicles must not brake for each other for ever. Of two that stand, the one further in goes
-first (if equal, the one from the first lane), unless the other stands in its way. Both can see
-which one that is.
+first (if equal, the one from the first lane), unless the other is in its way. Both see which it is.
 
-Nor may vehicles before the junction wait for each other for ever. If they misread each other, each
+Vehicles before the junction must not wait for each other for ever. If they misread each other, each
 may conclude that it is not its turn. But some vehicle always has the right of way. So if no vehicle
 crosses and all have stood for a while, the first lane goes alone (`Patience`).
 """
@@ -60,23 +58,19 @@ class Monitor:
         default=1.0, low=0, high=10,
     )  # fmt: skip
     # Used where it is too late to stop; longer than a vehicle at 20 km/h takes to cross.
-    look_ahead: float = real(
-        "how far ahead motion is predicted", "s", default=4.0, low=0.5, high=30
-    )
-    # The lateral error that automated driving on local streets must stay below (0.29 m; Reid et
-    # al., "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019, arXiv
-    # 1906.01061).
+    look_ahead: float = real("how far motion is predicted", "s", default=4.0, low=0.5, high=30)
+    # The lateral error of automated driving on local streets must stay below 0.29 m (Reid et al.,
+    # "Localization requirements for autonomous vehicles", SAE Int. J. CAV 2(3), 2019).
     tolerance: float = real(
         "how far beside a path a vehicle may seem to be while it is on it", "m",
         default=0.3, above=0, high=1,
     )  # fmt: skip
     # Less than 1 m/s² is no braking even on ice.
     deceleration: float | None = real(
-        "how hard it brakes at most; none is what the brakes can do", "m/s²",
+        "how hard it brakes at most; none means what the brakes can", "m/s²",
         low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
     )  # fmt: skip
-    # The longest time between two vehicles at an all-way stop is 1 … 2 s in SUMO's recommendations
-    # (`jmAllwayStopWait`).
+    # At an all-way stop, SUMO recommends 1 … 2 s between two vehicles (`jmAllwayStopWait`).
     patience: float = real(
         "how long all that take part stand before the first of them goes alone", "s",
         default=2.0, low=0.5, high=60,
@@ -135,7 +129,7 @@ class Monitors:
         self._braking = braking
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
-        """How hard the ego must brake for another, whatever that does [m/s²]; 0 if not at all."""
+        """How hard the ego must brake for another, whatever it does [m/s²]; 0 if not at all."""
         mine = self._rows[ego.lane][ego.manoeuvre]
         foes = (k for k in self._possible(other, readings) if self._conflict[mine, k])
         return max((self._asked_by(ego, mine, other, theirs) for theirs in foes), default=0.0)
@@ -162,7 +156,7 @@ class Monitors:
             stuck = not self._open(theirs, y, ego)  # the other, as long as the ego stands
             if first or stuck:
                 return 0.0
-        if self._passes_first(ego, other, shared, mirrored):
+        if self._goes_first(ego, other, shared, mirrored):
             return 0.0
         if not first and stopping_distance(ego.speed, self._b_max) + ROOM <= ego.distance:
             room = min(room, ego.distance)  # where it blocks no vehicle clearing the junction
@@ -174,9 +168,7 @@ class Monitors:
         site = self._site
         return passes(site.intersection, site.vehicle, mine, x, body, -other.distance)
 
-    def _passes_first(
-        self, ego: Observed, other: Observed, shared: Region, mirrored: Region
-    ) -> bool:
+    def _goes_first(self, ego: Observed, other: Observed, shared: Region, mirrored: Region) -> bool:
         """Whether the ego, at its present speed, leaves the region well before the other comes."""
         if ego.speed < HALTING:
             return False
@@ -214,14 +206,12 @@ class Patience:
         self._since: dict[int, float] = {}
         self._alone: set[int] = set()
 
-    def goes(
-        self, view: View, seen: View, ego: Observed, decided: bool, ranks: Sequence[int]
-    ) -> bool:
-        """Whether it goes, as `decided` or alone; of the true `view` it uses only motion."""
+    def goes(self, view: View, seen: View, ego: Observed, may: bool, ranks: Sequence[int]) -> bool:
+        """Whether it goes, because it `may` or alone; of the true `view` it uses only motion."""
         alone = ego.id in self._alone
-        if not alone and (decided or ego.speed >= HALTING):
+        if not alone and (may or ego.speed >= HALTING):
             self._since.pop(ego.id, None)
-            return decided
+            return may
         ids = {v.id for v in seen.vehicles}
         near = [v for v in view.vehicles if v.id in ids and v.distance <= self._sight]
         free = not any(_crosses(v, self._deceleration) for v in near if v.id != ego.id)

@@ -54,7 +54,7 @@ class Arrivals:
     def rank(self) -> Ints:
         """Each vehicle's place among those of its lane, from 0.
 
-        What chance makes of a vehicle, such as a human's, is drawn by lane and rank, so it does not
+        Random traits, such as a human driver, are drawn by lane and rank, so they do not
         depend on other lanes or on the horizon.
         """
         return ranks(self.lane)

@@ -17,13 +17,24 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from minisim.errors import InputError, instance, number, printable
+from minisim.errors import InputError, instance, number, printable, told
 from minisim.inflow import Inflow
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
 from minisim.names import Name
-from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
+from minisim.parameters import (
+    Reals,
+    Switch,
+    checked,
+    declared,
+    part,
+    real,
+    reals,
+    switch,
+    text,
+    whole,
+)
 from minisim.vehicle import MODELS, VehicleType
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default of
@@ -46,7 +57,9 @@ class Site:
     intersection: Intersection = part("its geometry", Intersection)
     vehicle: VehicleType = part("the vehicles' type", VehicleType)
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
-    demand: tuple[float, ...] = reals("expected inflow of each lane, mean over the run", "veh/h")
+    demand: Reals[tuple[float, ...]] = reals(
+        "expected inflow of each lane, mean over the run", "veh/h"
+    )
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
     inflow: Inflow | None = part(
@@ -56,7 +69,7 @@ class Site:
 
     @property
     def looks_out(self) -> bool:
-        """Whether vehicles let others pass that cross their way inside the junction.
+        """Whether vehicles give way to those crossing inside the junction.
 
         Only on SUMO's own ways, since its table of foes goes with them.
         """
@@ -86,6 +99,10 @@ class Site:
         """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
         return self.demand if self.inflow is None else self.inflow.mean(start, end)
 
+    def period(self, name: str, seconds: float) -> float:
+        """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""
+        return number(f"{name} [s], in steps of the host,", seconds, low=self.dt)
+
     @cached_property
     def conflicts(self) -> Bools:
         """Whether two movements from different arms must not be driven at once, shape (m, m)."""
@@ -95,7 +112,7 @@ class Site:
 class Observed(NamedTuple):
     """One vehicle in a view.
 
-    Draw what chance makes of a vehicle by its lane and rank: its id depends on other lanes.
+    Draw random traits of a vehicle by its lane and rank: its id depends on other lanes.
     """
 
     id: int  # the same in every view of a run
@@ -237,12 +254,12 @@ class Plan:
         "of the hold line from the junction entry", "m", default=0.0, low=0, high=1000
     )
     markings: tuple[Marking, ...] = checked("on every lane", _markings, "markings", default=())
-    marks: tuple[float, ...] = reals(
+    marks: Reals[tuple[float, ...]] = reals(
         "wake when a front bumper passes one of these distances before the junction entry; 0 is "
         "the entry itself, negative is past it",
         "m", default=(), low=-1000,
     )  # fmt: skip
-    wake_on_clear: bool = switch("wake when a rear bumper leaves the junction", default=False)
+    wake_on_clear: Switch = switch("wake when a rear bumper leaves the junction", default=False)
     period: float | None = real(
         "wake at this interval, at least the step", "s", default=None, above=0, optional=True
     )
@@ -254,7 +271,7 @@ class Plan:
         "its rear has left the junction",
         "m", default=0.0, low=0, high=1000,
     )  # fmt: skip
-    lanes_open: bool = switch("lanes start open; otherwise vehicles are held", default=False)
+    lanes_open: Switch = switch("lanes start open; otherwise vehicles are held", default=False)
 
 
 @runtime_checkable
@@ -278,7 +295,7 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far, which only grows; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may clash with a summary's own."""
 
 
 @runtime_checkable
@@ -337,14 +354,19 @@ class Controller(Protocol):
 
 
 def as_controller(what: str, value: object) -> Controller:
-    """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
-    if isinstance(value, Controller) and not isinstance(value, type):
-        printable(f"the name of {what}", value.name)
-        return value
+    """Return `value` if it is a controller; `what` names it in the `InputError` if not."""
+    try:
+        if isinstance(value, Controller) and not isinstance(value, type):
+            printable(f"the name of {what}", value.name)
+            return value
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        raise InputError(f"{what} has no name: {told(error)}") from error
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
-    hint = "; make it by scenarios.controllers.controller_named" if named else ""
+    hint = "; make it with scenarios.controllers.controller_named" if named else ""
     raise InputError(f"{what} is not a controller: {why}{hint}")
 
 

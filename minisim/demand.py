@@ -44,7 +44,7 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
         try:
             value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
-            wrong = f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
+            wrong = f"{name} must be {equal} or like 4:3:2:1, got {show(value)}"
             raise InputError(wrong) from None
     shares = numbers(name, value)
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:

@@ -17,11 +17,11 @@ from minisim.parameters import checked, declared, reals
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-#: More than any lane can carry: a higher density is a typing error.
+#: More than any lane can carry: a higher density is a mistake.
 MAX_DENSITY = 3600.0
 #: The longest duration and the latest demand time [s].
 MAX_TIME = 1e7
-#: More in one second have a chance below 10⁻¹⁶ at any density.
+#: The chance of more in one second is below 10⁻¹⁶ at any density.
 MOST_IN_A_SECOND = 20
 #: Seconds, or headways of each lane, drawn at once.
 BLOCK, HEADWAYS = 3600, 64

@@ -17,8 +17,11 @@ from minisim.inflow import MAX_TIME
 from minisim.junction.movements import ARM_NAMES
 
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
-#: May follow: the drivers' factors on the speed limit.
+#: Optional: the drivers' factors on the speed limit.
 FACTORS = "speed_factor"
+#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
+#: that none does is (1/2)^30, one in 10^9.
+ENOUGH = 30
 
 
 def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0) -> Arrivals:
@@ -31,7 +34,8 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
             "07:00". Vehicles that come earlier are left out.
 
     Raises:
-        InputError: a start that is not a time, or is later than every vehicle.
+        InputError: a start that is not a time, or is later than every vehicle; or `ENOUGH`
+            arrivals that look like those of a junction with fewer than n arms.
         FileError: unreadable, a column that is missing or unknown, a broken line (named by its
             number), or a lane or manoeuvre that does not exist with n arms.
     """
@@ -47,6 +51,12 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
     if begin and len(time) and time.max() < begin:
         last = f"the last vehicle comes at {clock(time.max())}"
         raise InputError(f"{path}: no vehicle comes from {show(start)} on; {last}")
+    used = 1 + int(max(arrivals.lane.max(initial=0), arrivals.manoeuvre.max(initial=0)))
+    if n is not None and len(time) >= ENOUGH and used < n:  # manoeuvres would mean other exits
+        raise InputError(
+            f"{path} looks like arrivals of a junction with {used} arms: none comes from lane "
+            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+        )
     return arrivals.between(begin, math.inf) if begin else arrivals
 
 

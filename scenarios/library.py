@@ -23,17 +23,16 @@ from scenarios.scenario import Scenario
 Side = Literal["left", "right"]
 
 #: Number of arms -> distance of the entries from the centre in the authors' networks [m]. The first
-#: two are those of the default kerb radius, but rounded to centimetres by netconvert, and 3 mm
-#: change when a vehicle enters a zone.
+#: two are our own, but rounded by netconvert, and 3 mm change when a vehicle enters a zone.
 PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 
 
 class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
-    A profile may be given by name, and shares of lanes (`split`) and of manoeuvres (`turns`) as
-    numbers or as a text such as "4:3:2:1". A `demand` by time of day replaces all that says how
-    many vehicles come; a run of it lasts until its end, unless there is a `horizon`.
+    A profile may be a name, and shares (`split`, `turns`) numbers or a text such as "4:3:2:1".
+    A `demand` by time of day replaces all that says how many vehicles come; a run of it lasts
+    until its end, unless there is a `horizon`.
     """
 
     name: str
@@ -125,7 +124,7 @@ def from_bearings(
             refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
     day = given.pop("demand", None)
     if "min_headway" in given and given.get("model") != "shifted":
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     given["profile"] = profile_named(given.get("profile", "paper"))
     geometry, demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
@@ -150,8 +149,7 @@ def refuse_beside(whole: str, others: Iterable[str]) -> None:
 def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
     """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
 
-    `InputError` for an unknown name (with the nearest one), or for one of `custom` and bearings
-    without the other.
+    `InputError` for an unknown name (with the nearest one), or only one of `custom` and bearings.
     """
     instance("scenario", name, str)
     if name == "custom":

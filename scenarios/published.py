@@ -15,8 +15,7 @@ from minisim.junction.paths import Way, distances_along
 from minisim.recorded import read_arrivals
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
-#: when the runs at 4:1:4:1 were made (in `my_network.net.xml` as of then, b+ comes from the south
-#: and c+ from the east).
+#: when the runs at 4:1:4:1 were made (in their `my_network.net.xml`, b+ is south and c+ east).
 RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
 #: Numbers of arms of the published junctions.
@@ -35,13 +34,10 @@ def published_ways(
 
     Args:
         arms: how many.
-        turnarounds: arms at whose far end the road leads back; None is as in the networks of the
-            authors.
-        waits: whether vehicles that turn far have a place to wait inside. Those in the networks of
-            the signals have none.
+        turnarounds: arms at whose far end the road leads back; None: as in the authors' networks.
+        waits: whether far turns wait inside; in the signals' networks they do not.
 
-    Raises:
-        InputError: another number of arms.
+    Raises `InputError` for another number of arms.
     """
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
     file = resources.files("scenarios") / "data" / "ways" / f"{arms}way.csv"

@@ -24,7 +24,7 @@ from minisim.errors import MissingExtraError
 from minisim.junction.geometry import MIN_ANGLE, Intersection
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
-from scenarios.profiles import FAIR, PAPER, PROFILES
+from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
 try:
@@ -134,24 +134,6 @@ def scenarios(
         demand=draw(demands(intersection.n, max_density)),
         profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=horizon,
-    )
-
-
-@st.composite
-def emptying(draw: st.DrawFn) -> Scenario:
-    """A random junction with demand for a minute, and an hour in which to serve it."""
-    intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
-    demand = draw(demands(intersection.n))
-    arrivals = demand.draw(intersection.n, 60.0, seed=draw(st.integers(0, 1000)))
-    return Scenario(
-        name="random",
-        intersection=intersection,
-        demand=demand,
-        profile=PROFILES[
-            draw(st.sampled_from(sorted(set(PROFILES) - {"as_run"})))
-        ],  # its signals are dead
-        horizon=3600.0,
-        recorded=arrivals,
     )
 
 

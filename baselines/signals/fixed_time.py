@@ -13,7 +13,7 @@ from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webste
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
 from minisim.names import Name
-from minisim.parameters import checked, declared, real, refuse_idle, switch
+from minisim.parameters import Switch, Takes, checked, declared, real, refuse_idle, switch
 
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
@@ -35,22 +35,19 @@ class FixedTime:
 
     name = Name("fixed-time")
 
-    greens: tuple[float, ...] | float | None = checked(
-        "green of each lane, or one number for all; none is Webster's, from the expected demand",
+    greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
+        "green of each lane, or one number for all; none means Webster's for the expected demand",
         _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
         optional=True, default=None,
     )  # fmt: skip
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
-    saturation_flow: float = real(
-        "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
-    )
-    # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
-    # 2 s of amber that drivers still use.
+    saturation_flow: float = real("of a lane", "veh/h", low=1, high=1e5, default=1500.0)
+    # HCM 2000, ch. 10: amber and all-red; 2 s of start-up loss, less 2 s of amber that drivers use.
     lost_time: float | None = real(
-        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
     )  # fmt: skip
-    equal_greens: bool = switch(
+    equal_greens: Switch = switch(
         "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
         default=False,
     )
@@ -102,8 +99,7 @@ class FixedTime:
 class Program:
     """Lanes that are green in turn, over and over; the first turns green at time 0.
 
-    What it shows follows from the time alone. `order` holds the lanes in the order of their greens;
-    times are in seconds.
+    What it shows follows from the time [s] alone. `order` holds the lanes in order of their greens.
     """
 
     def __init__(

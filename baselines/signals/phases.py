@@ -1,8 +1,7 @@
 """What is common to signals that end their phases by a rule: one phase per approach.
 
 Between two phases the old lane shows amber. The new one turns green once no vehicle crosses its
-way any more (`Heads`). A phase is timed from when its green is shown, so the shortest and longest
-greens are what drivers see.
+way any more (`Heads`). A phase is timed from when its green is shown, so drivers see its length.
 """
 
 from __future__ import annotations

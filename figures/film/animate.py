@@ -43,8 +43,7 @@ def write_animation(
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
     The run must have been recorded with `record="all"` over the time shown. There are `fps` frames
-    per second, at most one per step, and 50 in a GIF; `progress` is called with the frames done and
-    the total.
+    per second, at most one per step, and 50 in a GIF; `progress` gets frames done and the total.
 
     Raises:
         InputError: an unknown suffix, a time that was not recorded, or a number out of range.
@@ -205,11 +204,8 @@ class Picture:
         self._glass.set_verts(list(drawing.place(glass, x, y, angle)))
         self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
         self._ways.set_segments(film.ways(near))
-        opened = film.open_lanes(near)
-        colours = [
-            style.RIGHT_OF_WAY if i in opened else style.INK for i in range(run.site.intersection.n)
-        ]
-        self._holds.set_color(colours)
+        opened, lanes = film.open_lanes(near), range(run.site.intersection.n)
+        self._holds.set_color([style.RIGHT_OF_WAY if i in opened else style.INK for i in lanes])
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:

@@ -83,7 +83,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
 
 
 def zone_words(plan: Plan) -> dict[str, str]:
-    """Zone -> its name and place for a legend, so that it is known without its colour."""
+    """Zone -> its name and place for a legend, to tell zones apart without colour."""
     zones: dict[str, list[Marking]] = {}
     for marking in plan.markings:
         zones.setdefault(marking.name, []).append(marking)
@@ -137,16 +137,14 @@ def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour:
     axes.add_patch(Polygon(glass, facecolor=style.PAINT, alpha=0.75, linewidth=0, zorder=7))
 
 
-def draw_way(
-    axes: Axes, path: Path, start: float, end: float, colour: str, *, strong: bool
-) -> None:
+def draw_way(axes: Axes, path: Path, start: float, end: float, colour: str, *, bold: bool) -> None:
     """Draw a path from `start` to `end` as an arrow; a weak one is dashed, and above others."""
     width = axes.bbox.width * 72.0 / axes.figure.dpi / np.ptp(axes.get_xlim())  # points per metre
     neck = end - HEAD / width
-    look: dict[str, Any] = {"color": colour, "zorder": 5 if strong else 5.5}
+    look: dict[str, Any] = {"color": colour, "zorder": 5 if bold else 5.5}
     axes.plot(
-        *path.position(np.linspace(start, neck, 48)).T, linewidth=2.6 if strong else 1.5,
-        linestyle="-" if strong else (0, (4, 2.5)), dash_capstyle="butt", **look,
+        *path.position(np.linspace(start, neck, 48)).T, linewidth=2.6 if bold else 1.5,
+        linestyle="-" if bold else (0, (4, 2.5)), dash_capstyle="butt", **look,
     )  # fmt: skip
     axes.add_patch(FancyArrowPatch(
         *path.position(np.array([neck, end])), shrinkA=0, shrinkB=0, linewidth=0,

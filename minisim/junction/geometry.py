@@ -20,7 +20,7 @@ import numpy as np
 from minisim.errors import InputError, number, numbers
 from minisim.junction.movements import ARM_NAMES, Movement, Movements, movements_of
 from minisim.junction.paths import ARC_SEGMENTS, Path, Way
-from minisim.parameters import checked, declared, part, real, word
+from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
@@ -78,7 +78,7 @@ class Intersection:
     KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
     """
 
-    bearings: tuple[float, ...] = checked(
+    bearings: Reals[tuple[float, ...]] = checked(
         "of the arms, clockwise from true north", _bearings,
         f"3 … {len(ARM_NAMES)} numbers in [0, 360), ascending, {MIN_ANGLE:g} or more apart", "deg",
     )  # fmt: skip
@@ -87,7 +87,7 @@ class Intersection:
     )
     lane_width: float = real("width of every lane", "m", default=3.2, low=2, high=6)
     junction_radius: float = real(
-        "distance of every entry and exit from the centre; none is the smallest with a kerb of "
+        "distance of every entry and exit from the centre; none means the smallest with a kerb of "
         f"{KERB_RADIUS:g} m",
         "m", above=0, optional=True, default=None,
     )  # fmt: skip
@@ -95,8 +95,8 @@ class Intersection:
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
     ways: tuple[Way, ...] | None = part(
-        "another simulator's curves through the junction, a Way per movement, in their order; none "
-        "is the arcs",
+        "another simulator's curves through the junction, one Way per movement, in order; none "
+        "means arcs",
         tuple, optional=True, default=None,
     )  # fmt: skip
 

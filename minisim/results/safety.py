@@ -1,11 +1,9 @@
 """Safety monitors on a recording: TTC, DRAC, PET and braking, as SUMO's SSM device defines them.
 
-Each is a function of a trajectory frame (`run.trajectories`; record="junction" is enough) and the
-site:
+Each is a function of a trajectory frame (`run.trajectories`; record="junction" will do) and a site:
 
-* following — a vehicle and its leader. The leader is the vehicle ahead in the same lane, until
-  its rear has left their shared path, or the next one from another arm bound for the same exit
-  lane.
+* following — a vehicle and its leader: the vehicle ahead in the same lane, until its rear has left
+  their shared path, or the next one from another arm bound for the same exit lane.
   TTC = gap/Δv (Hayward 1972) and DRAC = Δv²/(2·gap), both only while closing (Δv > 0).
 * encroachment — two vehicles passing through the same conflict area of two movements.
   PET = time when the second enters − time when the first has left; at 0 or less, both were inside.
@@ -61,8 +59,8 @@ class Rows(NamedTuple):
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
-    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` are the
-    encroachments, besides the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
+    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` counts all
+    encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
     rows = _rows(frame, site)
@@ -115,8 +113,7 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle still inside when its recording ends counts as leaving then; one whose entry was not
-    recorded does not count. Columns `time_s` (when the second enters), `first, second, pet_s`,
-    sorted by time.
+    recorded does not count. Columns `time_s` (the second enters; sorted), `first, second, pet_s`.
     """
     rows = _rows(frame, site)
     areas = conflict_areas(site.intersection, site.vehicle)
@@ -133,12 +130,9 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         first, second = order[:-1][changes], order[1:][changes]
         ids = vehicle[passing[first]], vehicle[passing[second]]
         pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
-    time, firsts, seconds, pets = np.concatenate(pairs).T
-    order = np.argsort(time, kind="stable")
-    first, second = (ids[order].astype(np.int64) for ids in (firsts, seconds))
-    return pd.DataFrame(
-        {"time_s": time[order], "first": first, "second": second, "pet_s": pets[order]}
-    )
+    table = pd.DataFrame(np.concatenate(pairs), columns=["time_s", "first", "second", "pet_s"])
+    table = table.sort_values("time_s", kind="stable", ignore_index=True)
+    return table.astype({"first": np.int64, "second": np.int64})
 
 
 def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
@@ -211,8 +205,7 @@ def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
 def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers in and past the junction and of their leaders to the exit lane; gaps [m].
 
-    Leaders come from another arm. There must be a gap: when two bodies are side by side, neither
-    follows the other yet.
+    Leaders come from another arm. There must be a gap: two bodies side by side do not follow yet.
     """
     paths, movements = site.intersection.paths, site.intersection.movements
     origin, exit_arm = movements.origins[rows.movement], movements.exits[rows.movement]

@@ -58,9 +58,9 @@ def summarise(
     """The usual numbers of a run, and the metrics asked for.
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
-    complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds, by kind
-    (`kinds`). `spillback_s`, of each lane and of all, is when a queue first reached the end of its
-    road (`minisim.results.spillback`), None if none did.
+    complete form. Trips are grouped by lane (`lanes`) and, if there are kinds, by kind (`kinds`).
+    `spillback_s`, of each lane and of all, is when a queue first reached the end of its road
+    (`minisim.results.spillback`), None if none did.
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
@@ -70,8 +70,8 @@ def summarise(
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were
-    not recorded, a metric whose function raises or returns the wrong type or shape, or a count of
-    the controller's with the name of another number.
+    not recorded, a metric whose function raises or returns the wrong type or shape, or a
+    controller's count that has the name of another number.
     """
     full = spillback(run.columns, run.site.vehicle, float(run.scenario.warmup))
     run = run.counted
@@ -89,7 +89,7 @@ def summarise(
     summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":
-            raise InputError(f"{name!r} is also what the controller calls a count of its own")
+            raise InputError(f"the controller's count {name!r} has the name of another number")
     return {**summary, **run.counts}
 
 

@@ -87,14 +87,12 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
     if unknown or (codes < 0).any():
         lane = unknown[0] if unknown else "(missing)"
         raise InputError(f"lane {lane} is not in the geometry (a … {ARM_NAMES[n - 1]})")
-    manoeuvre = frame[MANOEUVRE].to_numpy(dtype=np.int64)
-    outside = (manoeuvre < 1) | (manoeuvre >= n)
+    turn = frame[MANOEUVRE].to_numpy(dtype=np.int64)
+    outside = (turn < 1) | (turn >= n)
     if outside.any():
-        raise InputError(
-            f"manoeuvre {manoeuvre[outside][0]} does not exist with {n} arms (1 … {n - 1})"
-        )
+        raise InputError(f"manoeuvre {turn[outside][0]} does not exist with {n} arms (1 … {n - 1})")
     lanes = np.array([index[str(name)] for name in names], dtype=np.int64)
-    return np.asarray(site.intersection.movements.index_of[lanes[codes], manoeuvre])
+    return np.asarray(site.intersection.movements.index_of[lanes[codes], turn])
 
 
 def check_columns(frame: pd.DataFrame, columns: Iterable[str] = TRAJECTORY_COLUMNS) -> None:

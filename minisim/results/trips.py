@@ -91,8 +91,7 @@ def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 
     A vehicle is present from demand to arrival, so queues before the road count too. The numbers
     are means over a quarter, which evens out the swing of a signal's cycle.
     `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have shape (k,);
-    all times are in s; `leave` is infinite if not reached. The quarters divide the time from
-    `start`, the end of the warm-up.
+    times are in s, from `start`, the end of the warm-up; `leave` is infinite if not reached.
     """
     length = (end - start) / 4.0
     if length <= 0.0:  # the run was stopped during its warm-up

@@ -92,9 +92,8 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
 def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trips:
     """SUMO's trips in demand order; raises `SumoError` if they are not those of the arrivals.
 
-    Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own time loss
-    leaves out what a vehicle loses while it accelerates to a higher limit, and SUMO does not know
-    about markings.
+    Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own leaves out what
+    a vehicle loses while it accelerates to a higher limit, and SUMO knows no markings.
     """
     end = (job.horizon if ended.done else ended.tick) * job.law.dt
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)

@@ -43,20 +43,17 @@ class Network:
     inside: tuple[float, ...]  #: of the way through the junction
 
 
-def build_network(
-    intersection: Intersection, speed_limit: float, folder: Path, home: Path
-) -> Network:
+def build_network(intersection: Intersection, limit: float, folder: Path, home: Path) -> Network:
     """Write the network into `folder`.
 
     With our arcs no vehicle has to give way: the hosted controller alone decides (`pass`, and no
-    place to wait inside the junction). Turns have the road's speed limit, since the host slows
-    vehicles down for them.
+    place to wait inside the junction). Turns have the road's limit: the host slows vehicles down.
 
     Raises:
         SumoError: netconvert refuses (the message is its own) or draws ways other than those given.
     """
     write_xml(folder / NODES, "nodes", _nodes(intersection))
-    write_xml(folder / EDGES, "edges", _edges(intersection, speed_limit))
+    write_xml(folder / EDGES, "edges", _edges(intersection, limit))
     command = [
         str(home / "bin" / "netconvert"), "--node-files", NODES, "--edge-files", EDGES,
         "--output-file", NETWORK, "--no-turnarounds", "true",

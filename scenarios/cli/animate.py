@@ -27,13 +27,9 @@ def animate(
     ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
-    begin: Annotated[
-        float, typer.Option("--from", metavar="S", help="Simulated time to begin at.")
-    ] = 300.0,
+    begin: Annotated[float, typer.Option("--from", metavar="S", help="When to begin.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
-    fps: Annotated[
-        float, typer.Option(help="Frames per second; at most one per step, and 50 in a .gif.")
-    ] = 10.0,
+    fps: Annotated[float, typer.Option(help="At most one per step, and 50 in a .gif.")] = 10.0,
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,

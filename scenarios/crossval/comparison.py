@@ -1,7 +1,6 @@
 """Two hosts on the same arrivals: how closely their trips agree, and where they part ways.
 
-Differences are SUMO's value minus minisim's. A vehicle has the same index in both hosts, because
-they get the same arrival table.
+Differences are SUMO's value minus minisim's. A vehicle has one index: both get the same arrivals.
 """
 
 from __future__ import annotations

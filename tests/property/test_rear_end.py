@@ -85,9 +85,7 @@ def test_the_cruise_control_of_the_published_runs_does_not_either() -> None:
 
 
 @given(floats(0.0, 100.0), floats(0.0, 200.0), floats(0.5, 1000.0), STEPS)
-def test_a_vehicle_that_can_stop_still_can_after_the_step(
-    v: float, more: float, b: float, dt: float
-) -> None:
+def test_what_can_stop_still_can_after_the_step(v: float, more: float, b: float, dt: float) -> None:
     """And never has to brake harder than the brakes can."""
     distance = v * v / (2.0 * b) + more
     a = stop_within(v, distance, b, dt)

@@ -12,17 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from minisim.errors import InputError, integer, number
-from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 #: A group of options in the help.
 FILES = "Files"
-
-#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
-#: that none does is (1/2)^30, one in 10^9.
-ENOUGH = 30
 
 
 def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
@@ -45,9 +40,9 @@ Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
-Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
-Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
+Side = Annotated[str, option("Traffic keeps left or right.", "SIDE")]
+Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
+Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float | None, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
@@ -81,9 +76,7 @@ DemandFile = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
-Start = Annotated[
-    str | None, option("Begin at this time of the file.", "07:00", rich_help_panel=FILES)
-]
+Start = Annotated[str | None, option("Begin here in the file.", "07:00", rich_help_panel=FILES)]
 
 
 def processes(jobs: int | None) -> int:
@@ -92,7 +85,7 @@ def processes(jobs: int | None) -> int:
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
-    """Raise `InputError` if an option has a value twice; None is an option not given."""
+    """Raise `InputError` if an option has a value twice; None means not given."""
     for name, values in given.items():
         for value, count in Counter(values or ()).items():
             if count > 1:
@@ -102,37 +95,30 @@ def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
 def build_scenario(
     name: str,
     bearings: str | None,
-    arrivals: Path | None = None,
+    file: Path | None = None,
     start: str | None = None,
     demand: Path | None = None,
-    **options: Any,
+    **more: Any,
 ) -> Scenario:
-    """The scenario that the options describe; None is an option not given."""
+    """The scenario that the options describe; None means not given."""
     from minisim.demandfile import read_demand
     from minisim.recorded import read_arrivals
     from scenarios.library import refuse_beside, scenario_named
 
-    given = {key: value for key, value in options.items() if value is not None}
+    given = {key: value for key, value in more.items() if value is not None}
     drawn = [f"--{key}" for key in ("density", "split", "turns") if key in given]
     if demand is not None:
         refuse_beside("--demand", drawn)
         given["demand"] = read_demand(demand, start)
         drawn = ["--demand"]
-    if arrivals is not None:
+    if file is not None:
         refuse_beside("--arrivals", drawn)
     elif demand is None and start is not None:
-        raise InputError("--start goes with --arrivals or --demand: it is a time of day there")
+        raise InputError("--start needs --arrivals or --demand: it is a time of day there")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
-    if arrivals is None:
+    if file is None:
         return made
-    n = made.intersection.n
-    recorded = read_arrivals(arrivals, n, start or 0.0)
-    arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
-    if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
-        raise InputError(
-            f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from lane "
-            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-        )
+    recorded = read_arrivals(file, made.intersection.n, start or 0.0)
     return replace(made, recorded=recorded)
 
 
@@ -142,8 +128,6 @@ def _bearings(text: str) -> list[float]:
         try:
             values.append(number(part, float(part)))
         except ValueError:
-            raise InputError(
-                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is not a finite "
-                "number"
-            ) from None
+            got = f"got {text!r}: {part!r} is not a finite number"
+            raise InputError(f"--bearings must be like 0,80,190,260, {got}") from None
     return values

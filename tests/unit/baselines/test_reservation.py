@@ -37,9 +37,6 @@ def decide(run: ReservationSession, time: float, *cars: Observed) -> list[object
     return [c for c in run.decide(View(time, cars)) if not isinstance(c, Wake)]
 
 
-# --- predictions are what the host does -------------------------------------------------------
-
-
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)
 @pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
@@ -106,9 +103,6 @@ def test_a_vehicle_that_hits_a_leader_is_not_predicted() -> None:
     assert predict(law_of(SITE), courses(SITE)[0], -3.0, 14.0, lane=[standing]) is None
 
 
-# --- the protocol -----------------------------------------------------------------------------
-
-
 def test_the_first_to_ask_gets_it_and_one_that_would_meet_it_does_not() -> None:
     run = session()
     assert decide(run, 0.0, car(1, 0, 2, 28.0)) == [Go(1)]
@@ -130,7 +124,7 @@ def test_a_passage_well_before_or_after_is_granted() -> None:
 
 
 def test_the_buffer_is_kept() -> None:
-    """b2 in ever longer distance behind a2: refused until it comes half a second later."""
+    """b2 ever further behind a2: refused until it comes half a second later."""
     gaps = []
     for distance in np.arange(20.0, 80.0, 1.0):
         run = session(reach=100.0)
@@ -165,9 +159,6 @@ def test_requests_are_considered_in_the_order_of_the_first() -> None:
     # c2 is gone; b2 asked first, a2 (nearer, earlier in the view) conflicts with it.
     run.manager.slots.clear()
     assert decide(run, 1.0, car(3, 0, 2, 15.0, speed=5.0), car(2, 1, 2, 18.0, speed=5.0)) == [Go(2)]
-
-
-# --- what safety rests on ---------------------------------------------------------------------
 
 
 def test_a_holder_that_differs_is_predicted_anew_and_keeps_what_still_fits() -> None:

@@ -27,9 +27,6 @@ def decided(run: V2ICSession, time: float, *cars: Observed) -> list[Command]:
     return list(run.decide(View(time, cars)))
 
 
-# --- closed forms -----------------------------------------------------------------------------
-
-
 def test_time_to_cover_is_that_of_uniform_acceleration_up_to_the_limit() -> None:
     assert time_to_cover(20.0, 0.0, 2.5, 14.0) == pytest.approx(4.0)  # ½·2.5·4² = 20
     # From 4 to 14 m/s at 2.5: 4 s and 36 m; the other 28 m at 14 m/s take 2 s.
@@ -63,9 +60,6 @@ def test_leaving_times_are_distance_by_speed_up_to_a_cap() -> None:
     assert serving.leaving_time(20.0, 0.0, 0.0) == pytest.approx(from_rest)
     assert serving.leaving_time(20.0, 0.0, 7.0) == pytest.approx(7.0 + from_rest)
     assert serving.leaving_time(0.0, 14.0, 0.0) > 0.0
-
-
-# --- the list ---------------------------------------------------------------------------------
 
 
 def test_the_first_goes_and_a_later_one_in_conflict_is_advised() -> None:

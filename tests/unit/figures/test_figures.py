@@ -1,4 +1,4 @@
-"""Figures and animations: everything is drawn where the model has it."""
+"""Figures and animations: everything is drawn where the model puts it."""
 
 from __future__ import annotations
 
@@ -215,8 +215,7 @@ def test_every_zone_is_coloured(picture: Picture) -> None:
     assert {tuple(rgb(colour)) for colour in style.ZONES.values()} <= seen
 
 
-#: What dichromats see, for linear RGB: Machado, Oliveira & Fernandes, IEEE TVCG 15 (2009), table of
-#: severity 1.
+#: What dichromats see, for linear RGB: Machado et al., IEEE TVCG 15 (2009), table of severity 1.
 EYES = {
     "usual": np.eye(3),
     "protanope": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
@@ -327,9 +326,7 @@ def test_a_gif_of_more_than_50_frames_per_second_keeps_its_length(tmp_path: Path
 
 
 @pytest.mark.parametrize(("start", "seconds"), [(200.0, 2.0), (90.0, 20.0), (120.0, 20.0)])
-def test_what_was_not_recorded_is_not_animated(
-    run: Run, tmp_path: Path, start: float, seconds: float
-) -> None:
+def test_no_recording_no_film(run: Run, tmp_path: Path, start: float, seconds: float) -> None:
     with pytest.raises(InputError, match="the run was recorded from 100 to 130 s"):
         write_animation(run, tmp_path / "film.gif", start=start, seconds=seconds)
     assert not list(tmp_path.iterdir())
@@ -348,9 +345,8 @@ def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
 
 def test_html_holds_every_frame(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    frames = [
-        Image.fromarray((rng.integers(0, 4, (5, 6, 3)) * 85).astype(np.uint8)) for _ in range(4)
-    ]
+    pictures = (rng.integers(0, 4, (4, 5, 6, 3)) * 85).astype(np.uint8)
+    frames = [Image.fromarray(picture) for picture in pictures]
     palette = palette_of(Image.fromarray(np.concatenate([np.asarray(f) for f in frames])))
     palette = palette.crop((0, 0, 6, 5))
     file = tmp_path / "film.html"

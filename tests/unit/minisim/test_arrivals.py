@@ -11,9 +11,8 @@ from minisim.errors import InputError
 
 def test_inflow_counts_vehicles_before_the_horizon() -> None:
     """Three vehicles in the first minute are 180 an hour, however many come later."""
-    arrivals = Arrivals(
-        np.array([0.0, 20.0, 59.9, 60.0, 61.0]), np.array([0, 0, 1, 1, 0]), np.ones(5, int)
-    )
+    time, lane = np.array([0.0, 20.0, 59.9, 60.0, 61.0]), np.array([0, 0, 1, 1, 0])
+    arrivals = Arrivals(time, lane, np.ones(5, int))
     assert arrivals.rates(3, 60.0) == pytest.approx((120.0, 60.0, 0.0))
     assert arrivals.rates(3, 3600.0) == pytest.approx((3.0, 2.0, 0.0))
 

@@ -42,9 +42,7 @@ def chi_square_poisson(counts: np.ndarray, rate: float, classes: int = 4) -> flo
 @pytest.mark.parametrize(
     ("density", "classes", "seed"), [(350.0, 4, 1), (350.0, 4, 2), (350.0, 4, 3), (3600.0, 7, 8)]
 )
-def test_poisson_counts_per_second_pass_a_chi_square_test(
-    density: float, classes: int, seed: int
-) -> None:
+def test_poisson_counts_per_second_pass_chi_square(density: float, classes: int, seed: int) -> None:
     arrivals = Demand(density=density).draw(4, DAY, seed)
     for lane in range(4):
         counts = per_second(arrivals, lane, DAY)
@@ -113,9 +111,6 @@ def test_manoeuvres_do_not_depend_on_those_before_nor_on_other_lanes(model: str)
         assert stats.chi2_contingency(table).pvalue > ALPHA
 
 
-# --- shares ------------------------------------------------------------------------------------
-
-
 def test_unbalanced_demand_keeps_the_total_and_gives_each_lane_its_share() -> None:
     """The paper's unbalanced demand: λ = share · D · N, shares 0.4, 0.3, 0.2, 0.1."""
     demand = Demand(density=350.0, split=(4, 3, 2, 1))
@@ -141,9 +136,7 @@ def test_shares_are_numbers_or_a_text(shares: Shares) -> None:
 
 
 @pytest.mark.parametrize("turns", [None, (1, 2, 1), (0, 1, 0)])
-def test_manoeuvres_follow_their_shares_independently_of_the_lane(
-    turns: tuple[float, ...] | None,
-) -> None:
+def test_manoeuvres_follow_their_shares_on_every_lane(turns: tuple[float, ...] | None) -> None:
     arrivals = Demand(density=350.0, turns=turns).draw(4, DAY, seed=4)
     shares = np.array(turns or (1, 1, 1)) / sum(turns or (1, 1, 1))
     table = np.zeros((4, 3))
@@ -170,10 +163,10 @@ def test_manoeuvres_are_drawn_from_their_own_stream() -> None:
         ({"split": (0, 0)}, "split must be shares"),
         ({"split": (1, -1)}, "split must be shares"),
         ({"split": (1e308, 1e308)}, "split must be shares"),
-        ({"turns": "ab"}, "turns is uniform or written like 4:3:2:1, got 'ab'"),
-        ({"split": "uniform"}, "split is balanced or written like"),
+        ({"turns": "ab"}, "turns must be uniform or like 4:3:2:1, got 'ab'"),
+        ({"split": "uniform"}, "split must be balanced or like"),
         ({"split": 4}, "split must be a sequence"),
-        ({"turns": "1:2/2:x"}, r"turns\[1\] is uniform or written like"),
+        ({"turns": "1:2/2:x"}, r"turns\[1\] must be uniform or like"),
         ({"turns": [(1, 2), (0, 0)]}, r"turns\[1\] must be shares ≥ 0"),
     ],
 )
@@ -213,8 +206,6 @@ def test_turns_may_differ_by_lane(turns: object) -> None:
     expected = table.sum(axis=1, keepdims=True) * shares
     np.testing.assert_array_less(np.abs(table - expected), 4.0 * np.sqrt(expected) + 1e-9)
 
-
-# --- by time of day ----------------------------------------------------------------------------
 
 MORNING = Period(start="07:00", end="07:15", rates=(400, 0, 200, 100), turns="1:0:0")  # type: ignore[arg-type]  # as in files
 NOON = Period(start="07:15", end="09:15", rates=(100, 50, 0, 300), turns="1:1:0/0:1:1/1:0:1/0:1:0")  # type: ignore[arg-type]  # as in files

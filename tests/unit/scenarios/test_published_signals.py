@@ -5,8 +5,7 @@ environment of their own) ran its own `static`, `delay_based` or `actuated` prog
 network of that run, with the published arrivals and speed factors, departPos "base", departSpeed 0
 and steps of 0.01 s. At unequal inflow, the fixed-time signal's vehicles were `CC` under ACC with a
 headway of 1.5 s in speed mode 31; the means of those runs are the published ones to the last digit.
-These trips are the first of each run, from `tripinfo`. SUMO 1.18 cannot be installed beside 1.28,
-so nothing here runs it again.
+These trips are the first of each run, from `tripinfo`. SUMO 1.18 and 1.28 exclude each other.
 """
 
 from __future__ import annotations
@@ -83,9 +82,8 @@ def test_the_adaptive_signal_switches_with_sumo(monkeypatch: pytest.MonkeyPatch)
 def test_a_vehicle_on_the_very_line_stops_at_amber() -> None:
     """SUMO 1.18, adaptive, balanced 150: vehicle 79 (d1) slows for its turn, to the line."""
     scenario = replace(replay("balanced", 150, 4, "ats"), horizon=530.0)
-    run = minisim.simulate(
-        scenario, controller_of("balanced", 150, 4, "ats"), on_collision="record"
-    )
+    signal = controller_of("balanced", 150, 4, "ats")
+    run = minisim.simulate(scenario, signal, on_collision="record")
     trip = run.columns.travel_time[79], run.columns.waiting_time[79]
     assert trip == pytest.approx((86.62, 17.0), abs=0.021)
 

@@ -37,9 +37,6 @@ def verdict(left: float | None, elapsed: float, *now: Observed, **more: Any) -> 
 PASS_ON = Verdict(1, 0.0)
 
 
-# The loop.
-
-
 def test_the_loop_is_two_seconds_before_the_line_or_nearer() -> None:
     """Nearer where the vehicles in between could not all leave in the shortest green."""
     assert Actuated().detector(SITE) == pytest.approx(LOOP)
@@ -64,9 +61,6 @@ def test_a_vehicle_leaves_the_loop_once() -> None:
     assert session.judge(View(13.0, ()), 0, 3.0) == PASS_ON  # 3 s
 
 
-# The rule.
-
-
 def test_a_gap_of_three_seconds_ends_the_green() -> None:
     assert verdict(2.99, 5.0).lane == 0
     assert verdict(3.0, 5.0) == PASS_ON
@@ -84,9 +78,7 @@ def test_a_gap_of_three_seconds_ends_the_green() -> None:
         (0.5, 49.0, 50.0),  # not beyond the longest
     ],
 )
-def test_a_green_goes_on_until_the_last_vehicle_is_over_the_line(
-    left: float, elapsed: float, end: float
-) -> None:
+def test_a_green_lasts_until_the_last_is_over(left: float, elapsed: float, end: float) -> None:
     lane, after = verdict(left, elapsed)
     assert lane == 0
     assert elapsed + after == pytest.approx(end)
@@ -120,9 +112,6 @@ def test_a_vehicle_between_loop_and_line_prolongs_the_green() -> None:
     after = Actuated().max_gap - (LOOP - 5.0) / 14.0
     assert session.judge(View(12.0 + after - 0.1, ()), 0, 5.0).lane == 0
     assert session.judge(View(12.0 + after + 0.1, ()), 0, 5.0) == PASS_ON
-
-
-# Whole signals.
 
 
 def test_on_an_empty_junction_every_green_is_the_shortest() -> None:

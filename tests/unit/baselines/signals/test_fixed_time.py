@@ -23,8 +23,6 @@ from tests.builders import drive, replayed, said, seen
 
 SITE = four_way(density=250).site()
 
-# Timing.
-
 
 def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
     assert FixedTime().timing(SITE) == webster([250.0] * 4)
@@ -93,9 +91,6 @@ def test_a_site_that_it_cannot_serve_is_a_clear_error() -> None:
         FixedTime(max_cycle=10).start(SITE)
 
 
-# Schedule.
-
-
 def test_each_lane_is_open_in_turn_and_the_cycle_begins_with_a() -> None:
     assert drive(FixedTime(greens=(4, 5, 6, 7), amber=2.0, all_red=1.0), SITE, 35.0) == {
         0: ["Open 0"], 4: ["Close 0"], 7: ["Open 1"], 12: ["Close 1"], 15: ["Open 2"],
@@ -144,9 +139,6 @@ def test_at_amber_only_vehicles_that_cannot_stop_keep_going() -> None:
     session.decide(View(0.0, ()))
     near, far = seen(3, 0, 2, 12.0, 14.0), seen(4, 0, 2, 30.0, 14.0)
     assert said(session.decide(View(10.0, (near, far)))) == ["Close 0", "Go 3", "Wake 12"]
-
-
-# On the road.
 
 
 @pytest.mark.parametrize("start", np.arange(0.0, 6.0, 0.6).tolist())
