@@ -371,7 +371,7 @@ def test_a_run_draws_from_demand_by_time_of_day(capsys: Captured, tmp_path: Path
     assert whole["density"] == pytest.approx(200)
     assert whole["trips"] == whole["movements"]["a1"]["trips"] == 206
     assert answer(capsys, *run, "--start", "07:15")["trips"] == 0
-    assert answer(capsys, *run, "--horizon", "450")["trips"] == 91
+    assert answer(capsys, *run, "--horizon", "450")["trips"] == 95
     assert "before the run of 3600 s" in fails(capsys, *run, "--horizon", "3600")
     assert "--demand replaces --density" in fails(capsys, *run, "-d", "350")
     assert "--arrivals replaces --demand" in fails(capsys, *run, "--arrivals", "x.csv")
