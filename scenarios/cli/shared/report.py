@@ -173,7 +173,8 @@ def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
         f"Webster's capacity; the cycle is capped at {signal.max_cycle:g} s."
         for experiment in experiments
         for signal, scenario in [(experiment.controller, experiment.scenario)]
-        if isinstance(signal, FixedTime) and signal.timing(scenario.site()).capped
+        if isinstance(signal, FixedTime)
+        and any(it.capped for it in signal.timings(scenario.site()))
     )
 
 
