@@ -19,7 +19,9 @@ from minisim.version import __version__
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals
+    from minisim.counts import read_counts
     from minisim.demand import Demand, DemandProfile, Period
+    from minisim.demandfile import read_demand, write_demand
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "minisim.arrivals": ("Arrivals",),
+    "minisim.counts": ("read_counts",),
+    "minisim.demandfile": ("read_demand", "write_demand"),
     "minisim.demand": ("Demand", "DemandProfile", "Period"),
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
@@ -53,8 +57,11 @@ __all__ = [
     "VehicleType",
     "__version__",
     "read_arrivals",
+    "read_counts",
+    "read_demand",
     "simulate",
     "write_arrivals",
+    "write_demand",
 ]
 
 

@@ -195,6 +195,12 @@ TABLE: Final = (
         equation=f"depart − demand {_TRIPINFO}", usual=True,
     ),
     Metric(
+        "control_delay_s", lambda trips: trips.time_loss + trips.depart_delay, "s", "trip", "trips",
+        "queue", title="control delay", symbol="d",
+        meaning="what the junction costs against driving on at the limit",
+        equation="time loss + departure delay; by it HCM 2016 grades the level of service",
+    ),
+    Metric(
         "collisions", lambda run: len(run.collisions), title="collisions",
         meaning="pairs of vehicles that touched", usual=True,
     ),

@@ -9,6 +9,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from minisim.clock import time_of_day
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
 from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from figures.studies.shared.section import Item
+    from minisim.counts import Count
     from scenarios.recipe import Recipe
 
 #: The closest calls, which are printed for every run.
@@ -197,3 +200,51 @@ def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
 
 def _seconds(value: float | None, unit: str = "") -> str:
     return "–" if value is None else f"{value if isinstance(value, int) else f'{value:.2f}'}{unit}"
+
+
+def count_facts(count: Count) -> dict[str, Any]:
+    """What was understood of a count, and what was left out."""
+    movements = {
+        f"{lane}{turn}": total
+        for lane, row in zip(ARM_NAMES, count.vehicles.sum((0, 3)).tolist(), strict=False)
+        for turn, total in enumerate(row, start=1)
+    }
+    return {
+        "arms": dict(zip(ARM_NAMES, count.arms, strict=False)),
+        "intervals": len(count.edges) - 1,
+        "from": time_of_day(count.edges[0]),
+        "until": time_of_day(count.edges[-1]),
+        "vehicles": float(count.vehicles.sum()),
+        "movements": movements,
+        "types": dict(zip(count.types, count.vehicles.sum((0, 1, 2)).tolist(), strict=True)),
+        "classes": dict(count.classes),
+        "fleet": count.fleet,
+        "left_out": dict(count.left_out),
+        "notes": list(count.notes),
+    }
+
+
+def count_parts(count: Count) -> Iterator[Text | Table]:
+    """The same as text: sums by arm and movement, by class, and what was left out."""
+    facts = count_facts(count)
+    yield Text.assemble(
+        (count.name, "bold"), f": {facts['vehicles']:g} vehicles, {facts['from']}-{facts['until']},"
+        f" {facts['intervals']} intervals",
+    )  # fmt: skip
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("lane")
+    table.add_column("arm")
+    for turn in range(1, len(count.arms)):
+        table.add_column(f"manoeuvre {turn}", justify="right")
+    table.add_column("all", justify="right")
+    for lane, arm in facts["arms"].items():
+        row = [facts["movements"][f"{lane}{turn}"] for turn in range(1, len(count.arms))]
+        table.add_row(lane, arm, *(f"{total:g}" for total in (*row, sum(row))))
+    yield table
+    for kind, total in facts["types"].items():
+        said = ", ".join(name for name, it in count.classes.items() if it == kind)
+        yield Text(f"  {kind} ({said}): {total:g}")
+    for what, total in facts["left_out"].items():
+        yield Text(f"  left out: {total:g} {what}", "yellow")
+    for note in facts["notes"]:
+        yield Text(f"  {note}", "dim")
