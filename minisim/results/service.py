@@ -52,7 +52,7 @@ def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd
     midnight = getattr(getattr(run.scenario, "demand", None), "start", 0.0)
     delay = METRICS["control_delay_s"].values(trips, len(of))
 
-    def total(values: object = None) -> np.ndarray:  # type: ignore[type-arg]  # of numbers
+    def total(values: object = None) -> np.ndarray:
         return np.bincount(of, weights=values, minlength=len(edges))  # type: ignore[arg-type]
 
     came = total()
