@@ -251,6 +251,8 @@ def _count(
             kept.append(it)
         else:
             left[f"{it.kind} ({kinds[it.kind]})"] += it.vehicles
+    if not kept:
+        raise FileError(f"{place}: nothing is left to simulate")
     arms, index = _arms([it.approach for it in kept] + [it.exit for it in kept if it.exit],
                         given, place, notes)  # fmt: skip
     edges = _edges(kept, given, place)
@@ -354,8 +356,6 @@ def _turn(it: _Record, given: Mapping[str, Any]) -> str | int:
 def _edges(records: list[_Record], given: Mapping[str, Any], place: str) -> tuple[int, ...]:
     """The edges of the intervals [s], one after the other; raises `FileError` for others."""
     starts = sorted({it.start for it in records})
-    if not starts:
-        raise FileError(f"{place}: nothing is left to simulate")
     ends = {it.start: it.end for it in records}
     if any(it.end != ends[it.start] for it in records):
         it = next(it for it in records if it.end != ends[it.start])

@@ -127,7 +127,7 @@ def test_a_missing_row_is_named(tmp_path: Path) -> None:
         ("06:15,06:30", "06:30,06:45", r"06:00-06:15 and 06:30-06:45 leave a hole; a mapping"),
         ("06:15,06:30", "06:10,06:25", r"06:00-06:15 and 06:10-06:25 overlap"),
         ("A,1,AG..(1),06:00,06:15", "A,1,AG..(1),06:00,06:20", r"begin at 06:00 and overlap"),
-        ("pkw", "pkv", r"unknown class 'pkv'; did you mean 'pkw'\?"),
+        ("pkw", "pkww", r"unknown class 'pkww'; did you mean 'pkw'\?"),
         ("AL..(1)", "A?", r"line 2: unknown turn 'A\?'; a mapping can say what it is"),
         ("2,1,20,0", "2,1,-20,0", r"line 2: a count must be a number 0 … 1e6, got '-20'"),
         ("2,1,20,0", "2,1,many,0", r"line 2: a count must be a number"),
@@ -137,7 +137,7 @@ def test_a_missing_row_is_named(tmp_path: Path) -> None:
         ("kennung", "x", r"no column has the turn or the exit"),
         ("intervall_start", "x", r"no column has the start of the intervals"),
         ("spur", "bus", r"more than one column 'bus'"),
-        ("rad,krad,pkw,lkw,bus", "a,b,c,d,e", r"no column has counts; none is a class"),
+        ("rad,krad,pkw,lkw,bus", "a,b,c,d,e", r"no column has counts: none is a class"),
     ],
 )
 def test_a_sheet_that_is_wrong_is_refused_in_one_sentence(
