@@ -765,3 +765,24 @@ def test_ctrl_c_shows_no_traceback_at_any_moment(seconds: float, tmp_path: Path)
     assert process.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in told
     assert "KeyboardInterrupt" not in told
+
+
+def test_counts_says_what_it_understood_and_saves_a_demand(
+    capsys: Captured, tmp_path: Path
+) -> None:
+    sheet, day = tmp_path / "sheet.csv", tmp_path / "day.toml"
+    rows = [f"7:{k},{arm},{turn},{12 + k},3" for k in (15, 30) for arm in "NES" for turn in "LR"]
+    sheet.write_text("\n".join(["time,approach,turn,car,bicycle", *rows, "7:15,N,U,2,0"]))
+    text = ok(capsys, "counts", str(sheet), "--save", str(day))
+    assert "sheet: 414 vehicles, 07:15-07:45, 2 intervals" in text
+    assert "left out: 36 bicycle (bicycles are not simulated)" in text
+    assert "left out: 2 U-turns" in text
+    facts = answer(capsys, "counts", str(sheet))
+    assert facts["arms"] == {"a": "N", "b": "E", "c": "S"}
+    assert facts["movements"]["a1"] == 69
+    run = answer(capsys, "run", "three-way", "--demand", str(day), "--no-safety")
+    assert run["horizon_s"] == 1800.0
+    assert abs(run["trips"] - 414) < 5 * 414**0.5
+    assert "the junction has 4" in fails(capsys, "run", "four-way", "--demand", str(day))
+    sheet.write_text(sheet.read_text().replace("7:15,N,L", "7:15,N,X"))
+    assert "unknown turn 'X'" in fails(capsys, "counts", str(sheet))
