@@ -13,6 +13,7 @@ import numpy as np
 from minisim.control import Site
 from minisim.errors import InputError, instance, show
 from minisim.files import AnyPath
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Movement, movements_of
 from minisim.junction.paths import Floats
@@ -196,7 +197,7 @@ def _widened(town: Town, arms: list[Arm], measured: float, given: dict[str, Any]
         roads = [_road(town, arm, radius) for arm in arms]
         try:
             made = Intersection(junction_radius=radius, roads=roads, **given)
-            Site(made, CAR, 1.0, (0.0,) * made.n)
+            Site(made, Fleet((CAR,)), 1.0, (0.0,) * made.n)
         except InputError:
             if radius > largest:
                 raise
