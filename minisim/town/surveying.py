@@ -231,7 +231,8 @@ def _forbidden(town: Town, arms: list[Arm]) -> list[str]:
 
 
 def _exit(arms: list[Arm], movement: Movement) -> Arm:
-    return arms[(movement.origin + movement.manoeuvre) % len(arms)]
+    movements = movements_of(len(arms))
+    return arms[int(movements.exits[movements.number(movement)])]
 
 
 def _notes(town: Town, node: str, arms: list[Arm]) -> Iterable[str]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +16,9 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar
+
+if TYPE_CHECKING:
+    from scenarios.scenario import Scenario
 
 #: What is compared by default, and with --quick.
 CONTROLLERS = ["dim", "fixed-time"]
@@ -110,7 +114,7 @@ def crossval(
     else:
         more: dict[str, Any] = {} if horizon is None else {"horizon": horizon}
         more |= {"node": node, "profile": profile or "fair"}
-        make = partial(scenario_named, **more)
+        make: Callable[..., Scenario] = partial(scenario_named, **more)
         where = scenarios or ["four-way"]
         if demand is None:
             cells = product(where, splits, who, densities)
