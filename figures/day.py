@@ -31,8 +31,9 @@ def day_figure(runs: Mapping[str, Run], interval: float = 900.0) -> Figure:
     `runs` maps what the legend says to runs of one demand. Grey lines are the levels of service A
     to F at junctions without signals (`minisim.results.service.LEVELS`).
     """
-    edges = {"left": 0.05, "right": 0.97, "top": 0.78, "bottom": 0.15, "wspace": 0.2}
-    figure, panels = plots.panels(12.0, 4.2, 3, sharey=False, **edges)
+    figure, panels = plots.panels(
+        12.0, 4.2, 3, sharey=False, left=0.05, right=0.97, top=0.78, bottom=0.15, wspace=0.2
+    )
     for axes, (column, label) in zip(panels, COLUMNS.items(), strict=True):
         for stroke, (name, run) in zip(cycle(_STROKES), runs.items()):
             table = service(run, interval)

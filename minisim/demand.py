@@ -16,7 +16,7 @@ from minisim.clock import seconds_of, time_of_day
 from minisim.errors import InputError, instance, items, number, numbers, show
 from minisim.inflow import MAX_DENSITY, MAX_TIME, Floats, Inflow, counted, spaced
 from minisim.junction.movements import ARM_NAMES
-from minisim.parameters import checked, declared, real, reals, text, word
+from minisim.parameters import Reals, Takes, checked, declared, real, reals, text, word
 from minisim.streams import stream
 
 MODELS = ("poisson", "exponential", "shifted")
@@ -222,9 +222,15 @@ def _periods(title: str, value: object) -> tuple[Period, ...]:
 class Period:
     """A time of day with one inflow, such as a quarter of an hour of a count."""
 
-    start: int = checked("its start", _whole, "time of day such as 07:00 | whole seconds")
-    end: int = checked("its end", _whole, "time of day such as 07:15 | whole seconds")
-    rates: tuple[float, ...] = reals("mean inflow of each lane", "veh/h", low=0, high=MAX_DENSITY)
+    start: Takes[int, int | str] = checked(
+        "its start", _whole, "time of day such as 07:00 | whole seconds"
+    )
+    end: Takes[int, int | str] = checked(
+        "its end", _whole, "time of day such as 07:15 | whole seconds"
+    )
+    rates: Reals[tuple[float, ...]] = reals(
+        "mean inflow of each lane", "veh/h", low=0, high=MAX_DENSITY
+    )
     turns: Turns = checked(
         "shares of the manoeuvres 1 … n−1, the same on every lane or a row for each",
         read_turns, f"shares such as 1:2:1 or 1:2:1/0:1:1/… | {UNIFORM}", default=None,
@@ -251,7 +257,7 @@ class DemandProfile(ArrivalModel):
     periods: tuple[Period, ...] = checked(
         "one after the other, without holes", _periods, "Periods"
     )  # fmt: skip
-    start: float = checked(
+    start: Takes[int, float | str | None] = checked(
         "time of day at which a run begins; none is the start of the first period",
         lambda _, value: _whole("start", value), "time of day such as 07:00 | whole seconds",
         optional=True, default=None,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +16,9 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar
+
+if TYPE_CHECKING:
+    from scenarios.scenario import Scenario
 
 #: What is compared by default, and with --quick.
 CONTROLLERS = ["dim", "fixed-time"]
@@ -103,8 +107,9 @@ def crossval(
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
         cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon or 0.0)
     else:
-        ends = {} if horizon is None else {"horizon": horizon}
-        make = partial(scenario_named, profile=profile or "fair", **ends)
+        make: Callable[..., Scenario] = partial(scenario_named, profile=profile or "fair")
+        if horizon is not None:
+            make = partial(make, horizon=horizon)
         where = scenarios or ["four-way"]
         if demand is None:
             cells = product(where, splits, who, densities)
