@@ -148,6 +148,7 @@ class V2ICAsRunSession:
         self._rows = junction.movements.rows
         if junction.n != 4:
             raise InputError(f"the as-run V2I-C is for 4 arms, the intersection has {junction.n}")
+        junction.refuse_roads("the as-run V2I-C")
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
         if self._origin < LEFT:
             raise InputError(

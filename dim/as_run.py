@@ -215,6 +215,7 @@ class AsRunSession:
 
     def __init__(self, site: Site, rules: AsRunRules) -> None:
         self.rules = rules
+        site.intersection.refuse_roads("the as-run DIM")
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
         zones = rules.red_start, rules.yellow_start, rules.green_start, rules.bound
         if rules.red_start > self._origin:

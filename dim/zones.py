@@ -61,7 +61,7 @@ class Zones:
 
     def check(self, site: Site) -> None:
         """Raise `InputError` if a vehicle could be inserted past the start of the zones."""
-        room = site.intersection.approach_length - site.vehicle.length
+        room = site.intersection.shortest_approach - site.vehicle.length
         if self.red_start > room:
             raise InputError(
                 f"the zones are {self.red_start:g} m long, but the approach lanes leave only "

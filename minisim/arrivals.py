@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import InputError
 from minisim.inflow import MAX_TIME, Floats, Ints
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, Bools
 
 #: A driver's factor on the speed limit; SUMO cuts its speedFactor to the same range.
 LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
@@ -24,17 +25,21 @@ class Arrivals:
     lane: Ints  # index of the approach lane
     manoeuvre: Ints  # 1 … n−1
     speed_factor: Floats | None = None  # drivers' factors on the speed limit; None: they are drawn
+    type: npt.NDArray[np.str_] | None = None  # names of the vehicles' types; None: they are drawn
 
     def __post_init__(self) -> None:
         time = _column("demand_time_s", self.time, np.float64)
         lane = _column("lane", self.lane, np.int64)
         manoeuvre = _column("manoeuvre", self.manoeuvre, np.int64)
+        columns: dict[str, npt.NDArray[Any]]
         columns = {"time": time, "lane": lane, "manoeuvre": manoeuvre}
         if self.speed_factor is not None:
             factors = _column("speed_factor", self.speed_factor, np.float64)
             if len(factors) and not LEAST_FACTOR <= factors.min() <= factors.max() <= MOST_FACTOR:
                 raise InputError(f"a speed_factor must be {LEAST_FACTOR:g} … {MOST_FACTOR:g}")
             columns["speed_factor"] = factors
+        if self.type is not None:
+            columns["type"] = np.asarray(self.type, dtype=np.str_)
         if any(len(column) != len(time) for column in columns.values()):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if not np.isfinite(time).all() or time.min(initial=0.0) < 0:
@@ -63,15 +68,27 @@ class Arrivals:
         """The arrivals from `start` [s] to before `end`, with times counted from `start`."""
         here = slice(*self.time.searchsorted((start, end)))
         factors = None if self.speed_factor is None else self.speed_factor[here]
-        return Arrivals(self.time[here] - start, self.lane[here], self.manoeuvre[here], factors)
+        types = None if self.type is None else self.type[here]
+        return Arrivals(
+            self.time[here] - start, self.lane[here], self.manoeuvre[here], factors, types
+        )
 
-    def check(self, n: int) -> None:
-        """Raise `InputError` for a lane or manoeuvre that does not exist with n arms."""
+    def check(self, n: int, allowed: Bools | None = None) -> None:
+        """Raise `InputError` for a lane or manoeuvre that does not exist with n arms.
+
+        Or for one that no vehicle may take there, if `allowed` is given, shape (n, n−1).
+        """
         for bad in self.lane[(self.lane < 0) | (self.lane >= n)].tolist():
             name = ARM_NAMES[bad] if 0 <= bad < len(ARM_NAMES) else str(bad)
             raise InputError(f"lane {name} is not in the geometry (lanes a … {ARM_NAMES[n - 1]})")
         for bad in self.manoeuvre[(self.manoeuvre < 1) | (self.manoeuvre >= n)].tolist():
             raise InputError(f"manoeuvre {bad} does not exist with {n} arms (1 … {n - 1})")
+        if allowed is not None:
+            for bad in np.flatnonzero(~allowed[self.lane, self.manoeuvre - 1]).tolist():
+                raise InputError(
+                    f"the vehicle of {self.time[bad]:g} s takes {ARM_NAMES[self.lane[bad]]}"
+                    f"{self.manoeuvre[bad]}, which is forbidden here or against a one-way road"
+                )
 
     def rates(self, n: int, horizon: float) -> tuple[float, ...]:
         """Mean inflow of each lane over the first `horizon` seconds [veh/h]."""

@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
-`streams`, `inflow`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
-engine, the hosts or the results; `make lint` checks this.
+Controllers may also import `junction`, `vehicle`, `fleet`, `parameters`, `names`, `errors`,
+`files`, `streams`, `inflow`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports
+the engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 from minisim.errors import InputError, instance, number, printable, told
+from minisim.fleet import Fleet
 from minisim.inflow import Inflow
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
@@ -55,17 +56,31 @@ class Site:
     """What a controller may know before the first vehicle arrives."""
 
     intersection: Intersection = part("its geometry", Intersection)
-    vehicle: VehicleType = part("the vehicles' type", VehicleType)
-    speed_limit: float = real("of the roads", "m/s", above=0, high=100)
+    fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
+    speed_limit: float = real("of the roads, the highest one", "m/s", above=0, high=100)
     demand: Reals[tuple[float, ...]] = reals(
         "expected inflow of each lane, mean over the run", "veh/h"
     )
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
+    limits: Reals[tuple[float, ...]] = reals(
+        "of each arm's road; by default its own in the intersection, or else `speed_limit`",
+        "m/s", default=(),
+    )  # fmt: skip
     inflow: Inflow | None = part(
         "expected by time of the run; none if it is always `demand`", Inflow,
         optional=True, default=None,
     )  # fmt: skip
+
+    @property
+    def vehicle(self) -> VehicleType:
+        """The vehicles' type; of several, one that is in every respect as bad as the worst."""
+        return self.fleet.worst
+
+    @property
+    def types(self) -> tuple[VehicleType, ...]:
+        """The vehicles' types; `Observed.type` is an index into them."""
+        return self.fleet.types
 
     @property
     def looks_out(self) -> bool:
@@ -81,23 +96,47 @@ class Site:
             raise InputError(f"demand must be {wanted}, got {self.demand}")
         if self.inflow is not None and len(self.inflow.rates[0]) != self.intersection.n:
             raise InputError(f"inflow must have {self.intersection.n} lanes, got {self.inflow}")
-        room = self.intersection.approach_length
+        self._set_limits()
+        if self.intersection.roads is not None and self.vehicle.sumo is not None:
+            raise InputError(
+                "vehicles that keep to SUMO's rules drive on roads that are all alike; leave out "
+                "roads, or take another profile, such as fair"
+            )
+        self.fleet.check(self.intersection.n)
+        room = self.intersection.shortest_approach
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
                 f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
                 f"{room:g} m; arm_length must be more than "
-                f"{self.intersection.arm_length - room + needed:g} m"
+                f"{self.intersection.junction_radius + needed:g} m"
             )
-        if entry_room(self.intersection, self.vehicle) <= 0.0:
+        if entry_room(self.intersection, self.fleet) <= 0.0:
+            tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
+            it = tight[0] if tight else self.vehicle
             raise InputError(
-                f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
-                f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
-                "touch another that waits beside it"
+                f"vehicles of {it.length:g} × {it.width:g} m ({it.name}) do not fit lanes of "
+                f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
 
     def expected(self, start: float, end: float) -> tuple[float, ...]:
         """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
         return self.demand if self.inflow is None else self.inflow.mean(start, end)
+
+    def limit(self, arm: int) -> float:
+        """The limit of an arm's road [m/s], before the junction and after it."""
+        return self.limits[arm] if self.limits else self.speed_limit
+
+    def _set_limits(self) -> None:
+        roads, n = self.intersection.roads or (), self.intersection.n
+        if not self.limits and any(road.speed_limit for road in roads):
+            limits = tuple(road.speed_limit or self.speed_limit for road in roads)
+            object.__setattr__(self, "limits", limits)
+            object.__setattr__(self, "speed_limit", max(limits))
+        if self.limits and len(self.limits) != n:
+            raise InputError(f"limits must be one per arm, {n} numbers, got {self.limits}")
+        for limit in self.limits:
+            number("limits [m/s]", limit, above=0, high=self.speed_limit)
 
     def period(self, name: str, seconds: float) -> float:
         """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""
@@ -106,7 +145,15 @@ class Site:
     @cached_property
     def conflicts(self) -> Bools:
         """Whether two movements from different arms must not be driven at once, shape (m, m)."""
-        return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
+        return conflicts(self.intersection, self.fleet) & self.intersection.movements.apart
+
+
+def _fleet(value: object) -> Fleet:
+    """A fleet, or the only type that drives, as a fleet."""
+    if isinstance(value, VehicleType):
+        return Fleet((value,))
+    instance("fleet", value, Fleet)
+    return cast(Fleet, value)
 
 
 class Observed(NamedTuple):
@@ -124,6 +171,7 @@ class Observed(NamedTuple):
     demand_time: float = 0.0  # when it wanted to enter the road [s]
     rank: int = 0  # its place among the vehicles of its lane, from 0
     speed_factor: float = 1.0  # its driver's factor on the speed limit
+    type: int = 0  # index of its type in `Site.types`; all can see whether it is a bus
 
     @property
     def movement(self) -> Movement:

@@ -15,7 +15,7 @@ from minisim.arrivals import Arrivals, ranks
 from minisim.clock import seconds_of, time_of_day
 from minisim.errors import InputError, instance, items, number, numbers, show
 from minisim.inflow import MAX_DENSITY, MAX_TIME, Floats, Inflow, counted, spaced
-from minisim.junction.movements import ARM_NAMES
+from minisim.junction.movements import ARM_NAMES, Bools
 from minisim.parameters import Reals, Takes, checked, declared, real, reals, text, word
 from minisim.streams import stream
 
@@ -95,31 +95,52 @@ class ArrivalModel:
         """What rows say of the shares of the lanes and of the manoeuvres."""
         raise NotImplementedError
 
-    def inflow(self, n: int) -> Inflow:
-        """The inflow of n lanes; `InputError` if it does not fit them, or is more than possible."""
+    def inflow(self, n: int, allowed: Bools | None = None) -> Inflow:
+        """The inflow of n lanes, 0 where none of the manoeuvres is `allowed`, shape (n, n−1).
+
+        Raises `InputError` if it does not fit the lanes, or is more than possible.
+        """
         raise NotImplementedError
 
-    def turning(self, n: int) -> Floats:
-        """Shares of the manoeuvres by period of the inflow and lane, shape (p, n, n−1)."""
+    def turns_of_periods(self) -> dict[str, Any]:
+        """What messages call the turns of each period -> the turns, as `read_turns` gives them."""
         raise NotImplementedError
+
+    def turning(self, n: int, allowed: Bools | None = None) -> Floats:
+        """Shares of the manoeuvres that are allowed, by period and lane, shape (p, n, n−1).
+
+        Raises `InputError` if they do not fit the lanes, leave one nothing that is allowed, or, if
+        given by lane, have a share of what is not.
+        """
+        given = self.turns_of_periods()
+        shares = np.array([_turning(name, turns, n) for name, turns in given.items()])
+        if allowed is None:
+            return shares
+        for name, turns in given.items():
+            for lane, row in enumerate(turns if _by_lane(turns) else ()):
+                if row is not None and (np.array(row)[~allowed[lane]] > 0.0).any():
+                    raise InputError(
+                        f"{name} send vehicles of lane {ARM_NAMES[lane]} where none may go"
+                    )
+        return _open_turns(shares, allowed)
 
     @property
     def duration(self) -> float:
         """How long it lasts [s]."""
         return math.inf
 
-    def check(self, n: int, duration: float) -> None:
+    def check(self, n: int, duration: float, allowed: Bools | None = None) -> None:
         """Raise `InputError` if it is not for n lanes, or ends before `duration` [s]."""
-        self.inflow(n)
-        self.turning(n)
+        self.inflow(n, allowed)
+        self.turning(n, allowed)
         if duration > self.duration:
             raise InputError(
                 f"the demand {self.words[0]!r} ends {self.duration:g} s after the start, before "
                 f"the run of {duration:g} s"
             )
 
-    def draw(self, n: int, duration: float, seed: int) -> Arrivals:
-        """Draw the arrivals on n lanes over `duration` seconds.
+    def draw(self, n: int, duration: float, seed: int, allowed: Bools | None = None) -> Arrivals:
+        """Draw the arrivals on n lanes over `duration` seconds, on manoeuvres that are `allowed`.
 
         Each random number belongs to one lane and one second or vehicle. So what comes before a
         time does not depend on what comes after, nor one lane on another: a longer duration only
@@ -130,8 +151,8 @@ class ArrivalModel:
         veh/h/lane, in 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
-        self.check(n, duration)
-        inflow, turning = self.inflow(n), self.turning(n)
+        self.check(n, duration, allowed)
+        inflow, turning = self.inflow(n, allowed), self.turning(n, allowed)
         rng = stream(seed, "arrivals")
         if self.model == "poisson":
             time, lane = counted(inflow, duration, rng)
@@ -164,7 +185,8 @@ class Demand(ArrivalModel):
     """
 
     density: float = real(
-        "mean inflow per lane; with a split, the mean over all lanes", "veh/h/lane",
+        "mean inflow per lane that vehicles may come on; with a split, the mean over these",
+        "veh/h/lane",
         low=0, high=MAX_DENSITY,
     )  # fmt: skip
     split: Shares = checked(
@@ -172,7 +194,8 @@ class Demand(ArrivalModel):
         partial(read_shares, equal=BALANCED), f"shares such as 4:3:2:1 | {BALANCED}", default=None,
     )  # fmt: skip
     turns: Turns = checked(
-        "shares of the manoeuvres 1 … n−1, the same on every lane or a row for each",
+        "shares of the manoeuvres 1 … n−1, the same on every lane among those allowed there, or a "
+        "row for each",
         read_turns, f"shares such as 1:2:1 or 1:2:1/0:1:1/… | {UNIFORM}", default=None,
     )  # fmt: skip
 
@@ -181,18 +204,22 @@ class Demand(ArrivalModel):
         """As of `ArrivalModel`: as in files."""
         return shares_text(self.split, BALANCED), turns_text(self.turns)
 
-    def rates(self, n: int) -> tuple[float, ...]:
-        """Mean inflow of each of n lanes [veh/h]."""
+    def rates(self, n: int, allowed: Bools | None = None) -> tuple[float, ...]:
+        """Mean inflow of each of n lanes [veh/h]; 0 where none of the manoeuvres is `allowed`."""
         shares = _shares("split", self.split, n, "lanes")
-        return self._fit(tuple(self.density * n * share for share in shares), "the split")
+        used = n
+        if allowed is not None:
+            lanes = np.asarray(allowed.any(axis=1))
+            shares, used = _open_shares(shares, lanes, even=self.split is None), int(lanes.sum())
+        return self._fit(tuple(self.density * used * share for share in shares), "the split")
 
-    def inflow(self, n: int) -> Inflow:
+    def inflow(self, n: int, allowed: Bools | None = None) -> Inflow:
         """As of `ArrivalModel`: one period."""
-        return Inflow((0.0,), (self.rates(n),))
+        return Inflow((0.0,), (self.rates(n, allowed),))
 
-    def turning(self, n: int) -> Floats:
+    def turns_of_periods(self) -> dict[str, Any]:
         """As of `ArrivalModel`: one period."""
-        return np.array([_turning("turns", self.turns, n)])
+        return {"turns": self.turns}
 
 
 def _whole(title: str, value: object) -> int:
@@ -286,7 +313,7 @@ class DemandProfile(ArrivalModel):
         """The periods of a run: those that end after `start`."""
         return tuple(period for period in self.periods if period.end > self.start)
 
-    def inflow(self, n: int) -> Inflow:
+    def inflow(self, n: int, allowed: Bools | None = None) -> Inflow:
         """As of `ArrivalModel`."""
         starts = tuple(max(period.start - self.start, 0.0) for period in self.ahead)
         for period in self.ahead:
@@ -294,11 +321,17 @@ class DemandProfile(ArrivalModel):
                 raise InputError(
                     f"the demand {self.name!r} has {len(period.rates)} lanes, the junction has {n}"
                 )
+            for lane, rate in enumerate(period.rates):
+                if rate and allowed is not None and not allowed[lane].any():
+                    raise InputError(
+                        f"the demand {self.name!r} has vehicles from lane {ARM_NAMES[lane]}, but "
+                        "none may come from there"
+                    )
         return Inflow(starts, tuple(self._fit(p.rates, f"the period {p}") for p in self.ahead))
 
-    def turning(self, n: int) -> Floats:
+    def turns_of_periods(self) -> dict[str, Any]:
         """As of `ArrivalModel`."""
-        return np.array([_turning(f"turns of {p}", p.turns, n) for p in self.ahead])
+        return {f"turns of {period}": period.turns for period in self.ahead}
 
 
 def _text(value: object) -> bool:
@@ -329,3 +362,25 @@ def _shares(name: str, given: Shares, count: int, things: str) -> tuple[float, .
     if len(shares) != count:
         raise InputError(f"{name} has {len(shares)} shares for {count} {things}")
     return tuple(share / sum(shares) for share in shares)
+
+
+def _open_shares(shares: tuple[float, ...], lanes: Bools, *, even: bool) -> tuple[float, ...]:
+    """Shares of the lanes that vehicles may come on; `even` shares are divided among these."""
+    for lane in np.flatnonzero(~lanes & (np.array(shares) > 0.0)).tolist():
+        if not even:
+            raise InputError(
+                f"split gives lane {ARM_NAMES[lane]} a share, but no vehicle may come from there: "
+                "its share must be 0"
+            )
+    return tuple(
+        (1.0 / int(lanes.sum()) if even else share) * used
+        for share, used in zip(shares, lanes.tolist(), strict=True)
+    )
+
+
+def _open_turns(turning: Floats, allowed: Bools) -> Floats:
+    """Shares of the manoeuvres, shape (p, n, n−1), without those not allowed."""
+    kept, lanes = np.where(allowed, turning, 0.0), np.asarray(allowed.any(axis=1))
+    for lane in np.flatnonzero(lanes & (kept.sum(axis=2) == 0.0).any(axis=0)).tolist():
+        raise InputError(f"turns leave lane {ARM_NAMES[lane]} none of the manoeuvres allowed there")
+    return np.where(lanes[:, None], kept, 1.0)  # no vehicle draws the latter

@@ -175,7 +175,7 @@ def begin(
     as_controller(show(controller), controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
-    arrivals.check(site.intersection.n)
+    arrivals.check(site.intersection.n, site.intersection.allowed_by_lane)
     return Hosted(
         scenario, controller, int(seed), record, window, on_collision, site, arrivals,
         *start(controller, site),
@@ -205,7 +205,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         if plan.period is not None:
             site.period("period of the plan", plan.period)
         road = site.intersection.approach_length
-        room = road - site.vehicle.length
+        room = site.intersection.shortest_approach - site.vehicle.length
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
         marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
         marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}

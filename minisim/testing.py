@@ -37,6 +37,7 @@ from minisim.errors import (
     number,
     show,
 )
+from minisim.fleet import Fleet
 from minisim.inflow import MAX_DENSITY
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
@@ -99,7 +100,9 @@ class SmallScenario:
     def site(self, seed: int) -> Site:
         """What a controller may know about it."""
         demand = Demand(density=self.density).rates(self.intersection.n)
-        return Site(self.intersection, self.vehicle, self.speed_limit, demand, self.dt, seed)
+        return Site(
+            self.intersection, Fleet((self.vehicle,)), self.speed_limit, demand, self.dt, seed
+        )
 
     def arrivals(self, seed: int) -> Arrivals:
         """Arrivals in the first `demand_time` seconds."""

@@ -7,6 +7,7 @@ from minisim.clock import clock
 from minisim.control import Site
 from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, number
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from scenarios.profiles import PAPER, Profile
@@ -20,6 +21,9 @@ class Scenario:
     intersection: Intersection = part("the geometry", Intersection)
     demand: Demand | DemandProfile = part("what to draw arrivals from", (Demand, DemandProfile))
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
+    fleet: Fleet | None = part(
+        "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
+    )
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
@@ -34,15 +38,24 @@ class Scenario:
     def __post_init__(self) -> None:
         number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
-        self.demand.check(n, self.horizon)
+        allowed = self.intersection.allowed_by_lane
+        self.demand.check(n, self.horizon, allowed)
+        self.vehicles.check(n)
         if self.recorded is not None:
-            self.recorded.check(n)
+            self.recorded.check(n, allowed)
+            if self.recorded.type is not None:
+                self.vehicles.indices(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
                 raise InputError(
                     f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
                     f"recorded arrival is at {clock(first)}; `start` says where in the table a run "
                     f"begins"
                 )
+
+    @property
+    def vehicles(self) -> Fleet:
+        """The fleet, or the profile's vehicle as one."""
+        return self.fleet or Fleet((self.profile.vehicle,))
 
     @property
     def profile_name(self) -> str:
@@ -59,7 +72,7 @@ class Scenario:
         """Mean inflow per lane [veh/h], as demanded or as recorded."""
         if self.recorded is None and isinstance(self.demand, Demand):
             return self.demand.density
-        return sum(self.rates) / len(self.rates)
+        return sum(self.rates) / len(self.intersection.approaches)
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -67,23 +80,26 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        return self.demand.inflow(n).mean(0.0, self.horizon)
+        inflow = self.demand.inflow(n, self.intersection.allowed_by_lane)
+        return inflow.mean(0.0, self.horizon)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
+        junction = self.intersection
         varies = self.recorded is None and isinstance(self.demand, DemandProfile)
         return Site(
             intersection=self.intersection,
-            vehicle=self.profile.vehicle,
+            fleet=self.vehicles,
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,
             seed=seed,
-            inflow=self.demand.inflow(self.intersection.n) if varies else None,
+            inflow=self.demand.inflow(junction.n, junction.allowed_by_lane) if varies else None,
         )
 
     def arrivals(self, seed: int) -> Arrivals:
         """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
             return self.recorded.between(0.0, self.horizon)
-        return self.demand.draw(self.intersection.n, self.horizon, seed)
+        junction = self.intersection
+        return self.demand.draw(junction.n, self.horizon, seed, junction.allowed_by_lane)

@@ -72,10 +72,15 @@ class GapSession(PhaseSession):
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
         self._detector = signal.detector(site)
-        past = self._detector - site.vehicle.length  # front bumper of a vehicle off the loop
-        marks = (past, 0.0) if signal.presence else (past,)
+        # Where the front bumper of a vehicle off the loop is.
+        fronts = tuple(dict.fromkeys(self._detector - it.length for it in site.types))
+        past = min(fronts)
+        marks = (*fronts, 0.0) if signal.presence else fronts
         # Presence counts as if the vehicle had left the loop and driven to the line at the limit.
-        self._ago = min(max(past, 0.0) / site.speed_limit, signal.max_gap - site.dt)
+        self._ago = [
+            min(max(past, 0.0) / site.limit(lane), signal.max_gap - site.dt)
+            for lane in range(site.intersection.n)
+        ]
         super().__init__(site, self._detector, signal.min_green, signal.amber, marks, signal.order)
         self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
@@ -90,7 +95,7 @@ class GapSession(PhaseSession):
                 since = past / v.speed if self._exact and v.speed > 0.0 else 0.0
                 self._left[v.lane] = view.time - since
             elif self._signal.presence and v.distance >= 0.0:
-                self._left[v.lane] = max(self._left[v.lane], view.time - self._ago)
+                self._left[v.lane] = max(self._left[v.lane], view.time - self._ago[v.lane])
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:

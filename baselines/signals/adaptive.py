@@ -61,7 +61,7 @@ class DelaySession(PhaseSession):
         reach = signal.detector_range
         super().__init__(site, reach, signal.min_green, signal.amber, (reach,), signal.order)
         self._signal = signal
-        self._speed_limit = site.speed_limit
+        self._limit = site.limit
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
@@ -80,9 +80,10 @@ class DelaySession(PhaseSession):
         present = phases.on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
         self._entered = {v.id: self._entered[v.id] for v in approaching}
-        limit, now = self._speed_limit, view.time
+        now = view.time
         times = []
         for v in approaching:
+            limit = self._limit(v.lane)
             lost = time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
             if v.lane == lane and lost > signal.min_time_loss:
                 times.append(self.duration(v.distance / limit))

@@ -83,17 +83,22 @@ class FixedTime:
         longer, flow = change - lost, self.saturation_flow
         capped, demand = False, site.demand if demand is None else demand
         if self.greens is None:
+            lanes = site.intersection.approaches
             optimum = webster(
-                demand, saturation_flow=flow, lost_time_per_phase=lost,
+                [demand[lane] for lane in lanes],
+                saturation_flow=flow, lost_time_per_phase=lost,
                 equal_greens=self.equal_greens, min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
             )  # fmt: skip
-            greens, capped = tuple(green - longer for green in optimum.greens), optimum.capped
+            green_of, capped = dict(zip(lanes, optimum.greens, strict=True)), optimum.capped
+            greens = tuple(
+                green_of[lane] - longer if lane in green_of else 0.0 for lane in range(n)
+            )
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
-        cycle = self._program(greens).cycle
+        cycle = self._program(greens, site).cycle
         return timing_of(greens, cycle, demand, flow, longer=longer, capped=capped)
 
     def timings(self, site: Site) -> list[SignalTiming]:
@@ -106,11 +111,11 @@ class FixedTime:
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
-        programs = [self._program(timing.greens) for timing in self.timings(site)]
+        programs = [self._program(timing.greens, site) for timing in self.timings(site)]
         return FixedTimeSession(site, Programs(programs, self.plans or math.inf))
 
-    def _program(self, greens: Sequence[float]) -> Program:
-        return Program(full_order(self.order, len(greens)), greens, self.amber, self.all_red)
+    def _program(self, greens: Sequence[float], site: Site) -> Program:
+        return Program(full_order(self.order, site.intersection), greens, self.amber, self.all_red)
 
 
 class Program:
@@ -122,7 +127,7 @@ class Program:
     def __init__(
         self, order: Sequence[int], greens: Sequence[float], amber: float, all_red: float
     ) -> None:
-        self._order = order
+        self._order, self._lanes = order, len(greens)
         stages = [time for lane in order for time in (greens[lane], amber, all_red)]
         self._starts = list(accumulate(stages[:-1], initial=0.0))  # of stages within a cycle [s]
         self.cycle = math.fsum(greens[lane] + amber + all_red for lane in order)  # [s]
@@ -130,7 +135,7 @@ class Program:
     def colours(self, time: float) -> list[Colour]:
         """What the heads of all lanes show from `time` [s] on."""
         k, stage = divmod(self._stage(time) % len(self._starts), len(_STAGES))
-        shown = [Colour.RED] * len(self._order)
+        shown = [Colour.RED] * self._lanes
         shown[self._order[k]] = _STAGES[stage]
         return shown
 

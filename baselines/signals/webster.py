@@ -86,7 +86,7 @@ def timing_of(
     """Greens and cycle [s] for inflows `rates` [veh/h]; effective greens last `longer` [s] more."""
     greens, rates = tuple(greens), tuple(rates)
     saturation = tuple(
-        rate * cycle / (saturation_flow * (green + longer))
+        rate * cycle / (saturation_flow * (green + longer)) if rate else 0.0
         for rate, green in zip(rates, greens, strict=True)
     )
     return SignalTiming(cycle, greens, sum(rates) / saturation_flow, saturation, capped)

@@ -105,5 +105,5 @@ def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection
 def _beside(intersection: Intersection, arm: int, before: float, room: float) -> Floats:
     """A point `room` metres off an approach lane, `before` metres before the junction."""
     middle, kerb, *_ = drawing.lane_strip(intersection, arm, before, before)
-    across = (kerb - middle) / intersection.lane_width
+    across = (kerb - middle) / intersection.lane_widths[arm]
     return np.asarray(kerb + across * room)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 #: Columns of `run.trajectories`: a row per vehicle and step, sorted by time, then vehicle.
 TIME: Final = "time_s"
 VEHICLE: Final = "vehicle"
+TYPE: Final = "type"  #: after the vehicle, if there is more than one type
 LANE: Final = "lane"
 MANOEUVRE: Final = "manoeuvre"
 S: Final = "s_m"
@@ -132,7 +133,7 @@ def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple
     """Each row's lane, named as in SUMO, and the position on it [m]."""
     paths = site.intersection.paths
     names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
-    starts = np.array([(0.0, p.entry, p.exit) for p in paths])
+    starts = np.array([(p.start, p.entry, p.exit) for p in paths])
     section = (s[:, None] >= starts[movement, 1:]).sum(axis=1)
     return names[movement, section].tolist(), s - starts[movement, section]
 

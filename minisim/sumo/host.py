@@ -132,7 +132,7 @@ def _run(hosted: Hosted, options: _Options) -> Run:
         collisions=ended.collisions,
         columns=columns,
         trace=ended.trace,
-        rows=job.vehicles[["id", "path"]].copy(),
+        rows=job.vehicles[["id", "path", "type"]].copy(),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 
@@ -201,7 +201,7 @@ def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
     depart_speed = hosted.scenario.depart_speed
     vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
-    network = build_network(site.intersection, site.speed_limit, folder, options.home)
+    network = build_network(site, folder, options.home)
     job = Job(
         command=_command(options.gui),
         folder=str(folder),

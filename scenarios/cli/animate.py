@@ -33,9 +33,12 @@ def animate(
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
+    unit: options.Unit = None,
+    fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
     side: options.Side = "left",
     bearings: options.Bearings = None,
+    lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = None,
     arrivals: options.Arrivals = None,
@@ -54,6 +57,7 @@ def animate(
     check_file(out)
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
+        unit=unit, fleet=fleet, lane_width=lane_width,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     number("--from [s]", begin, low=0, below=junction.horizon)

@@ -90,7 +90,7 @@ class Parting(NamedTuple):
     time: float  # [s]
     vehicle: int  # index into the trips
     movement: str  # such as "a2"
-    positions: tuple[float, float]  # from the road entry, in minisim and in SUMO [m]
+    positions: tuple[float, float]  # on its path, in minisim and in SUMO [m]
     speeds: tuple[float, float]  # in minisim and in SUMO [m/s]
     minisim: pd.DataFrame  # trajectories around it (`Run.trajectories`)
     sumo: pd.DataFrame

@@ -22,7 +22,8 @@ from minisim.simulation import Simulation
 from scenarios import Scenario, four_way
 from scenarios.controllers import CONTROLLERS, controller_named
 from scenarios.profiles import Profile
-from scenarios.strategies import scenarios, vehicles
+from scenarios.strategies import controllers as safe_controllers
+from scenarios.strategies import scenarios, uneven, vehicles
 from tests.builders import Fixed, digest, drained, hardest_braking, replayed, share
 
 #: Time to serve the arrivals of two minutes; far more than any fair share of the junction needs.
@@ -89,6 +90,21 @@ def test_no_vehicle_collides_and_each_is_served(
 ) -> None:
     scenario = data.draw(scenarios(max_density=densest))
     served_without_collision(scenario, data.draw(controllers), seed)
+
+
+@given(uneven(), safe_controllers(), seeds)
+@settings(max_examples=60)
+def test_roads_that_differ_are_as_safe(
+    scenario: Scenario, controller: Controller, seed: int
+) -> None:
+    run = served_without_collision(scenario, controller, seed)
+    taken = run.rows["path"]
+    assert run.site.intersection.allowed[taken].all()
+    limits = np.array([run.site.limit(p.exit_arm) for p in run.site.intersection.paths])
+    ends = np.array([path.exit for path in run.site.intersection.paths])
+    path = taken[run.trace["row"]]
+    past = run.trace["s"] > ends[path]
+    assert (run.trace["v"][past] <= limits[path][past] + 1e-6).all()
 
 
 @given(scenarios(max_density=250.0), vehicles(), seeds, st.sampled_from(GATES))

@@ -32,6 +32,7 @@ from minisim.control import (
     Hold,
     Open,
     Plan,
+    Site,
     Unregulated,
     View,
     Wake,
@@ -320,7 +321,11 @@ def test_a_collision_stops_the_run_with_a_replay() -> None:
 @given(intersections())
 def test_any_geometry_becomes_the_same_network(intersection: Intersection) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        made = network.build_network(intersection, 14.0, Path(folder), host.sumo_home())
+        made = network.build_network(
+            Site(intersection, VehicleType(), 14.0, (0.0,) * intersection.n),
+            Path(folder),
+            host.sumo_home(),
+        )
         root = ET.parse(Path(folder) / network.NETWORK).getroot()
     arcs = [path.crossing for path in intersection.paths]
     assert made.approach == pytest.approx([intersection.approach_length] * len(arcs), abs=1e-4)

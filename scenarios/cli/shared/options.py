@@ -37,6 +37,9 @@ Density = Annotated[
 ]
 Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
 Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
+Unit = Annotated[str | None, option("Of the inflow: veh, pcu, pcu-irc64, pcu-hcm.", "NAME")]
+Fleet = Annotated[str | None, option("Vehicle types: india, car:0.9,bus:0.1, …", "MIX")]
+LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.", "M")]
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
@@ -106,7 +109,7 @@ def build_scenario(
     from scenarios.library import refuse_beside, scenario_named
 
     given = {key: value for key, value in more.items() if value is not None}
-    drawn = [f"--{key}" for key in ("density", "split", "turns") if key in given]
+    drawn = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
     if demand is not None:
         refuse_beside("--demand", drawn)
         given["demand"] = read_demand(demand, start)
