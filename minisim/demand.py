@@ -16,7 +16,7 @@ from minisim.clock import seconds_of, time_of_day
 from minisim.errors import InputError, instance, items, number, numbers, show
 from minisim.inflow import MAX_DENSITY, MAX_TIME, Floats, Inflow, counted, spaced
 from minisim.junction.movements import ARM_NAMES, Bools
-from minisim.parameters import checked, declared, real, reals, text, word
+from minisim.parameters import Reals, Takes, checked, declared, real, reals, text, word
 from minisim.streams import stream
 
 MODELS = ("poisson", "exponential", "shifted")
@@ -98,13 +98,31 @@ class ArrivalModel:
     def inflow(self, n: int, allowed: Bools | None = None) -> Inflow:
         """The inflow of n lanes, 0 where none of the manoeuvres is `allowed`, shape (n, n−1).
 
-        `InputError` if it does not fit the lanes, or is more than possible.
+        Raises `InputError` if it does not fit the lanes, or is more than possible.
         """
         raise NotImplementedError
 
-    def turning(self, n: int) -> Floats:
-        """Shares of the manoeuvres by period of the inflow and lane, shape (p, n, n−1)."""
+    def turns_of_periods(self) -> dict[str, Any]:
+        """What messages call the turns of each period -> the turns, as `read_turns` gives them."""
         raise NotImplementedError
+
+    def turning(self, n: int, allowed: Bools | None = None) -> Floats:
+        """Shares of the manoeuvres that are allowed, by period and lane, shape (p, n, n−1).
+
+        Raises `InputError` if they do not fit the lanes, leave one nothing that is allowed, or, if
+        given by lane, have a share of what is not.
+        """
+        given = self.turns_of_periods()
+        shares = np.array([_turning(name, turns, n) for name, turns in given.items()])
+        if allowed is None:
+            return shares
+        for name, turns in given.items():
+            for lane, row in enumerate(turns if _by_lane(turns) else ()):
+                if row is not None and (np.array(row)[~allowed[lane]] > 0.0).any():
+                    raise InputError(
+                        f"{name} send vehicles of lane {ARM_NAMES[lane]} where none may go"
+                    )
+        return _open_turns(shares, allowed)
 
     @property
     def duration(self) -> float:
@@ -114,7 +132,7 @@ class ArrivalModel:
     def check(self, n: int, duration: float, allowed: Bools | None = None) -> None:
         """Raise `InputError` if it is not for n lanes, or ends before `duration` [s]."""
         self.inflow(n, allowed)
-        _open_turns(self.turning(n), allowed)
+        self.turning(n, allowed)
         if duration > self.duration:
             raise InputError(
                 f"the demand {self.words[0]!r} ends {self.duration:g} s after the start, before "
@@ -134,7 +152,7 @@ class ArrivalModel:
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
         self.check(n, duration, allowed)
-        inflow, turning = self.inflow(n, allowed), _open_turns(self.turning(n), allowed)
+        inflow, turning = self.inflow(n, allowed), self.turning(n, allowed)
         rng = stream(seed, "arrivals")
         if self.model == "poisson":
             time, lane = counted(inflow, duration, rng)
@@ -176,7 +194,8 @@ class Demand(ArrivalModel):
         partial(read_shares, equal=BALANCED), f"shares such as 4:3:2:1 | {BALANCED}", default=None,
     )  # fmt: skip
     turns: Turns = checked(
-        "shares of the manoeuvres 1 … n−1, the same on every lane or a row for each",
+        "shares of the manoeuvres 1 … n−1, the same on every lane among those allowed there, or a "
+        "row for each",
         read_turns, f"shares such as 1:2:1 or 1:2:1/0:1:1/… | {UNIFORM}", default=None,
     )  # fmt: skip
 
@@ -187,7 +206,8 @@ class Demand(ArrivalModel):
 
     def rates(self, n: int, allowed: Bools | None = None) -> tuple[float, ...]:
         """Mean inflow of each of n lanes [veh/h]; 0 where none of the manoeuvres is `allowed`."""
-        shares, used = _shares("split", self.split, n, "lanes"), n
+        shares = _shares("split", self.split, n, "lanes")
+        used = n
         if allowed is not None:
             lanes = np.asarray(allowed.any(axis=1))
             shares, used = _open_shares(shares, lanes, even=self.split is None), int(lanes.sum())
@@ -197,9 +217,9 @@ class Demand(ArrivalModel):
         """As of `ArrivalModel`: one period."""
         return Inflow((0.0,), (self.rates(n, allowed),))
 
-    def turning(self, n: int) -> Floats:
+    def turns_of_periods(self) -> dict[str, Any]:
         """As of `ArrivalModel`: one period."""
-        return np.array([_turning("turns", self.turns, n)])
+        return {"turns": self.turns}
 
 
 def _whole(title: str, value: object) -> int:
@@ -229,9 +249,15 @@ def _periods(title: str, value: object) -> tuple[Period, ...]:
 class Period:
     """A time of day with one inflow, such as a quarter of an hour of a count."""
 
-    start: int = checked("its start", _whole, "time of day such as 07:00 | whole seconds")
-    end: int = checked("its end", _whole, "time of day such as 07:15 | whole seconds")
-    rates: tuple[float, ...] = reals("mean inflow of each lane", "veh/h", low=0, high=MAX_DENSITY)
+    start: Takes[int, int | str] = checked(
+        "its start", _whole, "time of day such as 07:00 | whole seconds"
+    )
+    end: Takes[int, int | str] = checked(
+        "its end", _whole, "time of day such as 07:15 | whole seconds"
+    )
+    rates: Reals[tuple[float, ...]] = reals(
+        "mean inflow of each lane", "veh/h", low=0, high=MAX_DENSITY
+    )
     turns: Turns = checked(
         "shares of the manoeuvres 1 … n−1, the same on every lane or a row for each",
         read_turns, f"shares such as 1:2:1 or 1:2:1/0:1:1/… | {UNIFORM}", default=None,
@@ -258,7 +284,7 @@ class DemandProfile(ArrivalModel):
     periods: tuple[Period, ...] = checked(
         "one after the other, without holes", _periods, "Periods"
     )  # fmt: skip
-    start: float = checked(
+    start: Takes[int, float | str | None] = checked(
         "time of day at which a run begins; none is the start of the first period",
         lambda _, value: _whole("start", value), "time of day such as 07:00 | whole seconds",
         optional=True, default=None,
@@ -295,13 +321,17 @@ class DemandProfile(ArrivalModel):
                 raise InputError(
                     f"the demand {self.name!r} has {len(period.rates)} lanes, the junction has {n}"
                 )
-            if allowed is not None:
-                _open_shares(period.rates, np.asarray(allowed.any(axis=1)), even=False)
+            for lane, rate in enumerate(period.rates):
+                if rate and allowed is not None and not allowed[lane].any():
+                    raise InputError(
+                        f"the demand {self.name!r} has vehicles from lane {ARM_NAMES[lane]}, but "
+                        "none may come from there"
+                    )
         return Inflow(starts, tuple(self._fit(p.rates, f"the period {p}") for p in self.ahead))
 
-    def turning(self, n: int) -> Floats:
+    def turns_of_periods(self) -> dict[str, Any]:
         """As of `ArrivalModel`."""
-        return np.array([_turning(f"turns of {p}", p.turns, n) for p in self.ahead])
+        return {f"turns of {period}": period.turns for period in self.ahead}
 
 
 def _text(value: object) -> bool:
@@ -348,11 +378,9 @@ def _open_shares(shares: tuple[float, ...], lanes: Bools, *, even: bool) -> tupl
     )
 
 
-def _open_turns(turns: Floats, allowed: Bools | None) -> Floats:
-    """Shares of the manoeuvres by period and lane, (p, n, n−1), without those not allowed."""
-    if allowed is None:
-        return turns
-    kept, lanes = np.where(allowed, turns, 0.0), np.asarray(allowed.any(axis=1))
-    for lane in np.flatnonzero((lanes & (kept.sum(axis=2) == 0.0)).any(axis=0)).tolist():
+def _open_turns(turning: Floats, allowed: Bools) -> Floats:
+    """Shares of the manoeuvres, shape (p, n, n−1), without those not allowed."""
+    kept, lanes = np.where(allowed, turning, 0.0), np.asarray(allowed.any(axis=1))
+    for lane in np.flatnonzero(lanes & (kept.sum(axis=2) == 0.0).any(axis=0)).tolist():
         raise InputError(f"turns leave lane {ARM_NAMES[lane]} none of the manoeuvres allowed there")
     return np.where(lanes[:, None], kept, 1.0)  # no vehicle draws the latter

@@ -48,7 +48,7 @@ def read_demand(path: AnyPath, start: float | str | None = None) -> DemandProfil
     periods = tuple(_made(f"{path}: period {k}", Period, it) for k, it in enumerate(blocks, 1))
     given = {"name": Path(path).stem, **table, "periods": periods}
     demand: DemandProfile = _made(f"{path}", DemandProfile, given)
-    return demand if start is None else replace(demand, start=start)  # type: ignore[arg-type]  # a text, too
+    return demand if start is None else replace(demand, start=start)
 
 
 def write_demand(demand: DemandProfile, path: AnyPath) -> None:

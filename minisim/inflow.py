@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from minisim.errors import InputError, items, number, numbers
-from minisim.parameters import checked, declared, reals
+from minisim.parameters import Reals, Takes, checked, declared, reals
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -38,8 +38,8 @@ def _rows(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
 class Inflow:
     """Mean inflow of each lane in each of the periods of a run; the last has no end."""
 
-    starts: tuple[float, ...] = reals("of the periods: 0, then later ones", "s", low=0)
-    rates: tuple[tuple[float, ...], ...] = checked(
+    starts: Reals[tuple[float, ...]] = reals("of the periods: 0, then later ones", "s", low=0)
+    rates: Takes[tuple[tuple[float, ...], ...], Iterable[Iterable[float]]] = checked(
         "of each lane, a row per period", _rows, f"rows of numbers 0 … {MAX_DENSITY:g}", "veh/h"
     )
 

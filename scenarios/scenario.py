@@ -84,6 +84,7 @@ class Scenario:
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
+        junction = self.intersection
         varies = self.recorded is None and isinstance(self.demand, DemandProfile)
         return Site(
             intersection=self.intersection,
@@ -92,7 +93,7 @@ class Scenario:
             demand=self.rates,
             dt=self.profile.dt,
             seed=seed,
-            inflow=self.demand.inflow(self.intersection.n) if varies else None,
+            inflow=self.demand.inflow(junction.n, junction.allowed_by_lane) if varies else None,
         )
 
     def arrivals(self, seed: int) -> Arrivals:

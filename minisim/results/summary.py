@@ -62,9 +62,8 @@ def summarise(
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
     complete form. Trips are grouped by lane (`lanes`) and, if there are several, by kind (`kinds`)
-    and type (`types`).
-    `spillback_s`, of each lane and of all, is when a queue first reached the end of its road
-    (`minisim.results.spillback`), None if none did.
+    and type (`types`). `spillback_s`, of each lane and of all, is when a queue first reached the
+    end of its road (`minisim.results.spillback`), None if none did.
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).

@@ -196,7 +196,7 @@ def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
     "turns", ["1:0:0/uniform/0:1:1/0:0:5", [(1, 0, 0), None, [0, 1, 1], "0:0:5"]]
 )
 def test_turns_may_differ_by_lane(turns: object) -> None:
-    demand = Demand(density=350.0, turns=turns)  # type: ignore[arg-type]  # as in files
+    demand = Demand(density=350.0, turns=turns)
     assert demand.turns == ((1, 0, 0), None, (0, 1, 1), (0, 0, 5))
     assert demand.words == ("balanced", "1:0:0/uniform/0:1:1/0:0:5")
     table = np.zeros((4, 3))
@@ -207,8 +207,8 @@ def test_turns_may_differ_by_lane(turns: object) -> None:
     np.testing.assert_array_less(np.abs(table - expected), 4.0 * np.sqrt(expected) + 1e-9)
 
 
-MORNING = Period(start="07:00", end="07:15", rates=(400, 0, 200, 100), turns="1:0:0")  # type: ignore[arg-type]  # as in files
-NOON = Period(start="07:15", end="09:15", rates=(100, 50, 0, 300), turns="1:1:0/0:1:1/1:0:1/0:1:0")  # type: ignore[arg-type]  # as in files
+MORNING = Period(start="07:00", end="07:15", rates=(400, 0, 200, 100), turns="1:0:0")
+NOON = Period(start="07:15", end="09:15", rates=(100, 50, 0, 300), turns="1:1:0/0:1:1/1:0:1/0:1:0")
 PROFILE = DemandProfile(name="Market", periods=(MORNING, NOON))
 
 
@@ -236,7 +236,7 @@ def test_the_end_of_a_period_does_not_hold_back_a_lane() -> None:
 
 
 def test_a_run_may_begin_within_a_period() -> None:
-    later = replace(PROFILE, start="07:10")  # type: ignore[arg-type]  # as in files
+    later = replace(PROFILE, start="07:10")
     assert later.duration == 125 * 60
     assert later.inflow(4).starts == (0.0, 300.0)
     assert PROFILE.inflow(4).mean(0, 1800) == pytest.approx((250, 25, 100, 200))

@@ -76,7 +76,7 @@ def test_recorded_arrivals_replace_the_demand() -> None:
 
 
 def test_demand_by_time_of_day_replaces_the_constant_one_and_gives_the_horizon() -> None:
-    half = Period(start=0, end=1800, rates=(100, 0, 200), turns="1:3")  # type: ignore[arg-type]
+    half = Period(start=0, end=1800, rates=(100, 0, 200), turns="1:3")
     day = DemandProfile(periods=(half, replace(half, start=1800, end=3600, rates=(300, 0, 0))))
     scenario = three_way(demand=day)
     assert scenario.horizon == 3600.0
