@@ -69,7 +69,7 @@ class AllWayStopSession:
         heads = self._heads(view)
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
-        # A moving head can stand as soon as comfortable braking has stopped it.
+        # A moving head can be standing once comfortable braking has stopped it.
         moving = [v.speed for v in heads if v.id not in self._standing]
         looks = [view.time + (speed - HALTING) / self._vehicle.deceleration for speed in moving]
         queue = [v for v in heads if v.id in self._standing]

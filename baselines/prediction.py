@@ -1,7 +1,7 @@
-"""Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
+"""Where a vehicle will be, step by step, if it drives on as hosts move vehicles that are alike.
 
-It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.laws`). Positions count from the junction entry.
+By the run's own law (`minisim.laws`) it follows the vehicles ahead in its lane, and those that
+enter its exit lane first. Their motion is known. Positions count from the junction entry.
 """
 
 from __future__ import annotations

@@ -12,13 +12,13 @@ The protocol:
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
   their grants, so a later grant never slows down an earlier one. The law lets a vehicle in the
-  junction follow the one before it into the exit lane as if both were on one arc. A passage on
+  junction follow the one ahead of it into the exit lane as if both were on one arc. A passage on
   which it brakes harder than is comfortable for that vehicle is refused.
 - A refused vehicle drives up to its stop line and slows down as late as is comfortable. Refused
   requests are considered again every `period`, in the order in which they were first made.
 
 Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
-their predictions, and predicts anew where they differ. A holder whose new passage no longer fits
+their predictions, and predicts again where they differ. A holder whose new passage no longer fits
 loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
@@ -68,7 +68,7 @@ class Reservation:
     # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
     reach: float | None = real(
-        "how far before the junction vehicles ask; none is the stopping distance at the limit and "
+        "how far before the junction vehicles ask; none means stopping distance at the limit and "
         "a period's way: as late as possible without slowing down for a refusal", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
@@ -137,7 +137,7 @@ class Manager:
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int) -> Slot | None:
-        """A vehicle's passage behind the holders before it in both lanes; None if it hits one."""
+        """A vehicle's passage behind the holders ahead of it in both lanes; None if it hits one."""
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]

@@ -9,13 +9,13 @@
    of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
 3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
 4. *free for a moment is free*: on release a vehicle is expected to leave after (v_des − v)/a,
-   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list reckon with
+   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list assume
    1.3 s instead of 11 s;
 5. *advice is for good*: the speed of the release, √(v² + 2aD) up to 20 m/s, is never replaced;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
    advice of 0 stops a vehicle at once.
 
-The loop of the authors' driver runs every 0.01 s, and what it sets takes effect in the next step.
+The loop of the authors' script runs every 0.01 s, and what it sets takes effect in the next step.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Platoon(NamedTuple):
     movement: int  #: its index
     driven: float  #: distance since insertion [m]
     speed: float  #: [m/s]
-    #: Sorts vehicles that register in the same step, as the authors' driver spawned them.
+    #: Sorts vehicles that register in the same step, as the authors' script spawned them.
     order: tuple[float, ...]
 
 
@@ -152,7 +152,7 @@ class V2ICAsRunSession:
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
         if self._origin < LEFT:
             raise InputError(
-                f"the as-run V2I-C ends {LEFT:g} m after insertion, the approach lanes leave "
+                f"the as-run V2I-C ends {LEFT:g} m after insertion, but the approach lanes leave "
                 f"{self._origin:.4g} m"
             )
         insertion = self._origin + INSERTION

@@ -85,7 +85,7 @@ class AsRunDim:
         ORDERS, default="lanes",
     )  # fmt: skip
     matrix: Spelled[HarmonyMatrix | None] = part(
-        "harmony of the movements; none is the paper's table",
+        "harmony of the movements; none means the paper's",
         HarmonyMatrix,
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
         optional=True, default=None,
@@ -114,7 +114,7 @@ class AsRunDim:
 
 
 class Car(NamedTuple):
-    """What the rules know about a vehicle: its name in the authors' driver, and how far it is."""
+    """What the rules know about a vehicle: its name in the authors' script, and how far it is."""
 
     id: int
     name: str
@@ -220,8 +220,8 @@ class AsRunSession:
         zones = rules.red_start, rules.yellow_start, rules.green_start, rules.bound
         if rules.red_start > self._origin:
             raise InputError(
-                f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "
-                f"leave {self._origin:.4g} m"
+                f"the as-run zones begin {rules.red_start:g} m after insertion, but the approach "
+                f"lanes leave {self._origin:.4g} m"
             )
         self.plan = Plan(
             marks=tuple(self._origin - edge for edge in (*zones, FREED, CLEAR, FOLLOWED)),

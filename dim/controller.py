@@ -80,8 +80,8 @@ class Dim:
     )  # fmt: skip
     priorities: Takes[tuple[int, ...] | _Word | None, Iterable[int] | _Word | None] = checked(
         "which lane comes first: ranks of the lanes a, b, c, …, 0 first; inflow, the one with the "
-        "highest demand; rotating, each in turn; waiting, the one that has waited longest; none is "
-        "their own order",
+        "highest demand; rotating, each in turn; waiting, the one that has waited longest; none "
+        "means their own order",
         _priorities, "ranks such as (0,1,2,3) | inflow | rotating | waiting",
         optional=True, default=None,
     )  # fmt: skip
@@ -89,7 +89,7 @@ class Dim:
         "the road markings", Zones, kinds={"zones": Zones}, default=Zones()
     )
     matrix: Spelled[HarmonyMatrix | None] = part(
-        "harmony of the movements; none derives it from geometry and vehicle",
+        "harmony of the movements; none means from geometry and vehicle",
         HarmonyMatrix,
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
         optional=True, default=None,
@@ -114,7 +114,7 @@ class Dim:
         optional=True, default=None,
     )  # fmt: skip
     period: float | None = real(
-        "time between two looks, besides the wake-ups; none is what the perception needs", "s",
+        "time between two looks, besides the wake-ups; none means as the perception needs", "s",
         above=0, optional=True, default=None,
     )  # fmt: skip
 

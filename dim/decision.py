@@ -20,7 +20,7 @@ from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.junction.movements import ARM_NAMES, Movement
 
 #: "size": the largest clique and, among equals, the one with the higher-priority lanes (as the
-#: paper words it). "lanes": of all maximal cliques, the latter (as in its published runs).
+#: paper words it). "lanes": of all maximal cliques, the one with those (as in its published runs).
 ORDERS = ("size", "lanes")
 
 MAX_CASES = 1_000_000  #: more are not tried: 7 arms have 823,542 cases, 8 arms 17 million

@@ -72,7 +72,7 @@ class HarmonyMatrix:
     def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
         """Read a matrix: a header `,a1,a2,…`, then one line per movement, `a1,0,0,1,…`.
 
-        Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
+        Raises `FileError` if it is unreadable or not such a table (with the line), `InputError`
         for labels or entries that do not make a harmony matrix (with the entry).
         """
         return _parse(read_file("harmony matrix", path), f"harmony matrix {path!s}")
@@ -129,7 +129,7 @@ class HarmonyMatrix:
         return f"paper({self.n})" if paper else ""
 
     def __repr__(self) -> str:
-        # The repr of a controller is kept as provenance; the digest tells matrices apart in it.
+        # A controller's repr is kept as provenance, where the digest tells matrices apart.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
         return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"

@@ -17,7 +17,7 @@ exact perception and `commit="stoppable"` a monitor never brakes, and a run is t
 Two vehicles must not brake for each other for ever. Of two that stand, the one further in goes
 first (if equal, the one from the first lane), unless the other is in its way. Both see which it is.
 
-Nor may vehicles before the junction wait for each other for ever. If they misread each other, each
+Vehicles before the junction must not wait for each other for ever. If they misread each other, each
 may conclude that it is not its turn. But some vehicle always has the right of way. So if no vehicle
 crosses and all have stood for a while, the first lane goes alone (`Patience`).
 """
@@ -67,7 +67,7 @@ class Monitor:
     )  # fmt: skip
     # Less than 1 m/s² is no braking even on ice.
     deceleration: float | None = real(
-        "how hard it brakes at most; none is what the brakes can do", "m/s²",
+        "how hard it brakes at most; none means what the brakes can", "m/s²",
         low=1, high=1000, optional=True, default=None, label="deceleration of the monitor",
     )  # fmt: skip
     # At an all-way stop, SUMO recommends 1 … 2 s between two vehicles (`jmAllwayStopWait`).
@@ -129,7 +129,7 @@ class Monitors:
         self._braking = braking
 
     def _asked(self, ego: Observed, other: Observed, readings: set[int]) -> float:
-        """How hard the ego must brake for another, whatever that does [m/s²]; 0 if not at all."""
+        """How hard the ego must brake for another, whatever it does [m/s²]; 0 if not at all."""
         mine = self._rows[ego.lane][ego.manoeuvre]
         foes = (k for k in self._possible(other, readings) if self._conflict[mine, k])
         return max((self._asked_by(ego, mine, other, theirs) for theirs in foes), default=0.0)

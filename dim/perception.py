@@ -18,8 +18,8 @@ from minisim.parameters import declared
 #: longer stop it before the junction. "paper": when it is past the middle of the green zone.
 COMMITS = ("stoppable", "paper")
 
-ROUNDING = 1e-6  #: by how much a vehicle that has passed a mark may seem to be before it [m]
-UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent, which may be any
+ROUNDING = 1e-6  #: how far short of a mark a vehicle past it may seem to be [m]
+UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent
 
 #: Turns a view and an ego in it into the view that the ego sees. The ego sees itself exactly.
 See = Callable[[View, Observed], View]
@@ -82,7 +82,7 @@ class Reader(NamedTuple):
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        One that brakes comfortably for the hold line never is: the green zone exceeds the margin.
+        Not one braking comfortably for the hold line: the green zone exceeds the margin.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0

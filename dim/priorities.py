@@ -1,15 +1,15 @@
 """Which lane comes first where cliques tie: priorities that all vehicles know without a message.
 
-Fixed ranks starve the last lane. The two rules here change the ranks with time, by nothing that a
-vehicle cannot know on its own. All that look at the same moment get the same ranks:
+Fixed ranks starve the last lane. The two rules here change the ranks with time, by what every
+vehicle can know on its own. Vehicles that look at the same moment get the same ranks:
 
 - "rotating" needs a shared clock, such as satellite navigation has. Each lane in turn comes first
   for some seconds, and the others follow clockwise.
 - "waiting" puts first the lane whose front vehicle passed the start of the yellow zone longest ago.
-  A vehicle that comes later has watched only since the junction came within range of its sensors:
-  before it takes part, for at least `memory` = (range − yellow zone's start) / speed limit, since
-  no vehicle drives faster. So no wait counts for more than `memory`, and every participant knows
-  all waits: a vehicle that passed before the latecomer began to watch has waited longer than that.
+  A latecomer has watched only since the junction came within range of its sensors. Before it takes
+  part, that is at least `memory` = (range − yellow zone's start) / speed limit, since no vehicle
+  drives faster. So no wait counts for more than `memory`, and every participant knows all waits: a
+  vehicle that passed before the latecomer began to watch has waited longer than that.
   Lanes that tie are ranked as in "rotating".
 """
 

@@ -24,9 +24,9 @@ MODELS = ("poisson", "exponential", "shifted")
 BALANCED, UNIFORM = "balanced", "uniform"
 #: A driver's factor on the speed limit; SUMO cuts its speedFactor to the same range.
 LEAST_FACTOR, MOST_FACTOR = 0.2, 2.0
-#: More than any lane can carry: a higher density is a typing error.
+#: More than any lane can carry: a higher density is a mistake.
 MAX_DENSITY = 3600.0
-#: More in one second have a chance below 10⁻¹⁶ at any density.
+#: The chance of more in one second is below 10⁻¹⁶ at any density.
 MOST_IN_A_SECOND = 20
 #: Seconds, or headways of each lane, drawn at once.
 BLOCK, HEADWAYS = 3600, 64
@@ -74,7 +74,7 @@ class Arrivals:
     def rank(self) -> Ints:
         """Each vehicle's place among those of its lane, from 0.
 
-        What chance makes of a vehicle, such as a human's, is drawn by lane and rank, so it does not
+        Random traits, such as a human driver, are drawn by lane and rank, so they do not
         depend on other lanes or on the horizon.
         """
         return ranks(self.lane)
@@ -124,7 +124,7 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
         try:
             value = tuple(map(float, re.split("[:,]", listed)))
         except ValueError:
-            wrong = f"{name} is {equal} or written like 4:3:2:1, got {show(value)}"
+            wrong = f"{name} must be {equal} or like 4:3:2:1, got {show(value)}"
             raise InputError(wrong) from None
     shares = numbers(name, value)
     if not shares or min(shares) < 0 or not 0 < sum(shares) < math.inf:

@@ -66,7 +66,7 @@ class Site:
 
     @property
     def looks_out(self) -> bool:
-        """Whether vehicles let others pass that cross their way inside the junction.
+        """Whether vehicles give way to those crossing inside the junction.
 
         Only on SUMO's own ways, since its table of foes goes with them.
         """
@@ -124,7 +124,7 @@ class Site:
 class Observed(NamedTuple):
     """One vehicle in a view.
 
-    Draw what chance makes of a vehicle by its lane and rank: its id depends on other lanes.
+    Draw random traits of a vehicle by its lane and rank: its id depends on other lanes.
     """
 
     id: int  # the same in every view of a run
@@ -307,7 +307,7 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far, which only grows; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may clash with a summary's own."""
 
 
 @runtime_checkable
@@ -366,7 +366,7 @@ class Controller(Protocol):
 
 
 def as_controller(what: str, value: object) -> Controller:
-    """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
+    """Return `value` if it is a controller; `what` names it in the `InputError` if not."""
     try:
         if isinstance(value, Controller) and not isinstance(value, type):
             printable(f"the name of {what}", value.name)
@@ -378,7 +378,7 @@ def as_controller(what: str, value: object) -> Controller:
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
-    hint = "; make it by scenarios.controllers.controller_named" if named else ""
+    hint = "; make it with scenarios.controllers.controller_named" if named else ""
     raise InputError(f"{what} is not a controller: {why}{hint}")
 
 

@@ -35,7 +35,7 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched, and the run was not told to record that and go on.
+    """Two bodies touched, and the run does not record that and go on.
 
     Attributes:
         collisions: the `minisim.engine.collision.Collision`s of the last step.
@@ -131,7 +131,7 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 def nearest(value: object, allowed: Iterable[str]) -> str:
-    """The question whether the nearest of `allowed` was meant, in any case of letters; else ""."""
+    """A question that suggests the nearest of `allowed`, whatever its case; "" if none is near."""
     options = {option.casefold(): option for option in allowed}
     text = value.casefold() if isinstance(value, str) else ""
     close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)

@@ -167,7 +167,7 @@ def part(
 ) -> Any:
     """Another object, of the class or protocol `kind`.
 
-    A text, or a table as in TOML, gives it by a word in `kinds`, which maps each word to what makes
+    A text or a table (as in TOML) may name it by a word in `kinds`, which maps words to what makes
     it: `on`, `noisy(delay=0.1)`. `off` means none.
     """
     classes = kind if isinstance(kind, tuple) else (kind,)

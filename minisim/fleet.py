@@ -24,9 +24,9 @@ ROUNDING = 1e-6
 #: Sizes of vehicles on Indian roads (Chandra, Kumar 2003, Journal of Transportation Engineering
 #: 129:155, table 1). What they can do is SUMO's default for the class (page "Vehicle Type Parameter
 #: Defaults"), with three exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
-#: a vehicle that likes to brake at 10 m/s², so it drives like a car. There is no class for
-#: auto-rickshaws: the acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
-#: Moratuwa, handle 123/19055), the brakes are those of heavy vehicles.
+#: a vehicle whose comfortable braking is 10 m/s², so it drives like a car. There is no class for
+#: auto-rickshaws: their acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
+#: Moratuwa, handle 123/19055), their brakes are those of heavy vehicles.
 _INDIAN = (
     VehicleType(name="motorcycle", length=1.87, width=0.64),
     VehicleType(
@@ -100,7 +100,7 @@ def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
 class Fleet:
     """Which types of vehicles drive, and how many of each.
 
-    Which type a vehicle has is drawn by its lane and its place there, so it depends on nothing
+    A vehicle's type is drawn by its lane and its place there, so it depends on nothing
     else.
     """
 
@@ -135,7 +135,7 @@ class Fleet:
         return tuple(row[min(lane, len(row) - 1)] for row in self.shares)
 
     def check(self, n: int) -> None:
-        """Raise `InputError` for shares by lane that are not those of `n` lanes."""
+        """Raise `InputError` for shares by lane unless there are `n` lanes."""
         for row in self.shares:
             if len(row) not in (1, n):
                 raise InputError(f"the fleet has shares for {len(row)} lanes, the junction has {n}")
@@ -147,7 +147,7 @@ class Fleet:
 
     @cached_property
     def worst(self) -> VehicleType:
-        """A vehicle that is in every respect as bad as the worst: the longest, the weakest brakes.
+        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
 
         With one type it is that type.
         """
@@ -182,7 +182,7 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
-        value: a Fleet or VehicleType as it is; or the shares of `TYPES`, as a table such as
+        value: a Fleet or VehicleType, kept unchanged; or the shares of `TYPES`, as a table such as
             `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
             such as "car:0.8,bus:0.2".
         base: its law drives the vehicles of a table or text.
@@ -207,14 +207,14 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
     if base.sumo is not None:
-        raise InputError("a fleet goes with the profiles paper and fair, not with SUMO's vehicles")
+        raise InputError("a fleet needs the profile paper or fair, not with SUMO's vehicles")
     types = [TYPES[choice("vehicle type", name, TYPES)] for name in value]
     return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
 
 
 #: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
 #: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
-#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and knows no
+#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and has no
 #: motorcycles or auto-rickshaws.
 PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "IRC:106": {
@@ -238,12 +238,12 @@ _ALIKE = {
 def pcu_factors(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> tuple[float, ...]:
     """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
 
-    Where a source has two factors, they are those of shares of 5 % and 10 %; in between the factor
-    is interpolated. Raises `InputError` for a source or a type without a factor.
+    Where a source has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
+    interpolated. Raises `InputError` for a source or a type without a factor.
     """
     table = PCU[choice("source of passenger car units", source, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    if len(fleet.types) == 1:  # the unit is made for cars alone
+    if len(fleet.types) == 1:  # the unit is defined by cars alone
         return (1.0,)
     kinds = [_ALIKE.get(name, name) for name in fleet.names]
     rows = [table[choice(f"vehicle type in {source}", kind, table)] for kind in kinds]

@@ -62,12 +62,12 @@ class Law(NamedTuple):
     width: float
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
-    leave: float  # s up to which a vehicle at least stays in view
+    leave: float  # s up to which a vehicle stays in view at least
     room: float  # see `minisim.junction.partings.turning_room`
     margin: float  # see `minisim.vehicle.VehicleType`
     sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
-    depart_speed: float  # the most at insertion
+    depart_speed: float  # highest at insertion
     wake_on_clear: bool
     record_from: int  # ticks
     record_to: int
@@ -112,7 +112,7 @@ def build_law(
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )
-    # A whole number for a float would have every kernel compiled once more.
+    # An int in place of a float would recompile every kernel.
     whole = ("model", "record_from", "record_to")
     plain: dict[str, Any] = {
         k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole
@@ -122,7 +122,7 @@ def build_law(
 
 @njit_inline
 def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """The weight that this run's law gives a vehicle ahead, from 0 to infinity; the most decides.
+    """The weight that this run's law gives a vehicle ahead, 0 to infinity; the largest decides.
 
     Under the IDM it is the desired gap over the actual one, under Krauß's law 1/(safe speed).
     """
@@ -136,7 +136,7 @@ def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
 def room_behind(gap: float, v_leader: float, law: Law) -> float:
     """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader stops no sooner than its brakes can, and what corners need in a turn stays free.
+    The leader stops no sooner than its brakes can, and there is room for corners in a turn.
     """
     room = gap - law.room
     if law.semi_implicit:
@@ -190,7 +190,7 @@ def follow(v: float, v0: float, z: float, law: Law) -> float:
 def within(v: float, acc: float, limit: float, law: Law) -> float:
     """`acc`, unless a step of it would take a vehicle past its speed limit.
 
-    Where a·dt is large the IDM would overshoot: it takes a step for short.
+    Where a·dt is large, the IDM would overshoot: it assumes short steps.
     """
     return (limit - v) / law.dt if v < limit < v + acc * law.dt else acc
 
@@ -231,7 +231,7 @@ def slow_down(v: float, acc: float, target: float, distance: float, law: Law) ->
 
 @njit
 def krauss_stop(v: float, room: float, law: Law) -> float:
-    """The acceleration with which a vehicle may still stop in `room` [m], as Krauß's law has it.
+    """The acceleration with which a vehicle may still stop in `room` [m] by Krauß's law.
 
     Source: SUMO's `MSCFModel_Krauss::stopSpeed`.
     """
@@ -265,7 +265,7 @@ def hold(v: float, s: float, law: Law) -> float:
 
 @njit
 def stop_at_line(v: float, to_line: float, law: Law) -> float:
-    """`hold` as SUMO has it: a vehicle stops 1 m before a line, or nearer if it must.
+    """`hold` by SUMO's rule: a vehicle stops 1 m before a line, or nearer if it must.
 
     Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
     """

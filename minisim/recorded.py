@@ -15,7 +15,7 @@ from minisim.files import AnyPath, read_file, write_text
 from minisim.junction.movements import ARM_NAMES
 
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
-#: May follow: the drivers' factors on the speed limit.
+#: Optional: the drivers' factors on the speed limit.
 FACTORS = "speed_factor"
 #: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
 #: that none does is (1/2)^30, one in 10^9.

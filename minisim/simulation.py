@@ -71,7 +71,7 @@ class Simulation:
         self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
-            raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
+            raise InputError("on_collision 'teleport' needs a CruiseVehicle")
         self._road = build_road(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)

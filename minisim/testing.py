@@ -65,7 +65,7 @@ class SmallScenario:
     bearings: Reals[tuple[float, ...]] = reals(
         "of the arms, clockwise from north", "deg", default=(0.0, 90.0, 180.0, 270.0)
     )
-    side: Literal["left", "right"] = word("of driving", ("left", "right"), default="left")
+    side: Literal["left", "right"] = word("of the road", ("left", "right"), default="left")
     density: float = real("mean inflow", "veh/h/lane", default=350.0, low=0, high=MAX_DENSITY)
     demand_time: float = real("vehicles come until then", "s", default=300.0, above=0, high=1e6)
     drain: float = real("how much longer the run goes on", "s", default=0.0, low=0, high=1e6)
@@ -77,7 +77,7 @@ class SmallScenario:
     name: str = text("of the scenario", default="small")
     profile_name: str = text("of its profile", default="test")
     depart_speed: float | None = real(
-        "the most at insertion; none is the highest safe one", "m/s", default=None, optional=True
+        "highest at insertion; none means the highest safe", "m/s", default=None, optional=True
     )
 
     def __post_init__(self) -> None:
@@ -169,7 +169,7 @@ def check_controller(
         _check_served(controller, first)
         again = _disturbed(controller, scenario, run)
         for other, problem in (
-            (again, "a second run with the same seed gave other trips; a run left its traces"),
+            (again, "a second run with the same seed gave other trips; a run left traces"),
             (_watched(copy), "a pickled copy gave other trips"),
         ):
             trips = run(scenario, other, 1, on_collision="record").trips
@@ -297,7 +297,7 @@ def _check_arrivals(controller: Controller, run: Run) -> None:
     met = Arrivals(run.columns.demand_time, run.columns.lane, run.columns.manoeuvre)
     columns = ("time", "lane", "manoeuvre")
     same = all(getattr(met, of).tolist() == getattr(drawn, of).tolist() for of in columns)
-    _require(same, controller, "the run did not meet the arrivals of its scenario and seed")
+    _require(same, controller, "the run did not use the arrivals of its scenario and seed")
 
 
 def _check_served(controller: Controller, run: Run) -> None:
@@ -305,7 +305,7 @@ def _check_served(controller: Controller, run: Run) -> None:
     lanes = ", ".join(sorted({ARM_NAMES[lane] for lane in waiting}))
     unserved = f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served"
     where = f"on {run.site.intersection.n} arms (lanes {lanes})"
-    after = f"{run.scenario.horizon:.0f} s after the first could come"
+    after = f"within {run.scenario.horizon:.0f} s"
     _require(not waiting, controller, f"{unserved} {where}, {after}")
 
 

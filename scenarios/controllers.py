@@ -61,7 +61,7 @@ class Entry(NamedTuple):
     name: str  # without parameters
     make: type[Any]  # declares the parameters; its docstring's first line is the help text
     variants: tuple[Variant, ...] = (Variant(),)  # those that have a look or are rivals
-    as_run: str = ""  # what the bare name means under the profile `as_run`, if not the same
+    as_run: str = ""  # what the bare name means under the profile `as_run`, if different
 
 
 def _rival(look: Look) -> tuple[Variant]:
@@ -112,7 +112,7 @@ SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":
 #: A class of a caller's own: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 
-#: The same with a slip: a dot for the colon, no brackets, or one too few.
+#: The same with a slip: a dot for the colon, no brackets, or one missing.
 _ALMOST = re.compile(r"([\w./-]+)[:.]([A-Z]\w*)(|\W.*)", re.DOTALL)
 
 #: What is allowed besides the known names.

@@ -160,7 +160,7 @@ def _scenario(
     if given.get("recorded") is not None and clash:
         raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
     if "min_headway" in given and given.get("model") != "shifted":
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     given["profile"] = profile_named(given.get("profile", "paper"))
     demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}

@@ -50,7 +50,7 @@ def has_source(module: str) -> bool:
 
 
 def is_maker(kind: type) -> bool:
-    """Whether a class can make controllers, as far as it tells."""
+    """Whether a class can make controllers, as far as it shows."""
     return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
 
 

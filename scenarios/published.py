@@ -34,8 +34,8 @@ def published_ways(
 
     Args:
         arms: how many.
-        turnarounds: arms at whose far end the road leads back; None is as in the authors' networks.
-        waits: whether vehicles that turn far wait inside; in the signals' networks they do not.
+        turnarounds: arms at whose far end the road leads back; None: as in the authors' networks.
+        waits: whether far turns wait inside; in the signals' networks they do not.
 
     Raises `InputError` for another number of arms.
     """

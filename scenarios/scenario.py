@@ -23,7 +23,7 @@ class Scenario:
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
     warmup: float = real(
-        "nothing before it is measured: no trip demanded, no close call, no count; only "
+        "trips demanded, close calls and counts before it are left out; only "
         "collisions always count", "s", low=0, default=0.0,
     )  # fmt: skip
     recorded: Arrivals | None = part(
@@ -53,7 +53,7 @@ class Scenario:
 
     @property
     def depart_speed(self) -> float | None:
-        """The most at insertion [m/s]; None means the highest safe one."""
+        """Highest speed at insertion [m/s]; None means the highest safe one."""
         return self.profile.depart_speed
 
     @property

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, numbers
 
-#: Of every interval here.
+#: The level of all intervals.
 CONFIDENCE = 0.95
 
 #: A queue grows if it gains more standard deviations than this; by chance, 1 % of normal ones do.

@@ -37,7 +37,7 @@ class Actuated:
 
     max_gap: float = real("gap that ends the green", "s", low=0, high=3600, default=3.0)
     detector_gap: float = real(
-        "time from the loop to the line at the speed limit; the loop is nearer where the vehicles "
+        "time from the loop to the line at the speed limit; the loop is nearer if the vehicles "
         "between could not all leave within `min_green`", "s",
         above=0, high=3600, default=2.0,
     )  # fmt: skip

@@ -32,7 +32,7 @@ class Adaptive:
 
     detector_range: float = real("length of the detectors", "m", low=1, high=1000, default=100.0)
     min_time_loss: float = real(
-        "time lost from which on a vehicle prolongs the green", "s",
+        "time lost from which a vehicle prolongs the green", "s",
         low=0, high=3600, default=1.0,
     )  # fmt: skip
     # The authors' network: `minDur`, `maxDur` and its amber.
@@ -100,6 +100,6 @@ class DelaySession(PhaseSession):
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector at `entered`, `start` m away [s].
 
-    That is the time since then, less what the way since then takes at the limit [m/s].
+    That is the time since then, less what the same way takes at the limit [m/s].
     """
     return now - entered - (start - distance) / limit

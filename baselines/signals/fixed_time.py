@@ -36,7 +36,7 @@ class FixedTime:
     name = Name("fixed-time")
 
     greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
-        "green of each lane, or one number for all; none is Webster's, from the expected demand",
+        "green of each lane, or one number for all; none means Webster's for the expected demand",
         _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
         optional=True, default=None,
     )  # fmt: skip
@@ -44,7 +44,7 @@ class FixedTime:
     saturation_flow: float = real("of a lane", "veh/h", low=1, high=1e5, default=1500.0)
     # HCM 2000, ch. 10: amber and all-red; 2 s of start-up loss, less 2 s of amber that drivers use.
     lost_time: float | None = real(
-        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
     )  # fmt: skip
     equal_greens: Switch = switch(

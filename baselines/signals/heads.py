@@ -1,7 +1,7 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. If vehicles look out for those that cross (`VehicleType`), it
+depend on the length of an amber. If vehicles give way to those crossing (`VehicleType`), it
 turns green at once, as the published signals did. At the end of a green, vehicles that can no
 longer stop comfortably keep their right of way; all others stop.
 """
@@ -67,7 +67,7 @@ class Heads:
         self._open = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._open += [Colour.AMBER]
-            self._stops = lambda _: True  # dead, see there
+            self._stops = lambda _: True  # on the spot, see `obeys`
         elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
             self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
         self._at_once = site.looks_out
@@ -121,7 +121,7 @@ def lane_order() -> Any:
         )
 
     return checked(
-        "lanes in the order of their greens, by letter or number (a is 0); none is a, b, c…",
+        "lanes in the order of their greens, by letter or number (a is 0); none means a, b, c…",
         check, "lanes such as (c,b,a,d)", optional=True, default=None,
     )  # fmt: skip
 

@@ -44,7 +44,7 @@ def webster(
 ) -> SignalTiming:
     """Cycle and effective greens, one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
 
-    Only if Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1). A lane
+    `max_cycle` caps the cycle only if Y > 0.95, even if no optimum exists (Y ≥ 1). A lane
     whose share is below `min_green` gets `min_green`. That lengthens the cycle; in a capped cycle
     the other lanes share the rest. `rates` are the inflows of the lanes [veh/h]; L is
     `lost_time_per_phase` [s] times their number. `equal_greens` divides the greens equally.
@@ -83,7 +83,7 @@ def timing_of(
     greens: Iterable[float], cycle: float, rates: Iterable[float], saturation_flow: float,
     *, longer: float = 0.0, capped: bool = False,
 ) -> SignalTiming:  # fmt: skip
-    """Greens and cycle [s] under the inflows `rates` [veh/h]; effective greens are `longer` [s]."""
+    """Greens and cycle [s] for inflows `rates` [veh/h]; effective greens last `longer` [s] more."""
     greens, rates = tuple(greens), tuple(rates)
     saturation = tuple(
         rate * cycle / (saturation_flow * (green + longer)) if rate else 0.0

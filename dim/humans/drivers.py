@@ -69,12 +69,12 @@ class Driver(NamedTuple):
     """One vehicle's driver."""
 
     human: bool  #: otherwise the vehicle follows DIM
-    careless: float  #: 0 … 1; it signals no turn that a larger share of drivers leaves unsignalled
+    careless: float  #: 0 … 1; it signals a turn only if at most this share of drivers does not
     gap: float  #: factor on the critical gaps
 
 
 class Drivers:
-    """The drivers of a run, by lane and rank in it; a human at one share is one at any larger."""
+    """The drivers of a run, by lane and rank in it; a human at one share is human at any larger."""
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
         self._share = share
@@ -123,4 +123,4 @@ class Readings:
                 return alike
             turn = shown
         meant = [q for q in alike if self.turns[q] is turn]
-        return meant or alike  # motion belies silence, or the lane has no way straight on
+        return meant or alike  # motion contradicts silence, or the lane has no way straight on

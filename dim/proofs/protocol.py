@@ -28,9 +28,9 @@ from minisim.parameters import declared, part, word
 #: "waiting": the lane whose front vehicle came first, as if every vehicle remembered it forever.
 PRIORITIES = ("fixed", "rotating", "waiting")
 
-#: Phases of a front vehicle. It has been waiting since it came; or, with commit="paper" only, it
-#: has had the right of way and may be anywhere up to the point where it is committed, and may roll
-#: on there without the right of way; or it is committed.
+#: Phases of a front vehicle. It has been waiting since it came; or it is rolling (commit="paper"
+#: only): it has had the right of way, may be anywhere before the point where it is committed, and
+#: may roll on there without the right of way; or it is committed.
 WAITING: Final = 0
 ROLLING: Final = 1
 COMMITTED: Final = 2

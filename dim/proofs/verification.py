@@ -155,7 +155,7 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """What remains of tied cliques by the paper's wording, with the lanes by priority.
+    """Which tied cliques the paper's wording prefers, with the lanes by priority.
 
     "The clique with the highest priority lanes" holds the first lane, if any does, then the second…
     """

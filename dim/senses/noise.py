@@ -41,21 +41,21 @@ _POSITION, _SPEED = 8, 9  # what a draw is for; above the purposes in `dim.sense
 class NoisyPerception:
     """How vehicles misperceive each other; by default they do not.
 
-    Parameters of errors that never happen are allowed: a series may begin without errors.
+    Parameters of errors that never happen are allowed, so a series can start without errors.
     """
 
     intent_error: float = real(
         "probability that a shown intent is misread", low=0, high=1, default=0.0
     )
     kind: str = word(
-        "how: a turn's signal is not seen, or a manoeuvre is taken for any other one alike",
+        "how: a turn's signal is missed, or any other manoeuvre is equally likely to be read",
         KINDS, default="missed", label="kind of intent error",
     )  # fmt: skip
     shared: Switch = switch(
         "whether all observers err alike (a dirty lamp, the sun), or each on its own", default=True
     )
     persistent: Switch = switch(
-        "whether an error lasts as long as the vehicles meet, or every frame errs anew",
+        "whether an error lasts as long as the vehicles meet, or is redrawn each frame",
         default=True,
     )
     unsignalled: Reals[tuple[float, float]] = reals(
@@ -65,22 +65,22 @@ class NoisyPerception:
     )  # fmt: skip
     confidence: float | None = real(
         "an intent read with less confidence is unknown: the vehicle may take any manoeuvre; none "
-        "takes every reading as it is",
+        "believes every reading",
         above=0, high=1, optional=True, default=None,
     )  # fmt: skip
     sensor_range: float | None = real(
-        "how far a vehicle sees, from centre to centre; none has no end", "m",
+        "how far a vehicle sees, from centre to centre; none means no limit", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
     # Views do not hold vehicles that have left the junction, so such vehicles block nothing.
     occlusion: Switch = switch("whether bodies block the line of sight", default=False)
     delay: float = real("age of what is seen of the others", "s", low=0, high=10, default=0.0)
     position_noise: float = real(
-        "standard deviation of the others' positions along the lane, drawn anew each frame", "m",
+        "standard deviation of the others' positions along the lane, redrawn each frame", "m",
         low=0, high=20, default=0.0,
     )  # fmt: skip
     speed_noise: float = real(
-        "standard deviation of the others' speeds, drawn anew each frame", "m/s",
+        "standard deviation of the others' speeds, redrawn each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
     frame: float | None = real(

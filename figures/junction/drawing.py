@@ -92,7 +92,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
 
 
 def zone_words(plan: Plan) -> dict[str, str]:
-    """Zone -> its name and place for a legend, so that it is known without its colour."""
+    """Zone -> its name and place for a legend, to tell zones apart without colour."""
     zones: dict[str, list[Marking]] = {}
     for marking in plan.markings:
         zones.setdefault(marking.name, []).append(marking)

@@ -120,8 +120,8 @@ def webster_table() -> Table:
         tuple(rows),
         notes=(
             "Saturation flow 1500 veh/h, 2 s lost per phase. The paper rounds 5.08 and 7.11, and "
-            "prints 19.75 where its own network file and the formula have 19.25. The formula of "
-            "its text divides by C0 − L where it must multiply. The delay is Webster's for the "
+            "prints 19.75 where its own network file and the formula have 19.25. The formula in "
+            "its text divides by C0 − L where it should multiply. The delay is Webster's for the "
             "long run; a run of an hour near x = 1 has less.",
         ),
     )  # fmt: skip

@@ -59,14 +59,14 @@ def crossing_figure(results: Results) -> Figure:
     plots.frame(figure, title, looks, missing_note(results))
     words = (
         "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
-        "its 95 % interval     hollow: at none or all of these demands in the mean"
+        "its 95 % interval     hollow: at none or all of these demands, on average"
     )
     style.write(figure, plots.LEFT, 0.845, words, 8.5)
     return figure
 
 
 def loss_table(results: Results) -> Table:
-    """From which demand on DIM does worse than each rival."""
+    """The demand from which DIM does worse than each rival."""
     known = needed_losses(results)
     low, high = tried(known.values())
     rows = []
@@ -76,17 +76,16 @@ def loss_table(results: Results) -> Table:
             texts = ((cell.point, cell.interval) if cell else ("–", "–") for cell in cells)
             rows.append((style.look(rival).label, measure, *chain.from_iterable(texts)))
     return Table(
-        "Demand from which on DIM does worse [veh/h/lane]",
+        "Demand from which DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
         tuple(rows), labels=2,
         notes=(
             f"{missing_note(results)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
             f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
-            "b only, for beyond the capacity of both their order may turn again. “all”: at every "
-            "demand tried, in the mean; “c at the latest” then says that only from c on it is "
-            "sure. “never”: at none in the mean; “c at the earliest” says that from c on it may "
-            "be.",
+            "b only: beyond both capacities their order may reverse. “all”: at every demand tried, "
+            "on average; “c at the latest” then means that it is certain only from c on. “never”: "
+            "at none, on average; “c at the earliest” means that it is possible from c on.",
         ),
     )  # fmt: skip
 
@@ -114,7 +113,7 @@ SECTION = Section(
     "When does DIM lose?",
     (
         Item("fair", "every controller up to 800 veh/h/lane", fair_figure, ("fair",)),
-        Item("losses", "demand from which on DIM loses", crossing_figure, ("fair",)),
+        Item("losses", "demand from which DIM loses", crossing_figure, ("fair",)),
         Item("losses-table", "losses in numbers", loss_table, ("fair",)),
     ),
 )

@@ -147,7 +147,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                     room = min(room, room_behind(rear - s, ahead["v"], law))
                 j -= 1
 
-            # From the junction on, also the last vehicle before it bound for the same exit lane.
+            # From the junction on, also the last vehicle ahead bound for the same exit lane.
             # Both positions are measured from that lane, so a vehicle that is still on another arc
             # counts as if it were on this one.
             j = -1

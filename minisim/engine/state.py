@@ -40,7 +40,7 @@ VEHICLE = np.dtype(
         ("a", np.float64),  # of the step just taken [m/s²]
         ("section", np.int64),  # of the speed profile
         ("mark", np.int64),  # next wake-up mark
-        ("ahead", np.int64),  # last vehicle before it bound for the same exit lane, or -1
+        ("ahead", np.int64),  # last vehicle ahead bound for the same exit lane, or -1
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]

@@ -30,7 +30,7 @@ CLEARANCE = 0.5
 #: Spacing of the bodies that make up a corridor, and of those tested for zones [m].
 SWEEP_STEP = 0.5
 
-#: Spacing of the bodies tested for clearing distances [m]; at half the clearance, none is missed.
+#: Spacing of the bodies tested for clearing distances [m]; half the clearance misses none.
 CLEARING_STEP = CLEARANCE / 2.0
 
 #: Spacing of the bodies tested for areas [m].
@@ -113,8 +113,8 @@ def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
     between `[p, q, 0]` and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
     left the junction. Two vehicles can touch only when both are in their zones.
 
-    A zone begins one tested body before the first one too close and ends one after the last. If no
-    tested body is too close, but the corridors are in between, the zone is the whole crossing.
+    A zone reaches one tested body beyond the first and the last that are too close. If none is too
+    close, but the corridors are in between, the zone is the whole crossing.
     """
     ends = [path.crossing + vehicle.length for path in intersection.paths]
     past = [np.linspace(0.0, end, math.ceil(end / SWEEP_STEP) + 1) for end in ends]
@@ -133,7 +133,7 @@ def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floa
     """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
 
     `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
-    of movement p. Minus infinity if the two do not conflict; infinite if this is only so once the
+    of movement p. Minus infinity if the two do not conflict; infinite if that takes until the
     rear has left the junction, as when both use the same exit lane.
     """
     ways = _prepared(shapely.buffer(corridors(intersection, vehicle), CLEARANCE))

@@ -23,7 +23,7 @@ from minisim.vehicle import VehicleType
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between two bodies of which one stands or crawls [m]: one buffer (see `CLEARANCE`).
+#: Room between two bodies if one stands or crawls [m]: one buffer (see `CLEARANCE`).
 CLOSE = 0.25
 
 #: Least room if two vehicles would otherwise stand for ever, and the step of its measurement [m].
@@ -34,7 +34,7 @@ class Region(NamedTuple):
     """The forbidden region of two movements, on a grid of `STEP` from the junction entry onwards.
 
     Rows are positions of the first vehicle's front past the entry; columns, of the second's. Before
-    the entry counts as at the entry; beyond the grid is outside the region.
+    the entry counts as at the entry, and beyond the grid as outside the region.
     """
 
     close: Bools  #: whether bodies come closer than `CLOSE` within one step of the grid point
@@ -79,7 +79,7 @@ def passes(
 ) -> bool:
     """Whether a vehicle on a path can pass a vehicle that stands on another path.
 
-    The moving one needs `CLOSE` of room all the way on the grid or, measured, more than `TIGHT`.
+    The moving one needs `CLOSE` of room all the way by the grid, or more than `TIGHT` if measured.
     Movements are indices; `x` and `y` are how far past the entry the fronts are [m].
     """
     shared = region(intersection, vehicle, first, second)

@@ -37,7 +37,7 @@ from minisim.results.trips import Floats, Trips, queue_growth
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Keys of summaries and columns of sweeps, which no metric may have as its name.
+#: Names that no metric may have: keys of summaries and columns of sweeps.
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
     "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
@@ -51,7 +51,7 @@ GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
 #: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
 SPREAD: Final = ("p50", "p95", "max")
 
-#: How columns begin and end that are made of metrics.
+#: Prefixes and suffixes of columns made from metrics.
 BEGINNINGS: Final = ("complete_", *(f"{key}_" for key in GROUPS.values()))
 ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
 
@@ -60,7 +60,7 @@ def _name(title: str, value: Any) -> Any:
     if not isinstance(value, str) or not value.isidentifier():
         raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
     if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
-        raise InputError(f"{title} must not be that of a column of runs, got {value!r}")
+        raise InputError(f"{title} must not be a column of runs, got {value!r}")
     return value
 
 
@@ -91,7 +91,7 @@ class Metric:
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",
     )  # fmt: skip
-    title: str = text("for headings and axes; empty is its name", empty=True, default="")
+    title: str = text("for headings and axes; empty means its name", empty=True, default="")
     symbol: str = text("in equations", empty=True, default="")
     meaning: str = text("in one line", empty=True, default="")
     equation: str = text("with its source", empty=True, default="")
@@ -264,7 +264,7 @@ Asked = str | Metric | Callable[[Any], Any]
 
 
 def metric_of(function: Callable[[Any], Any]) -> Metric:
-    """The metric of a function with a name, whose attributes may be fields, such as `unit`."""
+    """The metric of a named function, whose attributes may set fields such as `unit`."""
     known = {it.name for it in parameters(Metric)} & vars(function).keys()
     return Metric(function.__name__, function, **{key: vars(function)[key] for key in known})
 
@@ -288,7 +288,7 @@ def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
         elif not isinstance(metric, Metric):
             metric = METRICS[choice("metric", metric, METRICS)]
         if METRICS.get(metric.name, metric) is not metric:
-            raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
+            raise InputError(f"there is already a metric {metric.name!r}; give yours another name")
         if asked.setdefault(metric.name, metric) != metric:
             raise InputError(f"two metrics are called {metric.name!r}")
     return tuple(asked.values())

@@ -55,7 +55,7 @@ class ScenarioLike(Protocol):
 
     @property
     def depart_speed(self) -> float | None:
-        """The most at insertion [m/s]; None means the highest safe speed."""
+        """Highest speed at insertion [m/s]; None means the highest safe one."""
 
     def site(self, seed: int) -> Site:
         """What the controller may know."""
@@ -101,7 +101,7 @@ class Run:
 
     @cached_property
     def counted(self) -> Run:
-        """The run that metrics get: trips and trajectories from the warm-up on, up to the end."""
+        """The part of the run that metrics measure: trips and trajectories after the warm-up."""
         start = float(self.scenario.warmup)
         rows = self.columns.counted(start)
         if self.columns.start == start and rows == slice(0, len(self.columns.lane)):

@@ -59,8 +59,8 @@ class Rows(NamedTuple):
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
-    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` are the
-    encroachments, besides the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
+    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` counts all
+    encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
     rows = _rows(frame, site)

@@ -63,7 +63,7 @@ class _StandIn:
 
 @dataclass(frozen=True, repr=False)
 class SavedController(_StandIn):
-    """Stands in for a controller of another class than ours."""
+    """Stands in for a controller whose class is not ours."""
 
     what = "controller"
     start = _StandIn.refuse
@@ -71,7 +71,7 @@ class SavedController(_StandIn):
 
 @dataclass(frozen=True, repr=False)
 class SavedScenario(_StandIn):
-    """Stands in for a scenario of another class than ours."""
+    """Stands in for a scenario whose class is not ours."""
 
     what = "scenario"
     profile_name: str

@@ -67,8 +67,8 @@ def summarise(
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were
-    not recorded, a metric whose function raises or returns the wrong type or shape, or a count of
-    the controller's with the name of another number.
+    not recorded, a metric whose function raises or returns the wrong type or shape, or a
+    controller's count that has the name of another number.
     """
     run = run.counted
     asked = asked_metrics(metrics)
@@ -83,7 +83,7 @@ def summarise(
     summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":
-            raise InputError(f"{name!r} is also what the controller calls a count of its own")
+            raise InputError(f"the controller's count {name!r} has the name of another number")
     return {**summary, **run.counts}
 
 

@@ -30,12 +30,12 @@ ACC = 1
 
 
 def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
-    """The attributes of CC's `vType` only; raises `InputError` if SUMO fixes another value."""
+    """What only CC's `vType` has; raises `InputError` if SUMO fixes another value."""
     if (vehicle.spacing, vehicle.radar) != FIXED:
         spacing, radar = FIXED
         raise InputError(
-            f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
-            f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
+            f"SUMO's model CC has spacing {spacing:g} m and radar {radar:g} m, but the vehicles "
+            f"have {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
     if vehicle.obeys:
         raise InputError("hosted in SUMO, a CruiseVehicle cannot obey limits and lights by itself")

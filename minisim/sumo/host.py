@@ -194,8 +194,8 @@ def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
     if site.vehicle.sumo is not None and not isinstance(site.vehicle, CruiseVehicle):
         raise InputError(
-            f"vehicles with sumo={site.vehicle.sumo!r} look out for those that cross inside the "
-            "junction; hosted in SUMO they leave that to the controller, so give none"
+            f"vehicles with sumo={site.vehicle.sumo!r} give way to those crossing inside the "
+            "junction; hosted in SUMO, the controller does that, so leave out sumo"
         )
     model = _model(options.model, site.vehicle)
     depart_speed = hosted.scenario.depart_speed

@@ -1,4 +1,4 @@
-"""Steering: it tells vehicles in SUMO what the road ahead and the controller ask of them.
+"""Tells vehicles in SUMO what the road ahead and the controller ask of them.
 
 `Follower` steers SUMO's IDM and Krauss. minisim's laws (`minisim.laws`) compute what a hold line, a
 marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`) where a lower
@@ -21,8 +21,8 @@ from minisim.engine.state import Records
 from minisim.laws import STOP_MARGIN, Law
 from minisim.sumo.messages import Job
 
-#: SUMO keeps the maximum acceleration (2) and heeds no right of way (no 8). A commanded speed may
-#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1),
+#: SUMO keeps the maximum acceleration (2) but not the right of way (8 off). A commanded speed may
+#: brake harder than is comfortable (4 off) and keeps the gaps itself: if SUMO kept them (1),
 #: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
 #: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
 #: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
@@ -52,9 +52,9 @@ class Car:
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
         self.s = self.v = self.a = 0.0
-        # Between looks more than a step apart, it grows by the time beyond that at the limit.
+        # Between rare looks it grows by the time that exceeds a drive at the limit.
         self.lost_ticks = 0.0
-        self.brake = 0.0  # the least that it must brake [m/s²]; 0 without such a command
+        self.brake = 0.0  # how hard it must brake [m/s²]; 0 without such a command
         self.section = self.mark = 0
         self.seen = 0  # tick of the last look at it
         self.present = False  # on the road
@@ -105,7 +105,7 @@ class Follower(Steering):
     """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
-        # SUMO's Krauss may drive vehicles whose own law is another.
+        # SUMO's Krauss may drive vehicles with another law.
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
         super().__init__(law, libsumo)
         self._limits = limits(job)
@@ -117,7 +117,7 @@ class Follower(Steering):
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def depart(self, car: Car) -> None:
-        """Leave all giving way to the controller."""
+        """Let the controller alone decide."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:

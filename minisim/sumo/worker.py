@@ -1,7 +1,7 @@
 """The process that runs libsumo. It moves the vehicles; the caller's process decides.
 
 libsumo holds one simulation per process, and a crash would take its caller down. So it has a
-process of its own, which knows no controllers. That process advances until a wake-up, sends a view
+process of its own, without controllers. That process advances until a wake-up, sends a view
 and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
 SUMO follows, integrates and finds collisions; `minisim.sumo.steering` tells it what else to obey.
 """
@@ -172,7 +172,7 @@ class Worker:
         self._turn_to(car)
 
     def _arrive(self, car: Car) -> bool:
-        """Note it; returns whether SUMO took it off the road before it had left the junction."""
+        """Note an arrival; returns whether SUMO removed the car before it had left the junction."""
         self._arrived += 1
         self._travel(car, self._end[car.path])
         car.present = False
@@ -244,7 +244,7 @@ class Worker:
         return self._position(car.path, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
-        """Leave a car whose rear has left the junction to SUMO alone."""
+        """Leave a car to SUMO alone: its rear has left the junction."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
         self._steering.release(car)

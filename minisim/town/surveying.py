@@ -14,7 +14,7 @@ from minisim.control import Site
 from minisim.errors import InputError, instance, show
 from minisim.files import AnyPath
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES, Movement, movements_of
+from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Floats
 from minisim.junction.roads import Road
 from minisim.town.arms import Arm, arms_of, bearing_of, centre_of, length_of, off_lane
@@ -221,16 +221,12 @@ def _road(town: Town, arm: Arm, radius: float) -> Road:
 
 def _forbidden(town: Town, arms: list[Arm]) -> list[str]:
     """The movements between lanes that there are, but for which there is no connection."""
-    missing = []
-    for movement in movements_of(len(arms)):
-        into, out_of = arms[movement.origin].into, _exit(arms, movement).out_of
+    missing, movements = [], movements_of(len(arms))
+    for movement, exit_arm in zip(movements, movements.exits.tolist(), strict=True):
+        into, out_of = arms[movement.origin].into, arms[exit_arm].out_of
         if into and out_of and (into.id, out_of.id) not in town.turns:
             missing.append(str(movement))
     return missing
-
-
-def _exit(arms: list[Arm], movement: Movement) -> Arm:
-    return arms[(movement.origin + movement.manoeuvre) % len(arms)]
 
 
 def _notes(town: Town, node: str, arms: list[Arm]) -> Iterable[str]:

@@ -101,7 +101,7 @@ def _parameters(make: Callable[..., Any], made: object) -> Iterator[dict[str, An
 
 
 def _spelled(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str | None:
-    """A value as one types it, or its repr if that is impossible; None if there is none."""
+    """A value as typed, or its repr if that is impossible; None if there is none."""
     from minisim.names import spelled_value
 
     if value is inspect.Parameter.empty:

@@ -34,7 +34,7 @@ def figures(
         int | None,
         option("Runs per case to look for: seeds 1 to this one; 10 by default, 2 with --quick."),
     ] = None,
-    quick: Annotated[bool, option("Of minisim reproduce --quick.", None, "--quick")] = False,
+    quick: Annotated[bool, option("Use runs of reproduce --quick.", None, "--quick")] = False,
     as_list: Annotated[bool, option("List the names and stop.", None, "--list")] = False,
 ) -> None:
     """Draw the paper's figures and tables, and further ones (PDF, SVG, PNG; MD, CSV, TeX)."""

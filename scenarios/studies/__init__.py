@@ -19,7 +19,7 @@ NAMES = (
     "text", "as-run", "fair", "gate", "capacity", "fairness", "humans", "perception", "confidence",
 )  # fmt: skip
 
-#: Studies that choose runs by the results of earlier ones, so their runs cannot be listed before.
+#: Studies that choose runs by the results of earlier ones, so they cannot be listed in advance.
 SEARCHES = ("capacity",)
 
 

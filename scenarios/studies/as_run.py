@@ -36,7 +36,7 @@ class PublishedPoint(NamedTuple):
 
 STUDY = Study(
     "as-run",
-    "Which numbers do the rules and vehicles behind the published ones give?",
+    "What do the rules and vehicles behind the published numbers give?",
     tuple(
         PublishedPoint(SERIES[cell.controller], cell.arms, cell.split, float(cell.density))
         for cell in (*GRID, *BASELINE_GRID)

@@ -135,7 +135,7 @@ def verdict(results: Results) -> str:
     try:
         known = needed_losses(results)
     except MissingRunsError as error:
-        return f"From which demand on DIM loses is not known: {error}."
+        return f"The demand from which DIM loses is not known: {error}."
     low, high = tried(known.values())
     lines = []
     for rival in OTHERS:
@@ -145,10 +145,10 @@ def verdict(results: Results) -> str:
             losing.append(f"{measure} {' → '.join(found)}")
         lines.append(f"- {label_of(rival)}: {'; '.join(losing)}")
     return "\n".join([
-        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
-        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
-        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
-        "mean:\n",
+        "Demands at which DIM does worse than each rival on four arms, paper's gate → harmonious "
+        "gate [veh/h/lane]: where that begins, with its 95 % interval; it lasts to the highest "
+        f"tried ({high:g}) unless an end is given. \"all\": from the lowest tried ({low:g}) on, on "
+        "average:\n",
         *lines,
     ])  # fmt: skip
 

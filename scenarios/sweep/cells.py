@@ -1,7 +1,7 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed are
-draws like others: their cell has their mean density.
+A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed count
+as draws: their cell has their mean density.
 """
 
 from __future__ import annotations
@@ -121,10 +121,10 @@ def pairs(
     one, other = (good[good[column] == name] for name in names)
     for name, runs in zip(names, (one, other), strict=True):
         if runs.duplicated([*by, "seed"]).any():
-            raise InputError(f"{name} has several runs of one seed; {', '.join(by)} are the same")
+            raise InputError(f"{name} has several runs of one seed with equal {', '.join(by)}")
     both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
     if (both["arrivals"] != both["arrivals_other"]).any():
-        raise InputError(f"{' and '.join(names)} did not meet the same arrivals")
+        raise InputError(f"{' and '.join(names)} had different arrivals")
     gap = both[metric].astype(float) - both[f"{metric}_other"].astype(float)
     grouped = gap.groupby([both[key] for key in by], sort=False)
     return {key: values.tolist() for key, values in grouped}
@@ -152,7 +152,7 @@ def saturated(good: pd.DataFrame) -> bool:
 def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
-    The time on a free road is travel less loss, of ended trips or else of all that was driven.
+    The time on a free road is travel less loss, of the trips that ended or else of all.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

@@ -58,7 +58,7 @@ from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import identity_of
 
-#: More runs are surely a typing error.
+#: More runs must be a mistake.
 MAX_RUNS = 1_000_000
 
 #: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of both forms.
@@ -116,7 +116,7 @@ def read_experiments(
 
 
 def check_can_run(recipes: Iterable[Recipe]) -> None:
-    """Start every controller at every site once; raises `InputError` if it cannot serve it."""
+    """Start every controller at every site once; `InputError` for a site that one cannot serve."""
     first = {tuple({**identity_of(it), "seed": 0}.values()): it for it in recipes}
     for recipe in first.values():
         scenario = recipe.scenario
@@ -137,7 +137,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     if "side" not in block:  # a file of a junction has its own
         axes["side"] = [None]
     if "min_headway" in block and "shifted" not in axes["model"]:
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
     if (count := prod(map(len, axes.values()))) > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
@@ -159,7 +159,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     recorded, start = chosen.pop("arrivals"), chosen.pop("start")
     if recorded is None and start is not None:
-        raise InputError("start goes with arrivals: it is a time in the table")
+        raise InputError("start needs arrivals: it is a time in the table")
     if chosen["model"] != "shifted":
         del chosen["min_headway"]
     if chosen["side"] is None:
@@ -180,11 +180,11 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
 
 
 def _table(given: object) -> dict[str, Any]:
-    """A name, or a table with one, as a table."""
+    """A name or named table, as a table."""
     if isinstance(given, str):
         return {"name": given}
     if not isinstance(given, dict):
-        raise InputError(f"must be a name or a table with one, got {show(given)}")
+        raise InputError(f"must be a name or a table with a name, got {show(given)}")
     if "name" not in given:
         raise InputError(f"the table {show(given)} has no name")
     instance("label", given.get("label", ""), str)

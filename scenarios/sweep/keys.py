@@ -20,8 +20,8 @@ from minisim.errors import InputError, show
 from minisim.version import __version__
 from scenarios.recipe import Recipe
 
-#: Raise it by one when recipes give other rows than before while the version of the package stays
-#: the same. Stored rows are then computed again.
+#: Raise it by one when recipes give different rows while the version of the package stays the same.
+#: Stored rows are then computed again.
 RESULTS = 5
 
 #: Packages whose changes `RESULTS` counts.
@@ -29,7 +29,7 @@ OURS = ("minisim", "dim", "baselines", "scenarios")
 
 
 def results_version() -> str:
-    """The version of rows, which depend on it and on their recipe."""
+    """The version of rows; they depend on it and on their recipe."""
     return f"{__version__}/{RESULTS}"
 
 

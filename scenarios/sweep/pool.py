@@ -122,7 +122,7 @@ def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -
     whole = partial(_ending, function)
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         return executor.submit(whole, task)
-    ensure_running()  # or the first process would start it, and that ends the delay
+    ensure_running()  # or the first process would, which ends the delay
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         return executor.submit(whole, task)

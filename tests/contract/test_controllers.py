@@ -135,7 +135,7 @@ def test_the_contract_without_safety() -> None:
 
 @dataclass(frozen=True)
 class Broken:
-    """A fixed-time signal at heart; its children spoil one thing."""
+    """A fixed-time signal at heart; each subclass breaks one thing."""
 
     name: str = "broken"
 

@@ -49,7 +49,7 @@ def served_without_collision(scenario: Scenario, controller: Controller, seed: i
 
 
 def assert_no_overlap_in_lane(run: Run) -> None:
-    """On the approach, every front bumper is behind the rear bumper of the vehicle before it."""
+    """On the approach, every front bumper is behind the rear bumper of the vehicle ahead."""
     trace = run.trace
     manoeuvres = run.site.intersection.n - 1
     approach = trace[trace["s"] < run.site.intersection.approach_length]
@@ -192,7 +192,7 @@ def test_motion_converges_with_the_step() -> None:
 
 #: Two vehicles on the paper's 4-arm junction, the smallest case: the one of lane d has the right of
 #: way and is just short of half the green zone when the one of lane a enters the yellow zone. The
-#: decision is made anew and takes the right of way from a vehicle that can no longer stop.
+#: decision is made again and takes the right of way from a vehicle that can no longer stop.
 COUNTEREXAMPLE = ((0.0, 3, 2), (0.8, 0, 2))
 
 

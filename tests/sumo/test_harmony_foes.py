@@ -42,7 +42,7 @@ BENT = "SUMO is stricter: it draws the ways closer than a lane is wide"
 
 @dataclass(frozen=True)
 class Oracle:
-    """A junction as SUMO has it: its foes, and the lines of the ways through it."""
+    """A junction in SUMO: its foes, and the lines of the ways through it."""
 
     links: dict[Movement, int]
     foes: dict[int, str]

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 #: Study of the paper's grid -> words.
-HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes it"}
+HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes"}
 
 EXPLAINED = (
-    "† not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
+    "† not the run named in its label (see causes). ↑ queues still grew at the end: the mean "
     "depends on the horizon. Inside: the paper's single run lies within our 95 % prediction "
     "interval; where that is wide, it says little."
 )

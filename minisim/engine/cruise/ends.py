@@ -20,9 +20,9 @@ TOLERANCE = 0.001
 
 @njit
 def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -> bool:
-    """Whether no vehicle can be inserted on an arm for one that arrives there.
+    """Whether a vehicle arriving on an arm keeps others from being inserted there.
 
-    Where the road leads back, SUMO takes it that the vehicle at its end might do so, and keeps room
+    Where the road leads back, SUMO assumes that the vehicle at its end might turn, and keeps room
     for it to stop. Source: `MSLane::isInsertionSuccess`, `MSCFModel::getSecureGap`.
     """
     i = cruise.last[arm]
@@ -40,7 +40,7 @@ def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -
 def look(
     vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise, tick: int
 ) -> bool:
-    """Note after a step which vehicles have entered the junction, and which an exit lane.
+    """Note after a step which vehicles have entered the junction or an exit lane.
 
     The vehicle ahead on an exit lane is the one that entered that lane before.
 
@@ -71,7 +71,7 @@ def look(
 
 @njit
 def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int) -> bool:
-    """Take a vehicle off the road that has run into the one ahead on its exit; whether it has.
+    """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
     Source: `MSLane::detectCollisionBetween`; `MSVehicleTransfer`, which finds no road behind.
@@ -86,7 +86,7 @@ def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, ti
     vehicles[i]["status"] = ARRIVED
     vehicles[i]["arrival_tick"] = tick
     vehicles[i]["cleared"] = 1
-    for k in range(len(vehicles)):  # those behind it follow the one before it
+    for k in range(len(vehicles)):  # those behind it follow the one ahead of it
         if vehicles[k]["ahead"] == i:
             vehicles[k]["ahead"] = j
     arm = int(ends[vehicles[i]["path"], 2])

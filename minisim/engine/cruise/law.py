@@ -129,7 +129,7 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit
-    counts for the first step beyond it only.
+    counts only for the first step beyond it.
     Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
     """
     before = s - v * law.dt
@@ -145,7 +145,7 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
 def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
     """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
 
-    Starting one step after a desired speed of 0, SUMO asks for standstill within one step.
+    From one step after a desired speed of 0, SUMO asks for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
     a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -law.b_max)

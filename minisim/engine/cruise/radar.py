@@ -1,4 +1,4 @@
-"""Which vehicles inside the junction one follows, on other ways than its own."""
+"""Which vehicles on other ways inside the junction a vehicle follows."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def meet(
     """Acceleration that vehicles inside the junction on other ways ask of vehicle i [m/s²].
 
     A vehicle that has yet to enter may drive up to the junction (`MSVehicle::checkLinkLeader`), so
-    only its radar counts. Inside it follows those that meet the part of the way that it is on; for
-    a vehicle that only crosses it may also speed up so far that it comes after that one
+    only its radar counts. Inside it follows those that meet the part of the way that it is on; it
+    may also speed up if it still arrives after a vehicle that only crosses
     (`MSVehicle::adaptToJunctionLeader`).
     """
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
@@ -115,10 +115,10 @@ def radar(
 ) -> float:
     """Acceleration that the radar's leader asks of vehicle i on this `part` of its way [m/s²].
 
-    Part by part of the way: the leader on it, then, of the vehicles that meet it, the one with the
-    least room behind it, counting what it needs to brake.
+    Part by part of the way: the leader on it, or else the vehicle meeting it that leaves the least
+    room, counting what it needs to brake.
     Source: `MSCFModel_CC::getRadarMeasurements`, `MSLane::getLeaderOnConsecutive`,
-    `libsumo::Vehicle::getLeader` (where what is less than no room becomes none).
+    `libsumo::Vehicle::getLeader` (where negative room becomes 0).
     """
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
     for here in range(part, 2):
@@ -204,7 +204,7 @@ def room(
 def before(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool:
     """Whether j was in the junction before i, which is inside; if both at once, the faster one.
 
-    What counts as being in it, is for the way that must yield to have passed its waiting position.
+    A vehicle on a way that must yield counts as in it once past its waiting position.
     Source: `MSVehicle::isLeader`.
     """
     mine, other = cruise.memory[i], cruise.memory[j]

@@ -52,7 +52,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, road, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
-            part = 2  # of its way on which the leader is, see `Ahead`
+            part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
             if s < leave:
                 if law.model != KRAUSS:
@@ -122,7 +122,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
 
 @njit
 def free(me: np.void, road: Road, law: Law) -> float:
-    """The acceleration of a vehicle that no other one hinders, within the limits here and ahead."""
+    """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
     start, speed = road.section_start, road.section_speed
     acc = follow_law(v, min(speed[p, section] * factor, me["advice"]), 0.0, law)

@@ -41,10 +41,10 @@ Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str | None, option("Of the traffic: left (the default) or right.", "SIDE")]
+Side = Annotated[str | None, option("Traffic keeps left (the default) or right.", "SIDE")]
 Node = Annotated[str | None, option("Of a town's network; see minisim junction.", "ID")]
-Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
-Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
+Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
+Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
@@ -81,7 +81,7 @@ def processes(jobs: int | None) -> int:
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
-    """Raise `InputError` if an option has a value twice; None is an option not given."""
+    """Raise `InputError` if an option has a value twice; None means not given."""
     for name, values in given.items():
         for value, count in Counter(values or ()).items():
             if count > 1:
@@ -91,7 +91,7 @@ def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
 def build_scenario(
     name: str, bearings: str | None, file: Path | None = None, start: str | None = None, **more: Any
 ) -> Scenario:
-    """The scenario that the options describe; None is an option not given."""
+    """The scenario that the options describe; None means not given."""
     from minisim.recorded import read_arrivals
     from scenarios.library import scenario_named
 
@@ -100,7 +100,7 @@ def build_scenario(
     if file is not None and clash:
         raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
     if file is None and start is not None:
-        raise InputError("--start goes with --arrivals: it is a time in the table")
+        raise InputError("--start needs --arrivals: it is a time in the table")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if file is None:
         return made
@@ -115,5 +115,5 @@ def _bearings(text: str) -> list[float]:
             values.append(number(part, float(part)))
         except ValueError:
             got = f"got {text!r}: {part!r} is not a finite number"
-            raise InputError(f"--bearings is written like 0,80,190,260, {got}") from None
+            raise InputError(f"--bearings must be like 0,80,190,260, {got}") from None
     return values

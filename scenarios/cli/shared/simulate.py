@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def simulate(
     scenario: Scenario, controller: Any, seed: int, until: float = math.inf, **options: Any
 ) -> Run:
-    """Run with a progress bar, in parts, with the same result; `until` ends it early [s]."""
+    """Run in parts, with a progress bar and the usual result, up to `until` [s] at most."""
     from minisim.simulation import Simulation
 
     simulation = Simulation(scenario, controller, seed=seed, **options)

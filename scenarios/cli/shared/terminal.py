@@ -81,7 +81,7 @@ def wrapped(text: str, indent: int) -> str:
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text, in plainer characters if need be, even if closed."""
+    """Let stdout and stderr, even if closed, take any text, in plainer characters if need be."""
     codecs.register_error("minisim-plain", _plain)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:

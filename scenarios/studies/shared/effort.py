@@ -26,7 +26,7 @@ class Search:
 
     @property
     def rounds(self) -> int:
-        """How often a bisection halves its bracket."""
+        """How many times a bisection halves its bracket."""
         return self.steps.bit_length() - 1
 
 
@@ -37,7 +37,7 @@ class Effort:
     seeds: int = whole("runs per point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
     densities: MaybeReals[tuple[float, ...]] = reals(
-        "only points with these demands, in studies that have any; none means all",
+        "only points with these demands, in studies that have them; none means all",
         "veh/h/lane", optional=True, label="densities", default=None,
     )  # fmt: skip
     search: Search = part("for studies that search", Search, default_factory=Search)

@@ -54,7 +54,7 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _order(row: Mapping[Any, Any]) -> tuple[object, ...]:
-    """In the order in which readers look: arms, inflow, controller, all lanes, lane, metric."""
+    """Sort key, in reading order: arms, inflow, controller, all lanes, lane, metric."""
     lane = "" if row["lane"] == "all" else row["lane"]
     places = SPLITS.index(row["split"]), list(SERIES.values()).index(row["series"])
     return row["arms"], *places, lane, row["metric"], row["density"]

@@ -64,7 +64,7 @@ class Study:
 
 
 class Runs(NamedTuple):
-    """How many runs of a point were made without failing, and how many the effort wants."""
+    """How many runs of a point succeeded, and how many the effort wants."""
 
     made: int
     wanted: int
@@ -83,7 +83,7 @@ class Results:
     def of(
         cls, study: Study, effort: Effort, asked: Sequence[tuple[Point, Mapping[str, Any] | None]]
     ) -> Results:
-        """The results, given each point asked for and the row of its run, in order."""
+        """The results, from pairs of a point and the row of its run, in order."""
         import pandas as pd
 
         rows = [{**row, **point._asdict()} for point, row in asked if row is not None]

@@ -124,7 +124,7 @@ def test_a_passage_well_before_or_after_is_granted() -> None:
 
 
 def test_the_buffer_is_kept() -> None:
-    """b2 in ever longer distance behind a2: refused until it comes half a second later."""
+    """b2 ever further behind a2: refused until it comes half a second later."""
     gaps = []
     for distance in np.arange(20.0, 80.0, 1.0):
         run = session(reach=100.0)

@@ -283,7 +283,7 @@ def test_isolated_vehicles_take_the_published_time(manoeuvre: int, seconds: floa
 
 
 def test_the_session_is_woken_often_enough() -> None:
-    """Called at every step, as the authors' driver is, it says the same."""
+    """Called at every step, as the authors' script is, it says the same."""
     what = replace(replay("balanced", 350, 4), horizon=240.0)
     few = minisim.simulate(what, AsRunDim(), on_collision="record")
     many = minisim.simulate(what, EveryStep(AsRunDim()), on_collision="record")

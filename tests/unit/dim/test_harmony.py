@@ -1,4 +1,4 @@
-"""The harmony matrix: from geometry, from files, and as the paper has it."""
+"""The harmony matrix: from geometry, from files, and from the paper."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def car(vehicle: int, movement: str, past: float, speed: float) -> Observed:
 
 
 def regions(p: int, q: int) -> tuple[Region, Region]:
-    """The forbidden region of two movements, as the first and as the second has it."""
+    """The forbidden region of two movements, seen from the first and from the second."""
     shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
     assert shared is not None
     assert mirrored is not None
@@ -252,7 +252,7 @@ def test_where_all_stand_and_wait_the_first_lane_goes_alone() -> None:
 
 
 def stands(monitors: Monitors, seen: View, vehicle: int, decided: bool = False) -> bool:
-    """Whether a vehicle goes that sees everything."""
+    """Whether a vehicle that sees everything goes."""
     ego = next(v for v in seen.vehicles if v.id == vehicle)
     return monitors.patience.goes(seen, seen, ego, decided, (0, 1, 2, 3))
 

@@ -1,4 +1,4 @@
-"""Figures and animations: everything is drawn where the model has it."""
+"""Figures and animations: everything is drawn where the model puts it."""
 
 from __future__ import annotations
 

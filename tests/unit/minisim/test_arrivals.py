@@ -217,8 +217,8 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
         ({"split": (0, 0)}, "split must be shares"),
         ({"split": (1, -1)}, "split must be shares"),
         ({"split": (1e308, 1e308)}, "split must be shares"),
-        ({"turns": "ab"}, "turns is uniform or written like 4:3:2:1, got 'ab'"),
-        ({"split": "uniform"}, "split is balanced or written like"),
+        ({"turns": "ab"}, "turns must be uniform or like 4:3:2:1, got 'ab'"),
+        ({"split": "uniform"}, "split must be balanced or like"),
         ({"split": 4}, "split must be a sequence"),
     ],
 )

@@ -70,15 +70,15 @@ def test_recorded_arrivals_replace_the_demand() -> None:
     assert four_way(recorded=recorded).recorded is recorded
     with pytest.raises(InputError, match="recorded replaces density, split; give one or the"):
         four_way(100, split="4:3:2:1", recorded=recorded)
-    with pytest.raises(InputError, match="min_headway goes with the model 'shifted'"):
+    with pytest.raises(InputError, match="min_headway needs the model 'shifted'"):
         four_way(min_headway=2.0)
 
 
 @pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])
 def test_bad_shares_are_one_sentence(text: str) -> None:
-    with pytest.raises(InputError, match="split is balanced or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="split must be balanced or like 4:3:2:1, got"):
         four_way(split=text)
-    with pytest.raises(InputError, match="turns is uniform or written like 4:3:2:1, got"):
+    with pytest.raises(InputError, match="turns must be uniform or like 4:3:2:1, got"):
         four_way(turns=text)
 
 
@@ -136,9 +136,9 @@ def test_scenarios_have_the_names_of_the_command_line() -> None:
     ("name", "message"),
     [
         ("four_way", "unknown scenario 'four_way'.*did you mean 'four-way'"),
-        ("4way", r"N-way \(such as 6-way\), custom; did you mean '4-way'"),
+        ("4way", r"N-way \(such as 6-way\), custom, or .*; did you mean '4-way'"),
         ("4-ways", "did you mean '4-way'"),
-        ("junction", r"custom$"),
+        ("junction", r"custom, or a file such as junction.toml$"),
         ("9" * 5000, "unknown scenario"),
         ("2-way", "number of arms must be an integer 3 … 12, got 2"),
         ("-way", "unknown scenario"),

@@ -50,7 +50,7 @@ SUMO = {
 }
 
 #: The one run that parts from SUMO's: an approach lane of the 3-arm network is 1 cm longer than its
-#: siblings, from 1120 s on that decides who goes first.
+#: siblings. From 1120 s on that decides which vehicle is first.
 PARTS = Cell("balanced", 350, 3)
 
 

@@ -1,4 +1,4 @@
-"""Signal heads: who is let go at the end of a green, and when a head may turn green."""
+"""Signal heads: what may still go after a green, and when a head may turn green."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def test_who_is_misread_at_a_small_error_is_at_a_larger_one(kind: str) -> None:
 def test_confidence_is_calibrated(kind: str, unsignalled: tuple[float, float]) -> None:
     """Of the readings in each tenth of confidence, the mean confidence of them is right.
 
-    All manoeuvres are driven alike.
+    All manoeuvres are equally frequent.
     """
     subject = lane(0.25, kind, unsignalled)
     bins: dict[int, list[tuple[float, bool]]] = {}

@@ -258,7 +258,7 @@ def test_noise_is_new_each_frame_and_one_for_all_or_each_its_own(noise: str, fie
         (errors(alike, 0, 0.0), errors(alike, 0, 0.1)),
     ):
         assert all(a != b for a, b in zip(one, other, strict=True))
-        assert len(set(one)) == len(one), "vehicles err each for itself"
+        assert len(set(one)) == len(one), "each vehicle errs on its own"
 
 
 def test_no_vehicle_seems_to_drive_backwards() -> None:

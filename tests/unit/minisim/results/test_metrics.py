@@ -98,7 +98,7 @@ def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
             "metric 'm' must give one finite number per trip",
         ),
         ("min_tcc_s", "unknown metric 'min_tcc_s'.*did you mean 'min_ttc_s'"),
-        (Metric("travel_time_s", len), "'travel_time_s' is there already; give yours another"),
+        (Metric("travel_time_s", len), "already a metric 'travel_time_s'; give yours another"),
         (5, "unknown metric 5"),
     ],
 )
@@ -121,7 +121,7 @@ def test_other_wrong_questions(run: Run) -> None:
         with pytest.raises(InputError, match="name of a metric must"):
             Metric(name, len)  # type: ignore[arg-type]
     for name in ("complete_m", "lanes_a_m", "movements_m", "kinds_m", "m_p95", "m_max", "m_ci95"):
-        with pytest.raises(InputError, match=f"must not be that of a column of runs, got '{name}"):
+        with pytest.raises(InputError, match=f"must not be a column of runs, got '{name}"):
             Metric(name, len)
     with pytest.raises(InputError, match="must be a function"):
         Metric("m", 5)  # type: ignore[arg-type]
@@ -153,7 +153,7 @@ def test_a_count_of_the_controller_hides_no_metric(run: Run) -> None:
     summary = counting.summary(["crossings"])
     assert (summary["honks"], summary["crossings"]) == (3, 2)
     for name, asked in (("honks", [Metric("honks", lambda run: 1)]), ("trips", [])):
-        with pytest.raises(InputError, match=f"{name!r} is also what the controller calls a count"):
+        with pytest.raises(InputError, match=f"count {name!r} has the name of another number"):
             replace(run, counts={name: 3}).summary(asked)
 
 

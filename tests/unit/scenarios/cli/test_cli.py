@@ -358,7 +358,7 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
     assert "no vehicle comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
     film = ("-o", str(tmp_path / "film.gif"))
     for command in (("run", "four-way"), ("animate", "four-way", *film)):
-        assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
+        assert "--start needs --arrivals" in fails(capsys, *command, "--start", "07:00")
 
 
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
@@ -474,7 +474,7 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "--horizon [s] must be a finite number, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "capacity"), "earlier ones: minisim reproduce --only capacity"),
+    (("sweep", "capacity"), "earlier ones: use minisim reproduce --only capacity"),
     (("sweep", "x" * 300), "unknown study 'xxx"),
     (("sweep", "x" * 300 + ".toml"), "File name too long"),
     (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "cannot read xxx"),
@@ -496,7 +496,7 @@ BAD = [
     (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
     (("crossval", "--replay", "--split", "1:1:1:1"), "unknown split of a published run"),
     (("crossval", "--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("crossval", "--replay", "five-way", "-c", "v2ic"), "3 and 5 arms balanced only, with dim"),
+    (("crossval", "--replay", "five-way", "-c", "v2ic"), "on 3 and 5 arms, only dim and balanced"),
     (("crossval", "three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
 ]
 

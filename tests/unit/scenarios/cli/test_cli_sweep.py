@@ -149,5 +149,5 @@ def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
         assert 0 < len(store) < 5000
         kept = f"minisim: {len(store)} of 5000 runs are in {path}"
     assert error.splitlines() == [
-        f"{kept}; the same command goes on from there", f"minisim: {word}",
+        f"{kept}; repeat the command to continue", f"minisim: {word}",
     ]  # fmt: skip

@@ -52,7 +52,7 @@ def test_priorities_by_inflow_where_the_text_has_them() -> None:
 
 
 def test_the_as_run_study_runs_what_ran() -> None:
-    """Discrepancies 10 to 14, of which tests/unit/scenarios/test_paper.py has the details."""
+    """Discrepancies 10 to 14; tests/unit/scenarios/test_paper.py has the details."""
     points = [point for point in study_named("as-run").points if point.arms == 4]
     for name, series in SERIES.items():
         for point in (point for point in points if point.series == series):

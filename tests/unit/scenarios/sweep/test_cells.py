@@ -103,7 +103,7 @@ def test_pairs_cancel_what_they_share() -> None:
 def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
-    with pytest.raises(InputError, match="did not meet the same arrivals"):
+    with pytest.raises(InputError, match="had different arrivals"):
         differences(other, "waiting_time_s", "dim", "dim:gate=harmonious")
     with pytest.raises(InputError, match="unknown controller of these rows 'dmi'"):
         differences(rows, "waiting_time_s", "dmi", "dim")
@@ -296,7 +296,7 @@ def test_a_run_counts_once() -> None:
     frame = pd.DataFrame({
         "who": ["x", "x", "y"], "m": 1.0, "where": 1, "seed": 1, "arrivals": "same", "error": None,
     })  # fmt: skip
-    with pytest.raises(InputError, match="x has several runs of one seed; where are the same"):
+    with pytest.raises(InputError, match="x has several runs of one seed with equal where"):
         pairs(frame, "m", "who", ("x", "y"), ["where"])
 
 

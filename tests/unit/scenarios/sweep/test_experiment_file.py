@@ -165,7 +165,7 @@ WRONG = [
     ('controller = {name = "unregulated", x = 3}', r"unregulated has no parameters, got x"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"unknown profile 3"),
-    ('split = "4-3"', r"split is balanced or written like"),
+    ('split = "4-3"', r"split must be balanced or like"),
     ("density = []", r"density is an empty list"),
     ('density = "many"', r"density"),
     ("seeds = 0", r"toml: seeds must be an integer 1 … .*, got 0; or a list of seeds"),
@@ -180,11 +180,11 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('start = "07:00"', r"start goes with arrivals"),
+    ('start = "07:00"', r"start needs arrivals"),
     ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
      r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
-    ("min_headway = 2", r"min_headway goes with the model 'shifted'"),
+    ("min_headway = 2", r"min_headway needs the model 'shifted'"),
     ("seeds = 1\n[[experiment]]\nseeds = 2", r"seeds above the blocks is never used"),
 ]  # fmt: skip
 
