@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
+    from minisim.junction.roads import Road
     from minisim.recorded import read_arrivals, write_arrivals
     from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
+    from minisim.town import read_junction
     from minisim.vehicle import VehicleType
 
 _NAMES = {
@@ -32,9 +34,11 @@ _NAMES = {
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
+    "minisim.junction.roads": ("Road",),
     "minisim.recorded": ("read_arrivals", "write_arrivals"),
     "minisim.results.run": ("Run",),
     "minisim.simulation": ("Simulation", "simulate"),
+    "minisim.town": ("read_junction",),
     "minisim.vehicle": ("VehicleType",),
 }
 
@@ -44,11 +48,13 @@ __all__ = [
     "Intersection",
     "MinisimError",
     "Movement",
+    "Road",
     "Run",
     "Simulation",
     "VehicleType",
     "__version__",
     "read_arrivals",
+    "read_junction",
     "simulate",
     "write_arrivals",
 ]
