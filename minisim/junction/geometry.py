@@ -174,7 +174,7 @@ class Intersection:
         """The same by lane and manoeuvre, shape (n, n−1)."""
         return self.allowed.reshape(self.n, self.n - 1)
 
-    @property
+    @cached_property
     def approaches(self) -> tuple[int, ...]:
         """The arms from which some movement is allowed."""
         return tuple(np.unique(self.movements.origins[self.allowed]).tolist())
@@ -184,7 +184,7 @@ class Intersection:
         """The arms into which some movement is allowed."""
         return tuple(np.unique(self.movements.exits[self.allowed]).tolist())
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[float, ...]:
         """Distance from the centre to the far end of each arm's road [m]."""
         return tuple(road.length or self.arm_length for road in self._each_road)
@@ -206,7 +206,7 @@ class Intersection:
         each = zip(self.lane_widths, self.offsets, strict=True)
         return tuple(width if offset else width / 2.0 for width, offset in each)
 
-    @property
+    @cached_property
     def approach_length(self) -> float:
         """Distance from the far end of the longest approach lane to the junction entry [m].
 
