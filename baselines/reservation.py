@@ -48,6 +48,7 @@ from minisim.control import (
 )
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
+from minisim.laws import Traits, traits_of
 from minisim.names import Name
 from minisim.parameters import declared, real
 
@@ -94,6 +95,7 @@ class Slot:
 
     vehicle: int
     lane: int
+    type: Traits  #: of the vehicle
     movement: int  #: its index
     start: int  #: when the prediction was made [steps]
     s: Floats  #: positions past the entry [m], one per step from `start` on
@@ -114,7 +116,8 @@ class Slot:
 
     def leader(self, now: int, until: float = math.inf, shift: float = 0.0) -> Leader:
         """What a follower meets from `now` [steps] on."""
-        return Leader(self.s[now - self.start :], self.v[now - self.start :], until, shift)
+        s, v = self.s[now - self.start :], self.v[now - self.start :]
+        return Leader(s, v, self.type.length, self.type.b_max, until, shift)
 
     def expects(self, seen: Observed, now: int) -> bool:
         """Whether the vehicle is where it was predicted to be."""
@@ -129,8 +132,12 @@ class Manager:
         self.slots: dict[int, Slot] = {}  #: by vehicle, in the order of their grants
         self._law = law_of(site)
         self._ways = courses(site)
-        zones = conflict_zones(site.intersection, site.vehicle).tolist()
-        self._zones = [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
+        self._types = tuple(map(traits_of, site.types))
+        tables = (conflict_zones(site.intersection, it, site.fleet).tolist() for it in site.types)
+        self._zones = [
+            [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
+            for zones in tables
+        ]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
         self._rows = site.intersection.movements.rows
@@ -152,16 +159,19 @@ class Manager:
             for slot in rivals
             if self._ways[slot.movement].exit_arm == way.exit_arm
         ]
-        motion = predict(self._law, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane)
+        me = self._types[seen.type]
+        motion = predict(
+            self._law, me, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane
+        )
         if motion is None:
             return None
         s, v, hard = motion
         enters = now + int(s.searchsorted(0.0))
         zones = {
             q: (now + int(s.searchsorted(first, "right")) - 1, now + int(s.searchsorted(last)))
-            for q, (first, last) in self._zones[p].items()
+            for q, (first, last) in self._zones[seen.type][p].items()
         }
-        return Slot(seen.id, seen.lane, p, now, s, v, enters, zones, hard)
+        return Slot(seen.id, seen.lane, me, p, now, s, v, enters, zones, hard)
 
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage fits every other; the `last` comes after all in its exit lane."""
@@ -196,7 +206,7 @@ class ReservationSession:
         self.plan = Plan(marks=(reach,), sight=reach)
         self._period = site.period("period", controller.period)
         self._dt = site.dt
-        self._brakes = site.vehicle.deceleration
+        self._brakes = [it.deceleration for it in site.types]
         self._requests: dict[int, None] = {}  # in the order of first requests
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -223,7 +233,7 @@ class ReservationSession:
         every reservation of a vehicle that can stop is checked again.
         """
         slots = self.manager.slots
-        stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}
+        stops = {v: can_stop(seen[v], self._brakes[seen[v].type]) for v in slots if v in seen}
         changed: set[int] = set()
         misfit = False
         for vehicle in sorted(stops, key=stops.__getitem__):

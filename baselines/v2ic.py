@@ -84,14 +84,13 @@ class V2ICSession:
     def __init__(self, controller: V2IC, site: Site) -> None:
         reach = min(controller.reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), wake_on_clear=True, sight=reach)
-        paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way
         self._period = site.period("period", controller.period)
         self._rows = site.intersection.movements.rows
         self._limit = site.limit
-        self._acceleration = site.vehicle.acceleration
-        self._crossing = [path.crossing + length for path in paths]
+        self._accelerations = [it.acceleration for it in site.types]
+        self._crossing = [path.crossing for path in site.intersection.paths]
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -117,24 +116,27 @@ class V2ICSession:
             limit = self._limit(me.lane)
             p = self._rows[me.lane][me.manoeuvre]
             blocked = max([latest[q] for q in self._foes[p]], default=0.0)
-            distance = me.distance + self._crossing[p]
+            distance = me.distance + self._crossing[p] + me.length
+            a = self._accelerations[me.type]
             if vehicle in self.granted:
-                leaving = self.leaving_time(distance, me.speed, 0.0, limit)
+                leaving = self.leaving_time(distance, me.speed, 0.0, a, limit)
             elif blocked > 0.0:
                 yield Advise(vehicle, advised_speed(me.distance, me.speed, blocked, limit))
-                leaving = self.leaving_time(distance, me.speed, blocked, limit)
+                leaving = self.leaving_time(distance, me.speed, blocked, a, limit)
             else:
                 self.granted.add(vehicle)
                 yield Go(vehicle)
                 yield Advise(vehicle, math.inf)
-                leaving = time_to_cover(distance, me.speed, self._acceleration, limit)
+                leaving = time_to_cover(distance, me.speed, a, limit)
             latest[p] = max(latest[p], leaving)
 
-    def leaving_time(self, distance: float, speed: float, blocked: float, limit: float) -> float:
+    def leaving_time(
+        self, distance: float, speed: float, blocked: float, a: float, limit: float
+    ) -> float:
         """Time that a vehicle needs to leave, `distance` ahead, at its present speed [s].
 
         It is never 0, since a listed vehicle has not left, and at most `blocked`, the time until
-        it can be let go, plus the time from rest at its present place.
+        it can be let go, plus the time from rest at its present place, at acceleration `a`.
         """
-        from_rest = time_to_cover(distance, 0.0, self._acceleration, limit)
+        from_rest = time_to_cover(distance, 0.0, a, limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)

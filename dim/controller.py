@@ -142,7 +142,7 @@ class Dim:
         """The matrix in force at this site; raises `InputError` if n differs."""
         n = site.intersection.n
         if self.matrix is None:
-            return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+            return HarmonyMatrix.from_geometry(site.intersection, site.fleet)
         if self.matrix.n != n:
             raise InputError(f"the matrix is for {self.matrix.n} arms, the intersection has {n}")
         return self.matrix
@@ -167,7 +167,8 @@ class DimSession:
         matrix = dim.harmony(site)
         table = decision_table(matrix, dim.order, dim.ranks(site))
         self.rules = Rules(table, dim.gate, dim.commit)
-        self.reader = Reader(site.intersection.n, zones, site.vehicle.deceleration, dim.commit)
+        brakes = tuple(it.deceleration for it in site.types)
+        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
         entry = (0.0,) if dim.gate == "harmonious" else ()
         looks = dim.perception.period

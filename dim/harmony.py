@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, show
 from minisim.files import read_file, write_text
+from minisim.fleet import Fleet, Vehicles
 from minisim.junction.conflicts import CLEARANCE, conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
@@ -51,15 +52,15 @@ class HarmonyMatrix:
     def from_geometry(
         cls,
         intersection: Intersection,
-        vehicle: VehicleType | None = None,
+        vehicles: Vehicles | None = None,
         clearance: float = CLEARANCE,
     ) -> HarmonyMatrix:
-        """Harmony if the corridors that a vehicle sweeps stay over `clearance` (0 … 10 m) apart."""
+        """Harmony if the corridors that vehicles sweep stay over `clearance` (0 … 10 m) apart."""
         instance("intersection", intersection, Intersection)
-        vehicle = VehicleType() if vehicle is None else vehicle
-        instance("vehicle", vehicle, VehicleType)
+        vehicles = VehicleType() if vehicles is None else vehicles
+        instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        return cls(intersection.n, ~conflicts(intersection, vehicle, clearance))
+        return cls(intersection.n, ~conflicts(intersection, vehicles, clearance))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:

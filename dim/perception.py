@@ -76,7 +76,7 @@ class Reader(NamedTuple):
 
     n: int  # arms
     zones: Zones
-    deceleration: float  # comfortable braking [m/s²]
+    decelerations: tuple[float, ...]  # comfortable braking of each type [m/s²]
     commit: str
 
     def committed(self, vehicle: Observed) -> bool:
@@ -86,7 +86,7 @@ class Reader(NamedTuple):
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0
-        return not can_stop(vehicle, self.deceleration)
+        return not can_stop(vehicle, self.decelerations[vehicle.type])
 
     def read(self, view: View) -> Percept:
         """Participants and crossing vehicles of a view, ordered by lane and front to back."""

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,17 +45,21 @@ class Arrivals:
     lane: Ints  # index of the approach lane
     manoeuvre: Ints  # 1 … n−1
     speed_factor: Floats | None = None  # drivers' factors on the speed limit; None: they are drawn
+    type: npt.NDArray[np.str_] | None = None  # names of the vehicles' types; None: they are drawn
 
     def __post_init__(self) -> None:
         time = _column("demand_time_s", self.time, np.float64)
         lane = _column("lane", self.lane, np.int64)
         manoeuvre = _column("manoeuvre", self.manoeuvre, np.int64)
+        columns: dict[str, npt.NDArray[Any]]
         columns = {"time": time, "lane": lane, "manoeuvre": manoeuvre}
         if self.speed_factor is not None:
             factors = _column("speed_factor", self.speed_factor, np.float64)
             if len(factors) and not LEAST_FACTOR <= factors.min() <= factors.max() <= MOST_FACTOR:
                 raise InputError(f"a speed_factor must be {LEAST_FACTOR:g} … {MOST_FACTOR:g}")
             columns["speed_factor"] = factors
+        if self.type is not None:
+            columns["type"] = np.asarray(self.type, dtype=np.str_)
         if any(len(column) != len(time) for column in columns.values()):
             raise InputError("an arrival table needs as many times as lanes and manoeuvres")
         if not np.isfinite(time).all() or time.min(initial=0.0) < 0:
@@ -83,7 +88,10 @@ class Arrivals:
         """The arrivals from `start` [s] to before `end`, with times counted from `start`."""
         here = slice(*self.time.searchsorted((start, end)))
         factors = None if self.speed_factor is None else self.speed_factor[here]
-        return Arrivals(self.time[here] - start, self.lane[here], self.manoeuvre[here], factors)
+        types = None if self.type is None else self.type[here]
+        return Arrivals(
+            self.time[here] - start, self.lane[here], self.manoeuvre[here], factors, types
+        )
 
     def check(self, n: int, allowed: Bools | None = None) -> None:
         """Raise `InputError` for a lane or manoeuvre that does not exist with n arms.

@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
-`streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the engine, the
-hosts or the results; `make lint` checks this.
+Controllers may also import `junction`, `vehicle`, `fleet`, `parameters`, `names`, `errors`,
+`files`, `streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
+engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 from minisim.errors import InputError, instance, number, printable, told
+from minisim.fleet import Fleet
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
@@ -54,7 +55,7 @@ class Site:
     """What a controller may know before the first vehicle arrives."""
 
     intersection: Intersection = part("its geometry", Intersection)
-    vehicle: VehicleType = part("the vehicles' type", VehicleType)
+    fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
     speed_limit: float = real("of the roads, the highest one", "m/s", above=0, high=100)
     demand: Reals[tuple[float, ...]] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
@@ -63,6 +64,16 @@ class Site:
         "of each arm's road; by default its own in the intersection, or else `speed_limit`",
         "m/s", default=(),
     )  # fmt: skip
+
+    @property
+    def vehicle(self) -> VehicleType:
+        """The vehicles' type; of several, one that is in every respect as bad as the worst."""
+        return self.fleet.worst
+
+    @property
+    def types(self) -> tuple[VehicleType, ...]:
+        """The vehicles' types; `Observed.type` is an index into them."""
+        return self.fleet.types
 
     @property
     def looks_out(self) -> bool:
@@ -82,6 +93,7 @@ class Site:
                 "vehicles that keep to SUMO's rules drive on roads that are all alike; leave out "
                 "roads, or take another profile, such as fair"
             )
+        self.fleet.check(self.intersection.n)
         room = self.intersection.shortest_approach
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
@@ -89,11 +101,13 @@ class Site:
                 f"{room:g} m; arm_length must be more than "
                 f"{self.intersection.junction_radius + needed:g} m"
             )
-        if entry_room(self.intersection, self.vehicle) <= 0.0:
+        if entry_room(self.intersection, self.fleet) <= 0.0:
+            tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
+            it = tight[0] if tight else self.vehicle
             raise InputError(
-                f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
-                f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
-                "touch another that waits beside it"
+                f"vehicles of {it.length:g} × {it.width:g} m ({it.name}) do not fit lanes of "
+                f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
 
     def limit(self, arm: int) -> float:
@@ -118,7 +132,15 @@ class Site:
     @cached_property
     def conflicts(self) -> Bools:
         """Whether two movements from different arms must not be driven at once, shape (m, m)."""
-        return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
+        return conflicts(self.intersection, self.fleet) & self.intersection.movements.apart
+
+
+def _fleet(value: object) -> Fleet:
+    """A fleet, or the only type that drives, as a fleet."""
+    if isinstance(value, VehicleType):
+        return Fleet((value,))
+    instance("fleet", value, Fleet)
+    return cast(Fleet, value)
 
 
 class Observed(NamedTuple):
@@ -136,6 +158,7 @@ class Observed(NamedTuple):
     demand_time: float = 0.0  # when it wanted to enter the road [s]
     rank: int = 0  # its place among the vehicles of its lane, from 0
     speed_factor: float = 1.0  # its driver's factor on the speed limit
+    type: int = 0  # index of its type in `Site.types`; all can see whether it is a bus
 
     @property
     def movement(self) -> Movement:

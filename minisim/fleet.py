@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -72,6 +73,17 @@ _SUMO = (
 TYPES: Mapping[str, VehicleType] = {it.name: it for it in (*_INDIAN, *_SUMO)}
 
 
+#: Fleets by name. `india` has the shares of the vehicles registered in India on 31 March 2009: 72 %
+#: two-wheelers, 13.3 % cars, jeeps and taxis, 5.5 % goods vehicles, 1.3 % buses (Ministry of Road
+#: Transport, Road Transport Year Book 2007–09). Goods vehicles are trucks here, and the 7.9 % of
+#: other vehicles are auto-rickshaws.
+MIXES: Mapping[str, Mapping[str, float]] = {
+    "india": {
+        "motorcycle": 0.72, "auto-rickshaw": 0.079, "car": 0.133, "truck": 0.055, "bus": 0.013,
+    },
+}  # fmt: skip
+
+
 def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
     types = tuple(value) if isinstance(value, list | tuple) else (value,)
     for it in types:
@@ -90,10 +102,13 @@ def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
 
 def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list | tuple) else (value,)
-    return tuple(
+    kept = tuple(
         numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
         for i, row in enumerate(rows)
     )
+    for share in itertools.chain.from_iterable(kept):
+        number("share of a type", share, low=0, high=1)
+    return kept
 
 
 @declared
@@ -110,7 +125,7 @@ class Fleet:
     shares: Takes[
         tuple[tuple[float, ...], ...], float | Sequence[float | Sequence[float]]
     ] = checked(
-        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers ≥ 0",
+        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers 0 … 1",
         default=((1.0,),),
     )  # fmt: skip
 
@@ -121,8 +136,7 @@ class Fleet:
         if len(counts - {1}) > 1:
             raise InputError(f"shares by lane need a number per lane, got {self.shares}")
         for lane in range(max(counts)):
-            for share in (row := self.of_lane(lane)):
-                number("share of a type", share, low=0, high=1)
+            row = self.of_lane(lane)
             if abs(sum(row) - 1.0) > ROUNDING:
                 where = f" on lane {ARM_NAMES[lane]}" if max(counts) > 1 else ""
                 given = ", ".join(
@@ -144,6 +158,13 @@ class Fleet:
     def names(self) -> tuple[str, ...]:
         """The names of the types."""
         return tuple(it.name for it in self.types)
+
+    def __str__(self) -> str:
+        """As `fleet_named` reads it, such as "car:0.8,bus:0.2"; the name of an only type."""
+        if len(self.types) == 1:
+            return self.types[0].name
+        shares = ("/".join(f"{share:g}" for share in row) for row in self.shares)
+        return ",".join(f"{name}:{share}" for name, share in zip(self.names, shares, strict=True))
 
     @cached_property
     def worst(self) -> VehicleType:
@@ -178,13 +199,18 @@ class Fleet:
         return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
 
 
+#: What has `types`: a fleet, or the only type that drives.
+Vehicles = Fleet | VehicleType
+
+
 def fleet_named(value: Any, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
         value: a Fleet or VehicleType, kept unchanged; or the shares of `TYPES`, as a table such as
             `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
-            such as "car:0.8,bus:0.2".
+            such as "car:0.8,bus:0.2", with shares by lane written 0.2/0.1/0.2/0.1; or the name of
+            a mix (`MIXES`) or of a type.
         base: its law drives the vehicles of a table or text.
 
     Raises:
@@ -196,14 +222,19 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     if isinstance(value, VehicleType):
         return Fleet((value,))
     wanted = "shares of vehicle types such as car:0.8,bus:0.2"
-    if isinstance(value, str):
+    if isinstance(value, str) and ":" not in value:
+        known = {**MIXES, **{name: {name: 1.0} for name in TYPES}}
+        value = known[choice("fleet", value, known)]
+    elif isinstance(value, str):
         pairs = [part.rpartition(":") for part in value.split(",")]
         try:
-            value = {name.strip(): float(share) for name, _, share in pairs}
+            value = {
+                name.strip(): [float(share) for share in row.split("/")] for name, _, row in pairs
+            }
         except ValueError:
             raise InputError(f"fleet must be {wanted}, got {show(value)}") from None
         if len(value) < len(pairs):
-            raise InputError("fleet names a vehicle type twice")
+            raise InputError(f"fleet names a vehicle type twice: {', '.join(p[0] for p in pairs)}")
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
     if base.sumo is not None:
@@ -212,20 +243,22 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
 
 
-#: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
-#: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
-#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and has no
-#: motorcycles or auto-rickshaws.
+#: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
+#:
+#: `pcu` is IRC:106-1990 (table 1), with a factor for a type that makes up 5 % of the traffic and
+#: one for 10 % or more. `pcu-irc64` is IRC:64-1990, with one. `pcu-hcm` is the Highway Capacity
+#: Manual (2000, chapter 16), which counts a heavy vehicle at a junction as two cars, and knows
+#: neither motorcycles nor auto-rickshaws.
 PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "IRC:106": {
+    "pcu": {
         "motorcycle": (0.5, 0.75), "auto-rickshaw": (1.2, 2.0), "car": (1.0, 1.0),
         "lcv": (1.4, 2.0), "bus": (2.2, 3.7), "truck": (2.2, 3.7),
     },
-    "IRC:64": {
+    "pcu-irc64": {
         "motorcycle": (0.5, 0.5), "auto-rickshaw": (1.0, 1.0), "car": (1.0, 1.0),
         "lcv": (1.5, 1.5), "bus": (3.0, 3.0), "truck": (3.0, 3.0),
     },
-    "HCM": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
+    "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
 }  # fmt: skip
 
 #: SUMO's classes count as the types that they stand for.
@@ -235,24 +268,24 @@ _ALIKE = {
 }  # fmt: skip
 
 
-def pcu_factors(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> tuple[float, ...]:
+def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
 
-    Where a source has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
-    interpolated. Raises `InputError` for a source or a type without a factor.
+    Where a unit has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
+    interpolated. Raises `InputError` for an unknown unit, or a type without a factor.
     """
-    table = PCU[choice("source of passenger car units", source, PCU)]
+    table = PCU[choice("passenger car unit", unit, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
     if len(fleet.types) == 1:  # the unit is defined by cars alone
         return (1.0,)
     kinds = [_ALIKE.get(name, name) for name in fleet.names]
-    rows = [table[choice(f"vehicle type in {source}", kind, table)] for kind in kinds]
+    rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)
     )
 
 
-def mean_pcu(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> float:
-    """Passenger car units of the mean vehicle, over `n` lanes with the same inflow."""
-    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    return float(np.dot(pcu_factors(fleet, source, n), shares))
+def mean_pcu(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
+    """Passenger car units of the mean vehicle of each of `n` lanes."""
+    factors = pcu_factors(fleet, unit, n)
+    return tuple(float(np.dot(factors, fleet.of_lane(lane))) for lane in range(n))

@@ -36,6 +36,7 @@ from minisim.errors import (
     number,
     show,
 )
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Reals, declared, part, real, reals, text, word
@@ -97,7 +98,9 @@ class SmallScenario:
     def site(self, seed: int) -> Site:
         """What a controller may know about it."""
         demand = Demand(density=self.density).rates(self.intersection.n)
-        return Site(self.intersection, self.vehicle, self.speed_limit, demand, self.dt, seed)
+        return Site(
+            self.intersection, Fleet((self.vehicle,)), self.speed_limit, demand, self.dt, seed
+        )
 
     def arrivals(self, seed: int) -> Arrivals:
         """Arrivals in the first `demand_time` seconds."""

@@ -8,17 +8,19 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals, Demand
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.files import AnyPath
+from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
+from minisim.vehicle import VehicleType
 from scenarios.junctions import is_junction_file, junction_from
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
@@ -34,7 +36,9 @@ PUBLISHED_RADII = {3: 4.16, 4: 7.2, 5: 8.4}
 class Options(TypedDict, total=False):
     """Keywords of every scenario, as `Intersection`, `Demand` and `Scenario` take them.
 
-    A profile may be a name, and shares (`split`, `turns`) numbers or a text such as "4:3:2:1".
+    A profile may be a name, a fleet as for `minisim.fleet.fleet_named`, and shares (`split`,
+    `turns`) numbers or a text such as "4:3:2:1". `unit` is that of the density: "veh", or passenger
+    car units (`minisim.fleet.PCU`).
     """
 
     name: str
@@ -50,6 +54,8 @@ class Options(TypedDict, total=False):
     model: str
     min_headway: float
     profile: str | Profile
+    unit: str
+    fleet: Fleet | VehicleType | Mapping[str, float | Sequence[float]] | str | None
     horizon: float
     warmup: float
     recorded: Arrivals | None
@@ -58,8 +64,11 @@ class Options(TypedDict, total=False):
 #: Mean inflow per lane by default [veh/h].
 DENSITY = 350.0
 
+#: The unit of a density that counts vehicles.
+VEHICLES = "veh"
+
 #: Keywords that recorded arrivals replace.
-DRAWN = ("density", "split", "turns", "model", "min_headway")
+DRAWN = ("density", "split", "turns", "model", "min_headway", "unit")
 
 _PARTS = (Intersection, Demand, Scenario)
 
@@ -71,7 +80,8 @@ _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
 def _shown(make: _Maker) -> _Maker:
     """Give `make` a signature in which help and completion see `Options` and their defaults."""
-    defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)} | {"name": None}
+    defaults = {f.name: f.default for kind in _PARTS for f in fields(kind)}
+    defaults |= {"name": None, "unit": VEHICLES}
     *own, _ = inspect.signature(make).parameters.values()  # the last is `options`
     options = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=defaults[key])
@@ -161,16 +171,32 @@ def _scenario(
         raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
     if "min_headway" in given and given.get("model") != "shifted":
         raise InputError("min_headway needs the model 'shifted'")
-    given["profile"] = profile_named(given.get("profile", "paper"))
+    profile = given["profile"] = profile_named(given.get("profile", "paper"))
+    if given.get("fleet") is not None:
+        given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
+    unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
     demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in (Demand, Scenario)
     )
-    return Scenario(
+    made = Scenario(
         intersection=junction(),
         demand=Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
+    return made if unit == VEHICLES else _in_vehicles(made, unit)
+
+
+def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
+    """The same scenario, with an inflow that was given in passenger car units as vehicles."""
+    if scenario.fleet is None:
+        raise InputError(f"unit {unit!r} needs a fleet, such as car:0.8,bus:0.2")
+    junction = scenario.intersection
+    means = mean_pcu(scenario.fleet, unit, junction.n)
+    rates = [rate / mean for rate, mean in zip(scenario.rates, means, strict=True)]
+    split = scenario.demand.split if len(set(means)) == 1 else tuple(rates)
+    density = sum(rates) / len(junction.approaches)
+    return replace(scenario, demand=replace(scenario.demand, density=density, split=split))
 
 
 def scenario_named(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
 from minisim.errors import InputError, number
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from minisim.recorded import clock
@@ -19,6 +20,9 @@ class Scenario:
     intersection: Intersection = part("the geometry", Intersection)
     demand: Demand = part("what to draw arrivals from", Demand)
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
+    fleet: Fleet | None = part(
+        "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
+    )
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
@@ -37,14 +41,22 @@ class Scenario:
         self.demand.rates(n, allowed)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        self.vehicles.check(n)
         if self.recorded is not None:
             self.recorded.check(n, allowed)
+            if self.recorded.type is not None:
+                self.vehicles.indices(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
                 raise InputError(
                     f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
                     f"recorded arrival is at {clock(first)}; `start` says where in the table a run "
                     f"begins"
                 )
+
+    @property
+    def vehicles(self) -> Fleet:
+        """The fleet, or the profile's vehicle as one."""
+        return self.fleet or Fleet((self.profile.vehicle,))
 
     @property
     def profile_name(self) -> str:
@@ -75,7 +87,7 @@ class Scenario:
         """What a controller may know about the scenario."""
         return Site(
             intersection=self.intersection,
-            vehicle=self.profile.vehicle,
+            fleet=self.vehicles,
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,

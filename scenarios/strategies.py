@@ -21,6 +21,8 @@ from typing import Literal
 from minisim.arrivals import Demand
 from minisim.control import Controller
 from minisim.errors import InputError, MissingExtraError
+from minisim.fleet import TYPES, Fleet
+from minisim.junction.conflicts import entry_room
 from minisim.junction.geometry import MIN_ANGLE, Intersection
 from minisim.junction.movements import movements_of
 from minisim.junction.roads import Road
@@ -30,7 +32,7 @@ from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
 try:
-    from hypothesis import reject
+    from hypothesis import assume, reject
     from hypothesis import strategies as st
 except ImportError as error:
     raise MissingExtraError("strategies need hypothesis: pip install 'minisim[testing]'") from error
@@ -114,6 +116,24 @@ def vehicles(draw: st.DrawFn) -> VehicleType:
         model=draw(st.sampled_from(["idm", "iidm"])),
     )
     return replace(made, max_deceleration=draw(floats(max(6.0, made.needed_braking), 12.0)))
+
+
+@st.composite
+def fleets(draw: st.DrawFn, intersection: Intersection) -> Fleet:
+    """One to five of the ready types and of random ones that fit a junction, with any shares."""
+    others = [draw(vehicles()) for _ in range(draw(st.integers(0, 2)))]
+    own = [replace(it, name=f"own {k}", model="idm") for k, it in enumerate(others)]
+    fitting = [it for it in (*TYPES.values(), *own) if entry_room(intersection, it) > 0.0]
+    some = st.lists(st.sampled_from(fitting), min_size=1, max_size=5, unique_by=lambda it: it.name)
+    types = draw(some)
+    weights = draw(st.lists(st.integers(1, 9), min_size=len(types), max_size=len(types)))
+    model = draw(st.sampled_from(["idm", "iidm", "krauss"]))
+    fleet = Fleet(
+        tuple(replace(it, model=model) for it in types),
+        tuple((weight / sum(weights),) for weight in weights),
+    )
+    assume(entry_room(intersection, fleet) > 0.0)
+    return fleet
 
 
 @st.composite

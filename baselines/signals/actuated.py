@@ -72,8 +72,10 @@ class GapSession(PhaseSession):
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
         self._detector = signal.detector(site)
-        past = self._detector - site.vehicle.length  # front bumper of a vehicle off the loop
-        marks = (past, 0.0) if signal.presence else (past,)
+        # Where the front bumper of a vehicle off the loop is.
+        fronts = tuple(dict.fromkeys(self._detector - it.length for it in site.types))
+        past = min(fronts)
+        marks = (*fronts, 0.0) if signal.presence else fronts
         # Presence counts as if the vehicle had left the loop and driven to the line at the limit.
         self._ago = [
             min(max(past, 0.0) / site.limit(lane), signal.max_gap - site.dt)

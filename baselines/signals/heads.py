@@ -62,14 +62,14 @@ class Heads:
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
-        b, dt = site.vehicle.deceleration, site.dt
-        self._stops = lambda v: can_stop(v, b)
+        brakes, dt = [it.deceleration for it in site.types], site.dt
+        self._stops = lambda v: can_stop(v, brakes[v.type])
         self._open = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._open += [Colour.AMBER]
             self._stops = lambda _: True  # on the spot, see `obeys`
         elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
-            self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
+            self._stops = lambda v: braking_distance(v.speed, brakes[v.type], dt) <= v.distance
         self._at_once = site.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * len(ways)

@@ -175,7 +175,7 @@ class _Senses:
     def _sense(self, vehicle: Observed, observer: int, moment: int) -> Observed:
         """One vehicle as an observer perceives it."""
         recipe, draws = self._recipe, self._draws
-        id, lane, manoeuvre, distance, speed, length, demand_time, rank, factor = vehicle
+        _, lane, manoeuvre, distance, speed, _, _, rank, *_ = vehicle
         key = self._key(lane, rank)
         if recipe.misreads and manoeuvre != UNKNOWN:
             when = _ALL if recipe.persistent else moment
@@ -184,9 +184,7 @@ class _Senses:
             distance += recipe.position_noise * draws.normal(_POSITION, key, observer, moment)
         if recipe.speed_noise:
             speed += recipe.speed_noise * draws.normal(_SPEED, key, observer, moment)
-        return Observed(
-            id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time, rank, factor
-        )
+        return vehicle._replace(manoeuvre=manoeuvre, distance=distance, speed=max(speed, 0.0))
 
     def _read(self, lane: int, manoeuvre: int, vehicle: int, observer: int, when: int) -> int:
         """What a manoeuvre is taken for, or `UNKNOWN`."""

@@ -132,13 +132,13 @@ def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
 
 
 def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.ArrayLike) -> Floats:
-    """Move a shape (k, 2) to n poses, shape (n, k, 2); angles clockwise from north [deg]."""
+    """A shape (k, 2), or one each, at n poses, (n, k, 2); angles clockwise from north [deg]."""
     angle = np.radians(np.atleast_1d(np.asarray(angle_deg, dtype=float)))
     heading = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
     left = np.stack([-heading[:, 1], heading[:, 0]], axis=-1)
     origin = np.stack([np.atleast_1d(x), np.atleast_1d(y)], axis=-1)
-    along = shape[None, :, :1] * heading[:, None, :]
-    across = shape[None, :, 1:] * left[:, None, :]
+    along = shape[..., :1] * heading[:, None, :]
+    across = shape[..., 1:] * left[:, None, :]
     return np.asarray(origin[:, None, :] + along + across)
 
 

@@ -46,7 +46,7 @@ RESERVED: Final = frozenset({
 })  # fmt: skip
 
 #: What trips can be grouped by -> the groups' key in a summary.
-GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
+GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds", "type": "types"}
 
 #: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
 SPREAD: Final = ("p50", "p95", "max")

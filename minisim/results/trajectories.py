@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 #: Columns of `run.trajectories`: a row per vehicle and step, sorted by time, then vehicle.
 TIME: Final = "time_s"
 VEHICLE: Final = "vehicle"
+TYPE: Final = "type"  #: after the vehicle, if there is more than one type
 LANE: Final = "lane"
 MANOEUVRE: Final = "manoeuvre"
 S: Final = "s_m"

@@ -132,7 +132,7 @@ def _run(hosted: Hosted, options: _Options) -> Run:
         collisions=ended.collisions,
         columns=columns,
         trace=ended.trace,
-        rows=job.vehicles[["id", "path"]].copy(),
+        rows=job.vehicles[["id", "path", "type"]].copy(),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from minisim import laws
 from minisim.engine.state import Records
-from minisim.laws import STOP_MARGIN, Law
+from minisim.laws import STOP_MARGIN, Law, Traits
 from minisim.sumo.messages import Job
 
 #: SUMO keeps the maximum acceleration (2) but not the right of way (8 off). A commanded speed may
@@ -39,16 +39,18 @@ class Car:
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
         "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
-        "s", "section", "seen", "v",
+        "s", "section", "seen", "traits", "type", "v",
     )  # fmt: skip
 
-    def __init__(self, row: int, record: Records, law: Law) -> None:
+    def __init__(self, row: int, record: Records, types: Sequence[Traits], law: Law) -> None:
         self.row = row
         self.id = int(record["id"])
         self.name = str(self.id)
         self.lane = int(record["lane"])
         self.rank = int(record["rank"])
         self.path = int(record["path"])
+        self.type = int(record["type"])
+        self.traits = types[self.type]
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
         self.s = self.v = self.a = 0.0
@@ -155,43 +157,46 @@ class Follower(Steering):
         if not merging:
             return 0.0
         ahead = merging[-1]
-        gap = (ahead.s - self._exit[ahead.path][0]) - self._law.length - (car.s - mine)
-        return float(laws.closeness(car.v, gap, ahead.v, self._law))
+        gap = (ahead.s - self._exit[ahead.path][0]) - ahead.traits.length - (car.s - mine)
+        return float(laws.closeness(car.v, gap, ahead.v, car.traits, self._law))
 
     def _leading(self, car: Car, lane: Sequence[Car]) -> float:
         """Closeness to the vehicle of its own lane that this car follows; `lane` is ahead of it."""
         for ahead in reversed(lane):
-            rear = ahead.s - self._law.length
+            rear = ahead.s - ahead.traits.length
             if rear < self._branch[ahead.path, car.path]:
-                return float(laws.closeness(car.v, rear - car.s, ahead.v, self._law))
+                return float(laws.closeness(car.v, rear - car.s, ahead.v, car.traits, self._law))
         return 0.0
 
     def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
-        law = self._law
+        law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
-        v0 = min(speeds[section] * car.factor, car.advice)
+        limit = speeds[section] * car.factor
+        v0 = min(limit, car.advice)
         k = section + 1
-        slower = laws.braking_begins(v, starts[k] - s, law)
-        held = held and near(v, law.hold - s, law)
+        slower = laws.braking_begins(v, starts[k] - s, me, law)
+        held = held and near(v, law.hold - s, me, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
         must_slow = v > v0 or v0 < LEAST_SPEED
         if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
             super().release(car)
             return
-        free = laws.follow(v, v0, 0.0, law)
-        acc = laws.follow(v, v0, z, law)
-        while laws.braking_begins(v, starts[k] - s, law):
-            acc = min(acc, laws.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
+        free = laws.drive(v, limit, car.advice, 0.0, me, law)
+        acc = laws.drive(v, limit, car.advice, z, me, law)
+        while laws.braking_begins(v, starts[k] - s, me, law):
+            lower = speeds[k] * car.factor
+            acc = min(acc, laws.slow_down(v, acc, lower, starts[k] - s, me, law))
             k += 1
         if held:
-            acc = min(acc, laws.hold(v, s, law))
+            acc = min(acc, laws.hold(v, s, me, law))
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
         if acc < free or must_slow:
-            acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), law))
-            self.command(car, v + max(acc, -law.b_max) * law.dt)
+            z = max(z, self._leading(car, lane))
+            acc = min(acc, laws.drive(v, limit, car.advice, z, me, law))
+            self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
             super().release(car)
 
@@ -208,6 +213,6 @@ def limits(job: Job) -> list[tuple[list[float], list[float]]]:
     return list(zip(starts, speeds, strict=True))
 
 
-def near(v: float, distance: float, law: Law) -> bool:
+def near(v: float, distance: float, me: Traits, law: Law) -> bool:
     """Whether a hold line `distance` ahead may matter in this step, with a metre to spare."""
-    return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
+    return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, me, law)

@@ -22,6 +22,7 @@ from minisim.control import Advise, Brake, Close, Command, Go, Hold, Observed, O
 from minisim.engine.collision import Collision
 from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
+from minisim.laws import Traits
 from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
@@ -55,7 +56,8 @@ class Worker:
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
         ]
-        cars = (Car(row, record, law) for row, record in enumerate(job.vehicles))
+        types = [Traits(*map(float, it)) for it in road.types]
+        cars = (Car(row, record, types, law) for row, record in enumerate(job.vehicles))
         self._cars = {car.name: car for car in cars}
         recorded_from = law.record_start if law.record_from != NEVER else math.inf
         needed_from = self._steering.near, law.entry - law.sight, self._marks[0], recorded_from
@@ -117,8 +119,8 @@ class Worker:
                     break
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
-                    car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
-                    car.rank, car.factor,
+                    car.id, car.lane, manoeuvre, distance, car.v, car.traits.length,
+                    car.demand_time, car.rank, car.factor, car.type,
                 )  # fmt: skip
 
     def _apply(self, command: Command) -> None:
@@ -133,7 +135,8 @@ class Worker:
                 if car.present:
                     self._steering.advise(car)
             case Brake(vehicle, deceleration):
-                self._cars[str(vehicle)].brake = min(deceleration, self._job.law.b_max)
+                car = self._cars[str(vehicle)]
+                car.brake = min(deceleration, car.traits.b_max)
             case Wake():
                 self._alarm.set(command)
 
@@ -162,7 +165,7 @@ class Worker:
     def _depart(self, car: Car) -> None:
         law = self._job.law
         car.present, car.seen = True, self._tick
-        car.s = self._start[car.path] + law.length + law.margin
+        car.s = self._start[car.path] + car.traits.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         if car.v > law.depart_speed:  # SUMO was told "max", since it never lowers a given speed
             car.v = law.depart_speed
@@ -210,7 +213,7 @@ class Worker:
 
     def _move(self, car: Car, travelled: float, v: float) -> bool:
         law, p = self._job.law, car.path
-        s = self._position(p, travelled)
+        s = self._position(car, travelled)
         car.a, car.s, car.v = (v - car.v) / law.dt, s, v
         self._record(car)
         passed = False
@@ -223,15 +226,15 @@ class Worker:
         if self._tick > car.seen:
             car.lost_ticks += max(1.0 - v / (speeds[car.section] * car.factor), 0.0)
             car.seen = self._tick
-        if not car.cleared and s >= max(self._exit[p] + law.length, law.leave):
+        if not car.cleared and s >= max(self._exit[p] + car.traits.length, law.leave):
             self._clear(car)
             passed |= law.wake_on_clear
         return passed
 
-    def _position(self, p: int, travelled: float) -> float:
-        """`s` on path p of a vehicle that has driven `travelled` since its insertion [m]."""
-        law, network = self._job.law, self._job.network
-        inside = travelled + law.length + law.margin - network.approach[p]
+    def _position(self, car: Car, travelled: float) -> float:
+        """`s` of a vehicle that has driven `travelled` since its insertion [m]."""
+        law, network, p = self._job.law, self._job.network, car.path
+        inside = travelled + car.traits.length + law.margin - network.approach[p]
         if inside <= 0.0:
             return float(law.entry + inside)
         if inside <= network.inside[p]:
@@ -241,7 +244,7 @@ class Worker:
     def _locate(self, car: Car) -> float | None:
         """`s` of any vehicle on the road [m], watched or not; None while SUMO teleports it."""
         travelled = self._libsumo.vehicle.getDistance(car.name)
-        return self._position(car.path, travelled) if travelled >= 0.0 else None
+        return self._position(car, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
         """Leave a car to SUMO alone: its rear has left the junction."""
@@ -254,7 +257,7 @@ class Worker:
 
     def _record(self, car: Car) -> None:
         law = self._job.law
-        past = car.s - law.length - self._exit[car.path]
+        past = car.s - car.traits.length - self._exit[car.path]
         here = car.s >= law.record_start and past <= law.record_past
         if here and law.record_from <= self._tick < law.record_to:
             released = self._released(car)

@@ -13,6 +13,7 @@ import numpy as np
 from minisim.control import Site
 from minisim.errors import InputError, instance, show
 from minisim.files import AnyPath
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Floats
@@ -30,8 +31,8 @@ SHORTEST = 60.0
 WIDTHS = (2.0, 6.0)
 #: By how much the junction's radius is raised at a time until cars can turn [m].
 WIDENING = 0.5
-#: Rows of vehicles that must fit: the usual car.
-CAR = VehicleType()
+#: What must be able to turn and pass: the usual car.
+CAR = Fleet((VehicleType(),))
 
 
 class Survey(NamedTuple):

@@ -33,10 +33,13 @@ def animate(
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
+    unit: options.Unit = None,
+    fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
     side: options.Side = None,
     bearings: options.Bearings = None,
     node: options.Node = None,
+    lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
@@ -58,6 +61,7 @@ def animate(
     frame_times(begin, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        unit=unit, fleet=fleet, lane_width=lane_width,
         profile=profile, side=side, node=node, horizon=horizon,
     )  # fmt: skip
     who = controller_named(controller, profile)

@@ -33,10 +33,13 @@ def run(
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
+    unit: options.Unit = None,
+    fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
     side: options.Side = None,
     bearings: options.Bearings = None,
     node: options.Node = None,
+    lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     warmup: Annotated[float, option("Measure only after this.", "S")] = 0.0,
@@ -87,6 +90,7 @@ def run(
         raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        unit=unit, fleet=fleet, lane_width=lane_width,
         profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: Columns that name a cell.
 CELL: Final = (
-    "scenario", "arms", "side", "profile", "split", "turns", "density", "horizon_s", "warmup_s",
-    "controller",
+    "scenario", "arms", "side", "profile", "fleet", "split", "turns", "density", "horizon_s",
+    "warmup_s", "controller",
 )  # fmt: skip
 
 #: Summed over the runs of a cell.

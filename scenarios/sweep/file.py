@@ -5,6 +5,7 @@
     density = [150, 250, 350]
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
+    # fleet = { car = 0.9, bus = 0.1 }  # shares of vehicle types, perhaps with unit = "pcu"
     # humans = [0, 0.2]                 # with controllers of DIM only
     # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
     # start = "07:00"                   # from this time of day on

@@ -37,9 +37,9 @@ from minisim.errors import ControllerError, InputError
 from minisim.results.run import Run
 from minisim.testing import ContractError, check_commands, check_controller, drained, small_scenario
 from minisim.vehicle import VehicleType
-from scenarios import four_way
+from scenarios import four_way, three_way
 from scenarios.controllers import SAFE, controller_named
-from tests.builders import ScriptedSession, as_run
+from tests.builders import ScriptedSession, as_run, hardest_braking
 
 #: Variants beside those of the table: parameters at their edges, and some together.
 MORE: tuple[Controller, ...] = (
@@ -124,6 +124,14 @@ def test_what_happens_does_not_depend_on_the_horizon(controller: Controller) -> 
     )
     assert len(before(short, 120.0)) > 10
     pd.testing.assert_frame_equal(before(short, 120.0), before(long, 120.0))
+
+
+@pytest.mark.parametrize("name", SAFE)
+def test_braking_is_comfortable_in_ordinary_traffic(name: str) -> None:
+    for road, seed in ((four_way, 1), (three_way, 3)):
+        scenario = road(350, profile="fair", horizon=600.0)
+        run = minisim.simulate(scenario, controller_named(name), seed, record="all")
+        assert hardest_braking(run) <= run.site.vehicle.deceleration + 1e-6
 
 
 def test_the_contract_without_safety() -> None:

@@ -119,11 +119,6 @@ def any_law(draw: st.DrawFn) -> VehicleType:
 )
 @example(**EDGE_CASE, limit=0.5)
 @example(**EDGE_CASE | {"dt": 0.5}, limit=0.5)
-@example(
-    **EDGE_CASE
-    | {"name": "v2ic", "dt": 0.5, "trips": [(0.0, a, m) for a in range(4) for m in (1, 2, 3)]},
-    limit=1.0,
-)
 def test_at_any_limit_step_and_law_each_is_served_or_all_are_refused(
     name: str, vehicle: VehicleType, limit: float, dt: float, trips: list[tuple[float, int, int]]
 ) -> None:

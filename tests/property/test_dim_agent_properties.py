@@ -127,7 +127,7 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
             if v.id not in minds:
                 own = DecisionTable(HarmonyMatrix.paper(n), dim.order, ranks)
                 agent = Agent(v.id, v.lane, Rules(own, dim.gate, dim.commit))
-                minds[v.id] = agent, Reader(n, dim.zones, b, dim.commit)
+                minds[v.id] = agent, Reader(n, dim.zones, (b,), dim.commit)
         percepts = {v.id: minds[v.id][1].read(view) for v in near}
         assert len(set(percepts.values())) <= 1
         going = {v.id for v in near if minds[v.id][0].decide(percepts[v.id])}

@@ -48,11 +48,11 @@ car = partial(VehicleType, max_deceleration=1000.0)
 )  # fmt: skip
 @example(
     car(acceleration=10.0, deceleration=20.0, exponent=50.0, headway=0.8, min_gap=0.5),
-    0.5, 0.5, "fixed-time", 350.0, 3,
+    0.5, 0.5, "fixed-time", 1500.0, 3,
 )  # fmt: skip
 @example(
     car(acceleration=50.0, deceleration=1.0, headway=0.5, speed_deviation=0.5),
-    0.5, 1.0, "fixed-time", 350.0, 3,
+    0.5, 1.0, "fixed-time", 1500.0, 3,
 )  # fmt: skip
 @example(
     car(acceleration=0.1, headway=0.5, max_deceleration=6.0), 0.3, 100.0, "dim", 3000.0, 3

@@ -32,8 +32,8 @@ def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -
         i = vehicles[i]["ahead"]
     first = vehicles[i]
     rest = road.ends[first["path"], 1] - first["s"]
-    needed = braking_distance(first["v"], law.b_max, law.dt) + REACTION * first["v"]
-    return bool(rest + TURNAROUND + law.margin - law.min_gap < needed)
+    needed = braking_distance(first["v"], cruise.type.b_max, law.dt) + REACTION * first["v"]
+    return bool(rest + TURNAROUND + law.margin - cruise.type.min_gap < needed)
 
 
 @njit
@@ -65,12 +65,12 @@ def look(
                 vehicles[i]["ahead"] = cruise.last[exit_arm]
                 cruise.last[exit_arm] = i
             if cruise.teleports and mine["left"] != 0 and vehicles[i]["status"] == DRIVING:
-                lost |= teleport(vehicles, road, law, cruise, i, tick)
+                lost |= teleport(vehicles, road, cruise, i, tick)
     return lost
 
 
 @njit
-def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int) -> bool:
+def teleport(vehicles: Records, road: Road, cruise: Cruise, i: int, tick: int) -> bool:
     """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
@@ -80,8 +80,8 @@ def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, ti
     if j < 0 or vehicles[j]["status"] != DRIVING:
         return False
     ends = road.ends
-    rear = vehicles[j]["s"] - law.length - ends[vehicles[j]["path"], 0]
-    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= law.min_gap - TOLERANCE:
+    rear = vehicles[j]["s"] - cruise.type.length - ends[vehicles[j]["path"], 0]
+    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= cruise.type.min_gap - TOLERANCE:
         return False
     vehicles[i]["status"] = ARRIVED
     vehicles[i]["arrival_tick"] = tick

@@ -38,6 +38,9 @@ Density = Annotated[
 ]
 Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
 Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
+Unit = Annotated[str | None, option("Of the inflow: veh, pcu, pcu-irc64, pcu-hcm.", "NAME")]
+Fleet = Annotated[str | None, option("Vehicle types: india, car:0.9,bus:0.1, …", "MIX")]
+LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.", "M")]
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
@@ -96,7 +99,7 @@ def build_scenario(
     from scenarios.library import scenario_named
 
     given = {key: value for key, value in more.items() if value is not None}
-    clash = [f"--{key}" for key in ("density", "split", "turns") if key in given]
+    clash = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
     if file is not None and clash:
         raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
     if file is None and start is not None:

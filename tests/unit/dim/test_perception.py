@@ -12,8 +12,8 @@ from tests.builders import car, view
 
 MATRIX = HarmonyMatrix.paper(4)
 TABLE = DecisionTable(MATRIX)
-STOPPABLE = Reader(4, Zones(), 2.0, "stoppable")
-PAPER = Reader(4, Zones(), 2.0, "paper")
+STOPPABLE = Reader(4, Zones(), (2.0,), "stoppable")
+PAPER = Reader(4, Zones(), (2.0,), "paper")
 
 
 def occupied(*movements: str) -> int:
@@ -109,7 +109,7 @@ def test_commit_paper_is_half_a_green_zone(distance: float, committed: bool, spe
 @pytest.mark.parametrize("b", [1.0, 2.0, 4.5])
 def test_braking_for_the_hold_line_never_looks_committed(green: float, b: float) -> None:
     """At v = √(2b·x) a vehicle x metres before the hold line just stops at it."""
-    reader = Reader(4, Zones(green=green), b, "stoppable")
+    reader = Reader(4, Zones(green=green), (b,), "stoppable")
     for x in (0.0, 0.1, 1.0, 3.0, 6.0):
         speed = (2 * b * x) ** 0.5 * (1 - 1e-9)
         assert not reader.committed(car(1, "a1", green + x, speed)), x

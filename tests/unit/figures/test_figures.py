@@ -36,7 +36,7 @@ from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.controllers import VARIANTS
 from scenarios.profiles import FAIR
-from tests.builders import replayed
+from tests.builders import Fixed, replayed
 
 INTERSECTIONS = [
     Intersection((0, 120, 240)),
@@ -159,6 +159,27 @@ def test_collisions_are_ringed(crash: Run) -> None:
     junction = crash.site.intersection
     front = junction.path(junction.parse(first.movements[0])).position(first.positions[0])
     assert np.linalg.norm(ring.mean(axis=0) - front) < 6.0
+
+
+def test_what_collided_stays_crossed_out_while_it_drives_on(crash: Run) -> None:
+    film, first = Frames(crash, 0.0), crash.collisions[0]
+    vehicle = crash.trajectories["vehicle"].to_numpy()
+    for time, harmed in ((-0.1, 0), (0.0, 2), (5.0, 2)):
+        rows = film.rows(film.at(first.time + time), 1e9)
+        rows = rows[np.isin(vehicle[rows], first.vehicles)]
+        strokes = film.crossed_out(rows, first.time + time)
+        assert len(strokes) == 2 * harmed
+        fronts = np.c_[film.x, film.y][rows].tolist()
+        for stroke in strokes:  # its middle is that of a body
+            away = np.linalg.norm(np.array(fronts) - stroke.mean(axis=0), axis=1)
+            assert away.min() == pytest.approx(crash.site.vehicle.length / 2.0)
+
+
+def test_a_long_title_ends_before_the_clock(crash: Run) -> None:
+    picture = Picture(replace(crash, controller=Fixed(name="long" * 20)))
+    title, clock = (picture._figure.texts[0], picture._clock)
+    clock.set_text("00:00")
+    assert title.get_window_extent().x1 < clock.get_window_extent().x0
 
 
 def test_nothing_recorded_is_an_error() -> None:

@@ -58,7 +58,8 @@ def test_a_textbooks_signal() -> None:
     Flows of 400 and 250 pcu/h at saturation flows of 1250 and 1000 (here at 1000) give a cycle of
     67.5 s and greens of 28.9 and 22.5 s.
     """
-    site: Any = SimpleNamespace(intersection=SimpleNamespace(n=2), demand=(320.0, 250.0))
+    junction = SimpleNamespace(n=2, approaches=(0, 1))
+    site: Any = SimpleNamespace(intersection=junction, demand=(320.0, 250.0))
     timing = FixedTime(saturation_flow=1000.0, amber=2.0, all_red=6.0).timing(site)
     assert timing.cycle == pytest.approx(67.5, abs=0.1)
     assert timing.greens == pytest.approx((28.9, 22.5), abs=0.1)

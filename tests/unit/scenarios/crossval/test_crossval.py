@@ -57,6 +57,7 @@ def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[b
         manoeuvre=np.array([1, 2, 3, 1]), exit_lane=np.array([1, 3, 3, 2]),
         waiting_time=np.array(waiting), travel_time=np.array(travel), time_loss=zero,
         depart_delay=zero, departed=np.ones(4, bool), arrived=done,
+        type=np.zeros(4, int),
     )  # fmt: skip
 
 
