@@ -15,7 +15,7 @@ from minisim.errors import InputError, instance, show
 from minisim.files import AnyPath
 from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
-from minisim.junction.movements import ARM_NAMES, Movement, movements_of
+from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Floats
 from minisim.junction.roads import Road
 from minisim.town.arms import Arm, arms_of, bearing_of, centre_of, length_of, off_lane
@@ -31,8 +31,8 @@ SHORTEST = 60.0
 WIDTHS = (2.0, 6.0)
 #: By how much the junction's radius is raised at a time until cars can turn [m].
 WIDENING = 0.5
-#: Rows of vehicles that must fit: the usual car.
-CAR = VehicleType()
+#: What must be able to turn and pass: the usual car.
+CAR = Fleet((VehicleType(),))
 
 
 class Survey(NamedTuple):
@@ -222,17 +222,12 @@ def _road(town: Town, arm: Arm, radius: float) -> Road:
 
 def _forbidden(town: Town, arms: list[Arm]) -> list[str]:
     """The movements between lanes that there are, but for which there is no connection."""
-    missing = []
-    for movement in movements_of(len(arms)):
-        into, out_of = arms[movement.origin].into, _exit(arms, movement).out_of
+    missing, movements = [], movements_of(len(arms))
+    for movement, exit_arm in zip(movements, movements.exits.tolist(), strict=True):
+        into, out_of = arms[movement.origin].into, arms[exit_arm].out_of
         if into and out_of and (into.id, out_of.id) not in town.turns:
             missing.append(str(movement))
     return missing
-
-
-def _exit(arms: list[Arm], movement: Movement) -> Arm:
-    movements = movements_of(len(arms))
-    return arms[int(movements.exits[movements.number(movement)])]
 
 
 def _notes(town: Town, node: str, arms: list[Arm]) -> Iterable[str]:
