@@ -28,9 +28,7 @@ TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
 
 
 @lru_cache
-def published_ways(
-    arms: int, turnarounds: str | None = None, network: str = ""
-) -> tuple[Way, ...]:
+def published_ways(arms: int, turnarounds: str | None = None, network: str = "") -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
 
     Args:
