@@ -197,7 +197,7 @@ def _widened(town: Town, arms: list[Arm], measured: float, given: dict[str, Any]
         roads = [_road(town, arm, radius) for arm in arms]
         try:
             made = Intersection(junction_radius=radius, roads=roads, **given)
-            Site(made, Fleet((CAR,)), 1.0, (0.0,) * made.n)
+            Site(made, CAR, 1.0, (0.0,) * made.n)
         except InputError:
             if radius > largest:
                 raise
