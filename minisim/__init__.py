@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
+    from minisim.junction.roads import Road
     from minisim.recorded import read_arrivals, write_arrivals
     from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
+    from minisim.town import read_junction
     from minisim.vehicle import VehicleType
 
 _NAMES = {
@@ -38,9 +40,11 @@ _NAMES = {
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
+    "minisim.junction.roads": ("Road",),
     "minisim.recorded": ("read_arrivals", "write_arrivals"),
     "minisim.results.run": ("Run",),
     "minisim.simulation": ("Simulation", "simulate"),
+    "minisim.town": ("read_junction",),
     "minisim.vehicle": ("VehicleType",),
 }
 
@@ -52,6 +56,7 @@ __all__ = [
     "MinisimError",
     "Movement",
     "Period",
+    "Road",
     "Run",
     "Simulation",
     "VehicleType",
@@ -59,6 +64,7 @@ __all__ = [
     "read_arrivals",
     "read_counts",
     "read_demand",
+    "read_junction",
     "simulate",
     "write_arrivals",
     "write_demand",

@@ -119,10 +119,6 @@ class Site:
                 "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
 
-    def expected(self, start: float, end: float) -> tuple[float, ...]:
-        """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
-        return self.demand if self.inflow is None else self.inflow.mean(start, end)
-
     def limit(self, arm: int) -> float:
         """The limit of an arm's road [m/s], before the junction and after it."""
         return self.limits[arm] if self.limits else self.speed_limit
@@ -137,6 +133,10 @@ class Site:
             raise InputError(f"limits must be one per arm, {n} numbers, got {self.limits}")
         for limit in self.limits:
             number("limits [m/s]", limit, above=0, high=self.speed_limit)
+
+    def expected(self, start: float, end: float) -> tuple[float, ...]:
+        """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
+        return self.demand if self.inflow is None else self.inflow.mean(start, end)
 
     def period(self, name: str, seconds: float) -> float:
         """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""

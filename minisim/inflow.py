@@ -98,7 +98,7 @@ def spaced(
     the mean headway is that of the period. Each number drawn belongs to a lane and a vehicle.
     """
     spans = list(inflow.spans(duration))
-    with np.errstate(divide="ignore"):  # infinite on a lane without arrivals
+    with np.errstate(divide="ignore", over="ignore"):  # infinite on a lane without arrivals
         means = np.array([1.0 / rates - shift for _, _, rates in spans])
     ends = [*(end for _, end, _ in spans[:-1]), math.inf]
     draws: list[list[float]] = []  # a row for the first vehicle of each lane, then the second, …

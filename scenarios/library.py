@@ -1,6 +1,6 @@
-"""Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
+"""Ready-made scenarios: the paper's three junctions, regular ones, any bearings, and files.
 
-All take the same keywords, `Options`, and call `from_bearings`.
+All take the same keywords, `Options`; those from files leave out the geometry's.
 """
 
 from __future__ import annotations
@@ -9,17 +9,20 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals
 from minisim.demand import Demand, DemandProfile, Turns
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
+from minisim.files import AnyPath
 from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
+from scenarios.junctions import is_junction_file, junction_from
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
 from scenarios.scenario import Scenario
@@ -71,6 +74,9 @@ VEHICLES = "veh"
 DRAWN = ("density", "split", "turns", "model", "min_headway", "unit")
 
 _PARTS = (Intersection, Demand, Scenario)
+
+#: Keywords of the geometry.
+GEOMETRY = tuple(it.name for it in fields(Intersection) if it.name in Options.__annotations__)
 
 _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
@@ -129,6 +135,36 @@ def from_bearings(
     a mapping of arms to roads, such as `{"b": Road(traffic="in")}`; the others are as usual.
     """
     given: dict[str, Any] = {"name": "custom", **options}
+    geometry = {key: given.pop(key) for key in GEOMETRY if key in given}
+    places = numbers("bearings", bearings)
+    if isinstance(geometry.get("roads"), Mapping):
+        geometry["roads"] = _roads(geometry["roads"], len(places))
+    return _scenario(partial(Intersection, places, **geometry), density, given)
+
+
+@_shown
+def from_file(
+    path: AnyPath, density: float | None = None, node: str | None = None,
+    **options: Unpack[Options],
+) -> Scenario:  # fmt: skip
+    """A junction from a file: a node of a town's network, or a table in TOML.
+
+    `InputError` as `from_bearings`, or for a keyword of the geometry, which the file gives (only an
+    extract of OpenStreetMap needs a side); and what `junction_from` raises.
+    """
+    given: dict[str, Any] = dict(options)
+    side = given.pop("side", None)
+    for key in GEOMETRY:
+        if key in given:
+            raise InputError(f"{key} needs bearings; {path} has the whole junction")
+    name, intersection = junction_from(path, node, side)
+    return _scenario(lambda: intersection, density, {"name": name, **given})
+
+
+def _scenario(
+    junction: Callable[[], Intersection], density: float | None, given: dict[str, Any]
+) -> Scenario:
+    """A scenario from keywords that are not the geometry's."""
     for key in given:
         choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     if density is not None:
@@ -143,18 +179,15 @@ def from_bearings(
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
     unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
-    bearings = numbers("bearings", bearings)
-    if isinstance(given.get("roads"), Mapping):
-        given["roads"] = _roads(given["roads"], len(bearings))
-    geometry, demand, rest = (
+    demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
-        for kind in _PARTS
+        for kind in (Demand, Scenario)
     )
     if day is not None:
         instance("demand", day, DemandProfile)
         rest = {"horizon": day.duration, **rest}
     made = Scenario(
-        intersection=Intersection(bearings=bearings, **geometry),
+        intersection=junction(),
         demand=day or Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
@@ -164,13 +197,14 @@ def from_bearings(
 def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
     """The same scenario, with an inflow that was given in passenger car units as vehicles."""
     demand = scenario.demand
-    if scenario.fleet is None or not isinstance(demand, Demand):
+    if scenario.fleet is None:
         raise InputError(f"unit {unit!r} needs a fleet, such as car:0.8,bus:0.2")
-    n = scenario.intersection.n
-    means = mean_pcu(scenario.fleet, unit, n)
-    rates = [rate / mean for rate, mean in zip(demand.rates(n), means, strict=True)]
+    assert isinstance(demand, Demand)  # a demand by time of day replaces the unit
+    means = mean_pcu(scenario.fleet, unit, scenario.intersection.n)
+    rates = [rate / mean for rate, mean in zip(scenario.rates, means, strict=True)]
     split = demand.split if len(set(means)) == 1 else tuple(rates)
-    return replace(scenario, demand=replace(demand, density=sum(rates) / n, split=split))
+    density = sum(rates) / len(scenario.intersection.approaches)
+    return replace(scenario, demand=replace(demand, density=density, split=split))
 
 
 def refuse_beside(whole: str, others: Iterable[str]) -> None:
@@ -179,12 +213,21 @@ def refuse_beside(whole: str, others: Iterable[str]) -> None:
         raise InputError(f"{whole} replaces {', '.join(clash)}; give one or the other")
 
 
-def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
-    """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
+def scenario_named(
+    name: str, bearings: Sequence[float] | None = None, node: str | None = None, **options: Any
+) -> Scenario:
+    """The scenario of a command-line name: three-way, four-way, five-way, N-way, custom or a file.
 
-    `InputError` for an unknown name (with the nearest one), or only one of `custom` and bearings.
+    `InputError` for an unknown name (with the nearest one), only one of `custom` and bearings, or a
+    node without a file; and what `from_file` raises.
     """
     instance("scenario", name, str)
+    if is_junction_file(name):
+        if bearings is not None:
+            raise InputError(f"bearings need the scenario 'custom', not the file {name}")
+        return from_file(name, node=node, **options)
+    if node is not None:
+        raise InputError(f"node needs a town's network, such as town.net.xml, not {name!r}")
     if name == "custom":
         if bearings is None:
             raise InputError("scenario 'custom' needs bearings, such as 0,80,190,260")
@@ -200,7 +243,7 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     near = nearest(counts[0] if counts else name, [*counts, *makers, "custom"])
     raise InputError(
         f"unknown scenario {show(name)}; allowed: {', '.join(makers)}, N-way (such as 6-way), "
-        f"custom{near}"
+        f"custom, or a file such as junction.toml{near}"
     )
 
 

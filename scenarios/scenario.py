@@ -80,8 +80,7 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        inflow = self.demand.inflow(n, self.intersection.allowed_by_lane)
-        return inflow.mean(0.0, self.horizon)
+        return self.demand.inflow(n, self.intersection.allowed_by_lane).mean(0.0, self.horizon)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""

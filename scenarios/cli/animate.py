@@ -36,8 +36,9 @@ def animate(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = None,
@@ -58,7 +59,7 @@ def animate(
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon,
+        profile=profile, side=side, node=node, horizon=horizon,
     )  # fmt: skip
     number("--from [s]", begin, low=0, below=junction.horizon)
     number("--seconds", seconds, above=0, high=min(3600.0, junction.horizon - begin))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -48,7 +48,9 @@ def crossval(
     context: typer.Context,
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENARIO]...", help="three-way, four-way, five-way or N-way."),
+        typer.Argument(
+            metavar="[SCENARIO]...", help="three-way, four-way, five-way, N-way, or a file."
+        ),
     ] = None,
     controller: Annotated[
         list[str] | None,
@@ -76,6 +78,7 @@ def crossval(
         option("Replay published runs: their arrivals, vehicles and controllers; compare with the "
                "paper too. With another --profile only the arrivals are theirs.", None, "--replay"),
     ] = False,
+    node: options.Node = None,
     jobs: options.Jobs = None,
     out: options.Folder = Path("out/crossval"),
     quick: options.Quick = False,
@@ -105,11 +108,13 @@ def crossval(
     if replay:
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
+        if node is not None:
+            raise InputError("--node does not go with --replay: published junctions are no towns'")
         cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon or 0.0)
     else:
-        make: Callable[..., Scenario] = partial(scenario_named, profile=profile or "fair")
-        if horizon is not None:
-            make = partial(make, horizon=horizon)
+        more: dict[str, Any] = {} if horizon is None else {"horizon": horizon}
+        more |= {"node": node, "profile": profile or "fair"}
+        make: Callable[..., Scenario] = partial(scenario_named, **more)
         where = scenarios or ["four-way"]
         if demand is None:
             cells = product(where, splits, who, densities)

@@ -36,8 +36,9 @@ def run(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = None,
@@ -91,7 +92,7 @@ def run(
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon, warmup=warmup,
+        profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans,

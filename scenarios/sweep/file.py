@@ -18,6 +18,9 @@
     scenario = { name = "custom", label = "skewed", bearings = [0, 80, 190, 260] }
     controller = { name = "dim", label = "west first", priorities = [1, 2, 3, 0] }
 
+    [[experiment]]                      # a file, see `scenarios.junctions`; or a junction.toml
+    scenario = { name = "town.net.xml", node = "252016277" }
+
 Without one, the file is a block. A controller's table has a name, a label and parameters.
 """
 
@@ -50,6 +53,7 @@ from minisim.inflow import MAX_TIME
 from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
+from scenarios.junctions import is_junction_file
 from scenarios.library import DRAWN, refuse_beside, scenario_named
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
@@ -64,7 +68,10 @@ MAX_RUNS = 1_000_000
 SHARES = ("split", "turns")
 
 #: Keys of a scenario's table.
-JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_length")
+JUNCTION = (
+    "name", "label", "bearings", "lane_width", "junction_radius", "arm_length", "roads",
+    "forbidden", "node",
+)  # fmt: skip
 
 
 def read_experiments(
@@ -131,6 +138,8 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         if whole in block:
             refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in block))
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
+    if "side" not in block:  # a file of a junction has its own
+        axes["side"] = [None]
     if "min_headway" in block and "shifted" not in axes["model"]:
         raise InputError("min_headway needs the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
@@ -161,14 +170,17 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
         chosen = {key: value for key, value in chosen.items() if key not in DRAWN}
     elif chosen["model"] != "shifted":
         del chosen["min_headway"]
-    if chosen["horizon"] is None:
-        del chosen["horizon"]
+    for key in ("side", "horizon"):
+        if chosen[key] is None:
+            del chosen[key]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
         label = junction.pop("label", "")
         _check_keys("key of a scenario", junction, JUNCTION)
         if junction["name"] == "custom" and "bearings" not in junction:
             raise InputError(f"custom needs bearings, such as scenario = {CUSTOM}")
+        if isinstance(junction["name"], str) and is_junction_file(junction["name"]):
+            junction["name"] = str(folder / junction["name"])
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)

@@ -26,7 +26,8 @@ def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> A
 
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom.")
+    str,
+    typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom; or a file."),
 ]
 ControllerName = Annotated[
     str, option("What decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
@@ -43,7 +44,8 @@ LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Traffic keeps left or right.", "SIDE")]
+Side = Annotated[str | None, option("Traffic keeps left (the default) or right.", "SIDE")]
+Node = Annotated[str | None, option("Of a town's network; see minisim junction.", "ID")]
 Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float | None, option("Simulated time; 3600 by default.", "S")]

@@ -161,9 +161,9 @@ def test_scenarios_have_the_names_of_the_command_line() -> None:
     ("name", "message"),
     [
         ("four_way", "unknown scenario 'four_way'.*did you mean 'four-way'"),
-        ("4way", r"N-way \(such as 6-way\), custom; did you mean '4-way'"),
+        ("4way", r"N-way \(such as 6-way\), custom, or .*; did you mean '4-way'"),
         ("4-ways", "did you mean '4-way'"),
-        ("junction", r"custom$"),
+        ("junction", r"custom, or a file such as junction.toml$"),
         ("9" * 5000, "unknown scenario"),
         ("2-way", "number of arms must be an integer 3 … 12, got 2"),
         ("-way", "unknown scenario"),
