@@ -70,8 +70,8 @@ def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
     return (b - a for a, b in pairwise((*bearings, bearings[0] + 360.0)))
 
 
-def _roads(name: str, value: Any) -> tuple[Road, ...] | None:
-    """One `Road` per arm; None if all are like the others."""
+def _roads(name: str, value: Any) -> tuple[Road, ...]:
+    """One `Road` per arm, each given as such or as a table of its parameters."""
     given = items(name, value, "a Road per arm")
     roads = tuple(Road(**road) if isinstance(road, Mapping) else road for road in given)
     for i, road in enumerate(roads):
