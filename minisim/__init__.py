@@ -18,7 +18,10 @@ from minisim.version import __version__
 # in the working directory. Type checkers know the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals, Demand
+    from minisim.arrivals import Arrivals
+    from minisim.counts import read_counts
+    from minisim.demand import Demand, DemandProfile, Period
+    from minisim.demandfile import read_demand, write_demand
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
@@ -30,7 +33,10 @@ if TYPE_CHECKING:
     from minisim.vehicle import VehicleType
 
 _NAMES = {
-    "minisim.arrivals": ("Arrivals", "Demand"),
+    "minisim.arrivals": ("Arrivals",),
+    "minisim.counts": ("read_counts",),
+    "minisim.demandfile": ("read_demand", "write_demand"),
+    "minisim.demand": ("Demand", "DemandProfile", "Period"),
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
@@ -45,18 +51,23 @@ _NAMES = {
 __all__ = [
     "Arrivals",
     "Demand",
+    "DemandProfile",
     "Intersection",
     "MinisimError",
     "Movement",
+    "Period",
     "Road",
     "Run",
     "Simulation",
     "VehicleType",
     "__version__",
     "read_arrivals",
+    "read_counts",
+    "read_demand",
     "read_junction",
     "simulate",
     "write_arrivals",
+    "write_demand",
 ]
 
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.demand import Demand, DemandProfile, Turns
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.files import AnyPath
 from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
@@ -38,7 +39,8 @@ class Options(TypedDict, total=False):
 
     A profile may be a name, a fleet as for `minisim.fleet.fleet_named`, and shares (`split`,
     `turns`) numbers or a text such as "4:3:2:1". `unit` is that of the density: "veh", or passenger
-    car units (`minisim.fleet.PCU`).
+    car units (`minisim.fleet.PCU`). A `demand` by time of day replaces all that says how many
+    vehicles come; a run of it lasts until its end, unless there is a `horizon`.
     """
 
     name: str
@@ -50,7 +52,7 @@ class Options(TypedDict, total=False):
     roads: Sequence[Road] | Mapping[str, Any] | None
     forbidden: Sequence[str]
     split: str | Sequence[float] | None
-    turns: str | Sequence[float] | None
+    turns: Turns
     model: str
     min_headway: float
     profile: str | Profile
@@ -59,6 +61,7 @@ class Options(TypedDict, total=False):
     horizon: float
     warmup: float
     recorded: Arrivals | None
+    demand: DemandProfile
 
 
 #: Mean inflow per lane by default [veh/h].
@@ -67,7 +70,7 @@ DENSITY = 350.0
 #: The unit of a density that counts vehicles.
 VEHICLES = "veh"
 
-#: Keywords that recorded arrivals replace.
+#: Keywords that recorded arrivals replace, and a demand by time of day.
 DRAWN = ("density", "split", "turns", "model", "min_headway", "unit")
 
 _PARTS = (Intersection, Demand, Scenario)
@@ -153,7 +156,7 @@ def from_file(
     side = given.pop("side", None)
     for key in GEOMETRY:
         if key in given:
-            raise InputError(f"{key} goes with bearings; {path} has the whole junction")
+            raise InputError(f"{key} needs bearings; {path} has the whole junction")
     name, intersection = junction_from(path, node, side)
     return _scenario(lambda: intersection, density, {"name": name, **given})
 
@@ -166,9 +169,10 @@ def _scenario(
         choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     if density is not None:
         given["density"] = density
-    clash = [key for key in DRAWN if key in given]
-    if given.get("recorded") is not None and clash:
-        raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
+    for whole in ("recorded", "demand"):
+        if given.get(whole) is not None:
+            refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
+    day = given.pop("demand", None)
     if "min_headway" in given and given.get("model") != "shifted":
         raise InputError("min_headway needs the model 'shifted'")
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
@@ -179,9 +183,12 @@ def _scenario(
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
         for kind in (Demand, Scenario)
     )
+    if day is not None:
+        instance("demand", day, DemandProfile)
+        rest = {"horizon": day.duration, **rest}
     made = Scenario(
         intersection=junction(),
-        demand=Demand(**{"density": DENSITY, **demand}),
+        demand=day or Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
     return made if unit == VEHICLES else _in_vehicles(made, unit)
@@ -189,14 +196,21 @@ def _scenario(
 
 def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
     """The same scenario, with an inflow that was given in passenger car units as vehicles."""
+    demand = scenario.demand
     if scenario.fleet is None:
         raise InputError(f"unit {unit!r} needs a fleet, such as car:0.8,bus:0.2")
-    junction = scenario.intersection
-    means = mean_pcu(scenario.fleet, unit, junction.n)
+    assert isinstance(demand, Demand)  # a demand by time of day replaces the unit
+    means = mean_pcu(scenario.fleet, unit, scenario.intersection.n)
     rates = [rate / mean for rate, mean in zip(scenario.rates, means, strict=True)]
-    split = scenario.demand.split if len(set(means)) == 1 else tuple(rates)
-    density = sum(rates) / len(junction.approaches)
-    return replace(scenario, demand=replace(scenario.demand, density=density, split=split))
+    split = demand.split if len(set(means)) == 1 else tuple(rates)
+    density = sum(rates) / len(scenario.intersection.approaches)
+    return replace(scenario, demand=replace(demand, density=density, split=split))
+
+
+def refuse_beside(whole: str, others: Iterable[str]) -> None:
+    """Raise `InputError` for other options beside one that replaces them."""
+    if clash := [other for other in others if other != whole]:
+        raise InputError(f"{whole} replaces {', '.join(clash)}; give one or the other")
 
 
 def scenario_named(
@@ -210,10 +224,10 @@ def scenario_named(
     instance("scenario", name, str)
     if is_junction_file(name):
         if bearings is not None:
-            raise InputError(f"bearings go with the scenario 'custom', not with the file {name}")
+            raise InputError(f"bearings need the scenario 'custom', not the file {name}")
         return from_file(name, node=node, **options)
     if node is not None:
-        raise InputError(f"node goes with a town's network, such as town.net.xml, not {name!r}")
+        raise InputError(f"node needs a town's network, such as town.net.xml, not {name!r}")
     if name == "custom":
         if bearings is None:
             raise InputError("scenario 'custom' needs bearings, such as 0,80,190,260")

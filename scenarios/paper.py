@@ -176,18 +176,18 @@ def replay(
     vehicle, road = made.profile.vehicle, made.intersection
     if vehicle.sumo is None or road.ways is None:
         return made
+    turnarounds, network = TURNAROUNDS[split] if arms == 4 else "", ""
     if sumo != "1.18":
         turnarounds = ""
         if isinstance(vehicle, CruiseVehicle):
             vehicle = replace(vehicle, sumo=sumo, obeys=False)
         else:
             vehicle = replace(vehicle, sumo=None)
-    elif controller in SIGNALS:
-        turnarounds = "" if split == RENAMED else TURNAROUNDS[split]
-    else:
-        turnarounds = TURNAROUNDS[split] if arms == 4 else ""
-    waits = controller not in SIGNALS or (controller == "fts" and split == RENAMED)
-    ways = published_ways(arms, turnarounds, waits=waits)
+    elif controller in SIGNALS and split == RENAMED:
+        turnarounds = ""
+    if controller in SIGNALS:
+        network = "waiting" if controller == "fts" and split == RENAMED else "signals"
+    ways = published_ways(arms, turnarounds, network)
     return replace(
         made, intersection=replace(road, ways=ways), profile=replace(made.profile, vehicle=vehicle)
     )

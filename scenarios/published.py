@@ -11,7 +11,7 @@ import numpy as np
 from minisim.arrivals import Arrivals
 from minisim.errors import choice
 from minisim.junction.movements import ARM_NAMES, movements_of
-from minisim.junction.paths import Way, distances_along
+from minisim.junction.paths import Way
 from minisim.recorded import read_arrivals
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
@@ -27,40 +27,37 @@ TURNAROUNDS = {"balanced": "bc", "4:3:2:1": "bc", RENAMED: "abcd"}
 
 
 @lru_cache
-def published_ways(
-    arms: int, turnarounds: str | None = None, *, waits: bool = True
-) -> tuple[Way, ...]:
+def published_ways(arms: int, turnarounds: str | None = None, network: str = "") -> tuple[Way, ...]:
     """The ways through a published junction, in the order of `Intersection.movements`.
 
     Args:
         arms: how many.
         turnarounds: arms at whose far end the road leads back; None: as in the authors' networks.
-        waits: whether far turns wait inside; in the signals' networks they do not.
+        network: "signals" for that of the signals, "waiting" for that of the fixed-time signal at
+            4:1:4:1; both have 4 arms. They differ in the places to wait inside for vehicles that
+            turn far: none, and one on each such way, where the others have two.
 
     Raises `InputError` for another number of arms.
     """
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
-    file = resources.files("scenarios") / "data" / "ways" / f"{arms}way.csv"
+    name = "_".join(filter(None, (f"{arms}way", network)))
+    file = resources.files("scenarios") / "data" / "ways" / f"{name}.csv"
     if turnarounds is None:
         turnarounds = TURNAROUNDS["balanced"] if arms == 4 else ""
     with file.open(encoding="utf-8") as text:
         rows = list(csv.DictReader(text))
     exits = movements_of(arms).exits.tolist()  # the rows are in their order
     return tuple(
-        _way(row, ARM_NAMES[exit_arm] in turnarounds, waits)
+        _way(row, ARM_NAMES[exit_arm] in turnarounds)
         for row, exit_arm in zip(rows, exits, strict=True)
     )
 
 
-def _way(row: dict[str, str], turns_back: bool, waits: bool) -> Way:
-    points = np.array(row["points"].split(), dtype=float).reshape(-1, 2)
-    length, wait = float(row["length_m"]), float(row["wait_m"])
-    if wait > 0.0 and not waits:  # the same curve without a point there
-        points = np.delete(points, np.abs(distances_along(points) - wait).argmin(), axis=0)
-        length, wait = round(float(distances_along(points)[-1]), 2), 0.0
+def _way(row: dict[str, str], turns_back: bool) -> Way:
+    points = tuple(zip(*[map(float, row["points"].split())] * 2, strict=True))
     return Way(
-        tuple((float(x), float(y)) for x, y in points),
-        length, wait, speed=float(row["speed_mps"]), major=row["major"] == "1",
+        points, float(row["length_m"]), float(row["wait_m"]),
+        speed=float(row["speed_mps"]), major=row["major"] == "1",
         yields=tuple(row["yields"].split()), foes=tuple(row["foes"].split()),
         turns_back=turns_back,
     )  # fmt: skip

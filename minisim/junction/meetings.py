@@ -105,7 +105,8 @@ def _kind(
     if path.movement.origin == rival.movement.origin:
         first_parts = i == min(ways[p]) and k == min(ways[q])
         return Meeting.PART if first_parts else Meeting.NOWHERE
-    if not rights.foes[p, q] or (0 in ways[p] and 0 in ways[q]):
+    opposite = path.exit_arm != rival.movement.origin and rival.exit_arm != path.movement.origin
+    if not rights.foes[p, q] or (0 in ways[p] and 0 in ways[q] and opposite):
         return Meeting.NOWHERE
     joins = path.exit_arm == rival.exit_arm
     if k == 0:

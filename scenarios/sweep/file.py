@@ -8,6 +8,7 @@
     # fleet = { car = 0.9, bus = 0.1 }  # shares of vehicle types, perhaps with unit = "pcu"
     # humans = [0, 0.2]                 # with controllers of DIM only
     # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
+    # demand = "day.toml"               # or demand by time of day (`minisim.demandfile`)
     # start = "07:00"                   # from this time of day on
 
     [[experiment]]                      # the lines above apply here too
@@ -36,7 +37,7 @@ from pathlib import Path
 from typing import Any
 
 from minisim import hosting
-from minisim.arrivals import MAX_TIME
+from minisim.demandfile import read_demand
 from minisim.errors import (
     FileError,
     InputError,
@@ -48,11 +49,12 @@ from minisim.errors import (
     show,
 )
 from minisim.files import read_file
+from minisim.inflow import MAX_TIME
 from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
 from scenarios.junctions import is_junction_file
-from scenarios.library import DRAWN, scenario_named
+from scenarios.library import DRAWN, refuse_beside, scenario_named
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -132,8 +134,9 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
 
 def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     """Every combination of a block."""
-    if "arrivals" in block and (clash := [key for key in DRAWN if key in block]):
-        raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
+    for whole in ("arrivals", "demand"):
+        if whole in block:
+            refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in block))
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
     if "side" not in block:  # a file of a junction has its own
         axes["side"] = [None]
@@ -159,12 +162,17 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     recorded, start = chosen.pop("arrivals"), chosen.pop("start")
-    if recorded is None and start is not None:
-        raise InputError("start needs arrivals: it is a time in the table")
-    if chosen["model"] != "shifted":
+    if recorded is None and chosen["demand"] is None and start is not None:
+        raise InputError("start needs arrivals or demand: it is a time of day there")
+    if chosen["demand"] is not None:
+        instance("demand", chosen["demand"], str)
+        chosen["demand"] = read_demand(folder / chosen["demand"], start)
+        chosen = {key: value for key, value in chosen.items() if key not in DRAWN}
+    elif chosen["model"] != "shifted":
         del chosen["min_headway"]
-    if chosen["side"] is None:
-        del chosen["side"]
+    for key in ("side", "horizon"):
+        if chosen[key] is None:
+            del chosen[key]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
         label = junction.pop("label", "")

@@ -108,6 +108,12 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             else:
                 stopping = cruise.memory[i]["stopping"] != 0
                 a = realise(v, me["a"], u, stopping, law, cruise)
+                to_wait = law.entry + cruise.waits[p, 0] - s
+                if cruise.obeys and not is_open and 0.0 < to_wait <= cruise.waits[p, 0]:
+                    # Past a light that is red now, it is quick to pass its waiting position: SUMO
+                    # leaves the engine out (`MSVehicle::processLinkApproaches`, `vSafeMin`).
+                    least = min(v + u * law.dt, (to_wait + POSITION_EPS) / law.dt)
+                    a = max(a, (least - v) / law.dt)
             a = min(a, max(me["brake"], -v / law.dt))
             cruise.memory[i]["stopping"] = v0 == 0.0
             if held and cruise.obeys:

@@ -15,7 +15,7 @@ from dim.as_run import winner
 from dim.harmony import HarmonyMatrix
 from minisim.control import Controller
 from minisim.errors import InputError
-from minisim.junction.movements import Movement
+from minisim.junction.movements import Movement, movements_of
 from scenarios.paper import (
     BASELINE_GRID,
     DENSITIES,
@@ -113,6 +113,17 @@ def test_runs_that_were_not_published(cell: Cell, message: str) -> None:
         published_arrivals("balanced", 100, 4)
     with pytest.raises(InputError, match="published junction"):
         published_ways(6)
+
+
+@pytest.mark.parametrize(
+    ("network", "waits"),
+    [("", ["a3", "c3"]), ("signals", []), ("waiting", ["a3", "b3", "c3", "d3"])],
+)
+def test_the_published_networks_differ_in_their_waiting_positions(
+    network: str, waits: list[str]
+) -> None:
+    ways = dict(zip(movements_of(4).names, published_ways(4, network=network), strict=True))
+    assert [name for name, way in ways.items() if way.wait > 0.0] == waits
 
 
 @pytest.mark.parametrize("controller", ["dim", "fts", "ats", "v2ic"])
