@@ -33,11 +33,11 @@ bench: $(VENV)/.installed-all  ## speed, as ratios to SUMO in the same run
 	$(BIN)/python tests/bench/bench.py
 	$(BIN)/python tests/bench/workers.py
 
-mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call goes on with it
+mutants: $(VENV)/.installed-mutants  ## do the tests notice when dim is changed? A long run; a second call continues it
 	$(BIN)/python tests/mutants.py run
 	$(BIN)/python tests/mutants.py table
 
-pictures: demo  ## the pictures of README and docs, drawn anew from out/runs.sqlite (make reproduce)
+pictures: demo  ## the pictures of README and docs, redrawn from out/runs.sqlite (make reproduce)
 	cp out/demo.png out/demo.gif docs
 	$(BIN)/minisim decide four-way a1 b2 c2 d2 --plot docs/decision.png
 	$(BIN)/minisim figures waiting-balanced perception --store out/runs.sqlite --out out/figures

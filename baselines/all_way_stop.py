@@ -35,11 +35,8 @@ class AllWayStop:
 
     name = Name("all-way-stop")
 
-    # SUMO's `jmAllwayStopWait`, whose default is a single step. 1 s is the reaction time in SUMO's
-    # safety measures (device SSM, MDRAC).
-    reaction: float = real(
-        "how long a driver stands before it goes", "s", low=0, high=60, default=1.0
-    )
+    # SUMO's `jmAllwayStopWait`, by default a single step; 1 s is SUMO's reaction time (SSM, MDRAC).
+    reaction: float = real("how long a driver stands", "s", low=0, high=60, default=1.0)
 
     def start(self, site: Site) -> AllWayStopSession:
         """Begin a run."""
@@ -59,9 +56,11 @@ class AllWayStopSession:
         self.plan = Plan(marks=(line,), wake_on_clear=True, sight=line + SIGHT_MARGIN)
         self._reaction = reaction
         self._dt = site.dt
-        self._vehicle = site.vehicle
+        self._types = site.types
         self._rows = site.intersection.movements.rows
-        self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
+        self._clearing = [
+            clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
+        ]
         self._standing: dict[int, float] = {}  # vehicle: since [s]
         self._gone: set[int] = set()
 
@@ -72,9 +71,10 @@ class AllWayStopSession:
         heads = self._heads(view)
         since = self._standing
         self._standing = {v.id: since.get(v.id, view.time) for v in heads if v.speed <= HALTING}
-        # A moving head can stand as soon as comfortable braking has stopped it.
-        moving = [v.speed for v in heads if v.id not in self._standing]
-        looks = [view.time + (speed - HALTING) / self._vehicle.deceleration for speed in moving]
+        # A moving head can be standing once comfortable braking has stopped it.
+        moving = [v for v in heads if v.id not in self._standing]
+        brakes = [self._types[v.type].deceleration for v in moving]
+        looks = [view.time + (v.speed - HALTING) / b for v, b in zip(moving, brakes, strict=True)]
         queue = [v for v in heads if v.id in self._standing]
         queue.sort(key=lambda v: (self._standing[v.id], v.lane))
         waiting: list[Observed] = []
@@ -108,14 +108,14 @@ class AllWayStopSession:
 
         A vehicle in the way can clear it no sooner than full acceleration allows.
         """
-        clearing = self._clearing[self._index(vehicle)]
-        if any(clearing[self._index(other)] > 0.0 for other in waiting):
+        own = self._index(vehicle)
+        if any(self._clearing[it.type][own][self._index(it)] > 0.0 for it in waiting):
             return math.inf
         free = now
         for other in crossing:
-            room = clearing[self._index(other)] + other.distance
+            room = self._clearing[other.type][own][self._index(other)] + other.distance
             if room > 0.0:
-                a, speed = self._vehicle.acceleration, other.speed
+                a, speed = self._types[other.type].acceleration, other.speed
                 free = max(free, now + (math.sqrt(speed * speed + 2.0 * a * room) - speed) / a)
         return free
 

@@ -1,8 +1,7 @@
-"""Where a vehicle will be, step by step, if it drives on as the hosts move vehicles that are alike.
+"""Where a vehicle will be, step by step, if its driver is like all others and it may drive on.
 
-It follows the vehicles ahead in its lane and those that enter the same exit lane before it, whose
-motion is known, by the run's own law (`minisim.laws`). Positions are distances past the
-junction entry, negative before it.
+By the run's own law (`minisim.laws`) it follows the vehicles ahead in its lane, and those that
+enter its exit lane first. Their motion is known. Positions count from the junction entry.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from minisim.control import LATERAL_ACCELERATION, Plan, Site
 from minisim.jit import njit
 from minisim.laws import (
     Law,
+    Traits,
     braking_begins,
     build_law,
     closeness,
@@ -46,7 +46,8 @@ class Course(NamedTuple):
 
     crossing: float  #: from entry to exit [m]
     turn: float  #: highest speed inside the junction [m/s]
-    limit: float  #: and outside [m/s]
+    before: float  #: before it [m/s]
+    behind: float  #: and behind it [m/s]
     end: float  #: where a vehicle has arrived [m]
     exit_arm: int  #: index of the arm that it leaves by
 
@@ -55,11 +56,12 @@ def courses(site: Site) -> tuple[Course, ...]:
     """The courses of all movements of a site."""
     junction, margin = site.intersection, law_of(site).margin
     turns = [junction.turn_speed(path.movement, LATERAL_ACCELERATION) for path in junction.paths]
-    limit = site.speed_limit
-    return tuple(
-        Course(p.crossing, min(limit, turn), limit, p.length - margin - p.entry, p.exit_arm)
-        for p, turn in zip(junction.paths, turns, strict=True)
-    )
+    made = []
+    for p, turn in zip(junction.paths, turns, strict=True):
+        before, behind = site.limit(p.movement.origin), site.limit(p.exit_arm)
+        end = p.length - margin - p.entry
+        made.append(Course(p.crossing, min(before, turn), before, behind, end, p.exit_arm))
+    return tuple(made)
 
 
 class Leader(NamedTuple):
@@ -67,6 +69,8 @@ class Leader(NamedTuple):
 
     s: Floats  #: positions [m], one per step from now on; after the last it is gone
     v: Floats  #: speeds [m/s]
+    length: float  #: of its body [m]
+    b_max: float  #: the most that its brakes can do [m/s²]
     until: float = math.inf  #: its rear matters up to this position on its own path [m]
     shift: float = 0.0  #: added to its position to measure it on the follower's path [m]
 
@@ -77,6 +81,8 @@ class Leaders(NamedTuple):
     s: Floats  #: shape (leaders, steps) [m]
     v: Floats  #: the same [m/s]
     bound: Floats  #: `until` or `shift` of each [m]
+    length: Floats  #: of each [m]
+    b_max: Floats  #: of each [m/s²]
 
 
 class Motion(NamedTuple):
@@ -88,13 +94,12 @@ class Motion(NamedTuple):
 
 
 def predict(
-    law: Law, course: Course, position: float, speed: float,
+    law: Law, me: Traits, course: Course, position: float, speed: float,
     *, lane: Sequence[Leader] = (), exit_lane: Sequence[Leader] = (),
 ) -> Motion | None:  # fmt: skip
     """The motion of a vehicle until it arrives, if it may drive on; None if it hits a leader.
 
-    `lane` holds the vehicles ahead in its lane, nearest first; `exit_lane` those that enter its
-    exit lane before it, in this order.
+    `lane` holds the vehicles ahead, nearest first; `exit_lane` those that enter that lane earlier.
     """
     ahead = _stacked(lane, [leader.until for leader in lane])
     entering = _stacked(exit_lane, [leader.shift for leader in exit_lane])
@@ -102,7 +107,7 @@ def predict(
     while count == UNFINISHED:  # it ends: every leader arrives, and a free road is driven on
         steps *= 2
         s, v = np.empty(steps), np.empty(steps)
-        count, hard = _drive(law, course, position, speed, ahead, entering, s, v)
+        count, hard = _drive(law, me, course, position, speed, ahead, entering, s, v)
     return Motion(s[:count].copy(), v[:count].copy(), hard) if count else None
 
 
@@ -111,12 +116,13 @@ def _stacked(leaders: Sequence[Leader], bound: list[float]) -> Leaders:
     s, v = np.full((len(leaders), steps), np.inf), np.zeros((len(leaders), steps))
     for j, leader in enumerate(leaders):
         s[j, : len(leader.s)], v[j, : len(leader.v)] = leader.s, leader.v
-    return Leaders(s, v, np.array(bound))
+    length, b_max = np.array([(it.length, it.b_max) for it in leaders]).reshape(-1, 2).T.copy()
+    return Leaders(s, v, np.array(bound), length, b_max)
 
 
 @njit
 def _drive(
-    law: Law, course: Course, position: float, speed: float,
+    law: Law, me: Traits, course: Course, position: float, speed: float,
     lane: Leaders, exit_lane: Leaders, s_out: Floats, v_out: Floats,
 ) -> tuple[int, bool]:  # fmt: skip
     """Fill `s_out` and `v_out` as `minisim.engine.kernel` would drive the vehicle.
@@ -131,19 +137,19 @@ def _drive(
         first = True  # no vehicle is between it and the junction
         z, room = 0.0, math.inf
         # A vehicle that cannot stop before the junction sees past a leader that may turn off.
-        near = s < course.crossing and v * v > -2.0 * law.b_max * s
+        near = s < course.crossing and v * v > -2.0 * me.b_max * s
         behind = False
         for j in range(len(lane.s)):
             if k >= lane.s.shape[1] or lane.s[j, k] == math.inf:
                 continue
             first = first and lane.s[j, k] >= 0.0
-            rear = lane.s[j, k] - law.length
+            rear = lane.s[j, k] - lane.length[j]
             if rear < lane.bound[j] and (not behind or lane.s[j, k] >= 0.0):
                 if rear <= s:
                     return 0, hard
                 if not behind:
-                    z = closeness(v, rear - s, lane.v[j, k], law)
-                room = min(room, room_behind(rear - s, lane.v[j, k], law))
+                    z = closeness(v, rear - s, lane.v[j, k], me, law)
+                room = min(room, room_behind(rear - s, lane.v[j, k], lane.b_max[j], me, law))
                 behind = True
             if not near and (behind or s >= course.crossing):
                 break
@@ -152,21 +158,26 @@ def _drive(
             for j in range(len(exit_lane.s) - 1, -1, -1):
                 if exit_lane.s[j, k] >= 0.0:  # the last to enter it
                     if exit_lane.s[j, k] < math.inf:
-                        rear = exit_lane.s[j, k] + exit_lane.bound[j] - law.length
+                        rear = exit_lane.s[j, k] + exit_lane.bound[j] - exit_lane.length[j]
                         if first or s >= 0.0:
-                            z_exit = closeness(v, rear - s, exit_lane.v[j, k], law)
+                            z_exit = closeness(v, rear - s, exit_lane.v[j, k], me, law)
                         if rear >= course.crossing:
-                            room = min(room, room_behind(rear - s, exit_lane.v[j, k], law))
+                            b_ahead = exit_lane.b_max[j]
+                            behind_it = room_behind(rear - s, exit_lane.v[j, k], b_ahead, me, law)
+                            room = min(room, behind_it)
                     break
-        v0 = course.turn if 0.0 <= s < course.crossing else course.limit
-        acc = within(v, follow(v, v0, max(z, z_exit), law), v0, law)
-        if z_exit > z and acc < -law.b:
+        v0 = course.before if s < 0.0 else course.turn if s < course.crossing else course.behind
+        acc = within(v, follow(v, v0, max(z, z_exit), me, law), v0, law)
+        if z_exit > z and acc < -me.b:
             hard = True
-        if s < 0.0 and braking_begins(v, -s, law):
-            acc = min(acc, slow_down(v, acc, course.turn, -s, law))
-        if short_of(room, v, v + acc * law.dt, law):
-            acc = min(acc, keep_room(v, room, law))
-        acc = max(acc, -law.b_max)
+        if s < 0.0 and braking_begins(v, -s, me, law):
+            acc = min(acc, slow_down(v, acc, course.turn, -s, me, law))
+        left = course.crossing - s
+        if left > 0.0 and course.behind < course.turn and braking_begins(v, left, me, law):
+            acc = min(acc, slow_down(v, acc, course.behind, left, me, law))
+        if short_of(room, v, v + acc * law.dt, me, law):
+            acc = min(acc, keep_room(v, room, me, law))
+        acc = max(acc, -me.b_max)
         if law.semi_implicit:
             s, v = semi_implicit(s, v, acc, law.dt)
         else:

@@ -12,18 +12,17 @@ The protocol:
 - The passage is granted if, for every other holder in conflict, one of the two has left its zone
   `buffer` seconds before the other enters its own. Holders enter a shared exit lane in the order of
   their grants, so a later grant never slows down an earlier one. The law lets a vehicle in the
-  junction follow the one before it into the exit lane as if both were on one arc. A passage on
+  junction follow the one ahead of it into the exit lane as if both were on one arc. A passage on
   which it brakes harder than is comfortable for that vehicle is refused.
 - A refused vehicle drives up to its stop line and slows down as late as is comfortable. Refused
   requests are considered again every `period`, in the order in which they were first made.
 
 Safety does not depend on predictions far ahead. Every `period` the manager compares holders with
-their predictions, and predicts anew where they differ. A holder whose new passage no longer fits
+their predictions, and predicts again where they differ. A holder whose new passage no longer fits
 loses its reservation if it can still stop, and so does its follower. So the passage of a vehicle
 that can no longer stop fits those of all others that cannot, and the rest yield. What remains is
 the error of a prediction over the last seconds before the zones, from a state at most one period
-old; `buffer` covers it. Predictions come true in minisim for vehicles that are alike and follow a
-known law; all others are refused.
+old; `buffer` covers it. Vehicles that differ or follow an unknown law are refused.
 """
 
 from __future__ import annotations
@@ -49,6 +48,7 @@ from minisim.control import (
 )
 from minisim.junction.conflicts import conflict_zones
 from minisim.junction.partings import branch
+from minisim.laws import Traits, traits_of
 from minisim.names import Name
 from minisim.parameters import declared, real
 
@@ -69,7 +69,7 @@ class Reservation:
     # Asking earlier lets distant vehicles reserve room that nearer ones need: at 350 veh/h/lane
     # (fair) the mean time loss is 4.1 s at 30 m, 4.7 at 60, 5.3 at 100 and 10.2 at 150.
     reach: float | None = real(
-        "how far before the junction vehicles ask; none is the stopping distance at the limit and "
+        "how far before the junction vehicles ask; none means stopping distance at the limit and "
         "a period's way: as late as possible without slowing down for a refusal", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
@@ -78,12 +78,13 @@ class Reservation:
         "time between one vehicle's leaving a conflict zone and another's entering its own", "s",
         low=0, high=10, default=0.5,
     )  # fmt: skip
-    period: float = real(
-        "time between two looks at holders and requests", "s", low=0.01, high=10, default=0.5
-    )
+    period: float = real("time between two looks", "s", low=0.01, high=10, default=0.5)
 
     def start(self, site: Site) -> ReservationSession:
-        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted."""
+        """Begin a run; raises `InputError` for vehicles whose motion cannot be predicted.
+
+        A period below the host's step is refused, too.
+        """
         self.covers.check(self.name, site.vehicle)
         return ReservationSession(self, site)
 
@@ -94,6 +95,7 @@ class Slot:
 
     vehicle: int
     lane: int
+    type: Traits  #: of the vehicle
     movement: int  #: its index
     start: int  #: when the prediction was made [steps]
     s: Floats  #: positions past the entry [m], one per step from `start` on
@@ -114,7 +116,8 @@ class Slot:
 
     def leader(self, now: int, until: float = math.inf, shift: float = 0.0) -> Leader:
         """What a follower meets from `now` [steps] on."""
-        return Leader(self.s[now - self.start :], self.v[now - self.start :], until, shift)
+        s, v = self.s[now - self.start :], self.v[now - self.start :]
+        return Leader(s, v, self.type.length, self.type.b_max, until, shift)
 
     def expects(self, seen: Observed, now: int) -> bool:
         """Whether the vehicle is where it was predicted to be."""
@@ -129,9 +132,11 @@ class Manager:
         self.slots: dict[int, Slot] = {}  #: by vehicle, in the order of their grants
         self._law = law_of(site)
         self._ways = courses(site)
-        zones = conflict_zones(site.intersection, site.vehicle).tolist()
+        self._types = tuple(map(traits_of, site.types))
+        tables = (conflict_zones(site.intersection, it, site.fleet).tolist() for it in site.types)
         self._zones = [
-            {q: zone for q, zone in enumerate(row) if zone[0] == zone[0]} for row in zones
+            [{q: it for q, it in enumerate(row) if it[0] == it[0]} for row in zones]
+            for zones in tables
         ]
         entry = site.intersection.approach_length
         self._branch = branch(site.intersection, site.vehicle) - entry
@@ -139,7 +144,7 @@ class Manager:
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 
     def predict(self, seen: Observed, now: int) -> Slot | None:
-        """A vehicle's passage behind the holders before it in both lanes; None if it hits one."""
+        """A vehicle's passage behind the holders ahead of it in both lanes; None if it hits one."""
         p = self._rows[seen.lane][seen.manoeuvre]
         way = self._ways[p]
         others = [slot for slot in self.slots.values() if slot.vehicle != seen.id]
@@ -154,16 +159,19 @@ class Manager:
             for slot in rivals
             if self._ways[slot.movement].exit_arm == way.exit_arm
         ]
-        motion = predict(self._law, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane)
+        me = self._types[seen.type]
+        motion = predict(
+            self._law, me, way, -seen.distance, seen.speed, lane=lane, exit_lane=exit_lane
+        )
         if motion is None:
             return None
         s, v, hard = motion
         enters = now + int(s.searchsorted(0.0))
         zones = {
             q: (now + int(s.searchsorted(first, "right")) - 1, now + int(s.searchsorted(last)))
-            for q, (first, last) in self._zones[p].items()
+            for q, (first, last) in self._zones[seen.type][p].items()
         }
-        return Slot(seen.id, seen.lane, p, now, s, v, enters, zones, hard)
+        return Slot(seen.id, seen.lane, me, p, now, s, v, enters, zones, hard)
 
     def fits(self, slot: Slot, *, last: bool) -> bool:
         """Whether a passage fits every other; the `last` comes after all in its exit lane."""
@@ -196,9 +204,9 @@ class ReservationSession:
             reach = max(braking + controller.period * site.speed_limit, STANDS_BEFORE)
         reach = min(reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), sight=reach)
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._dt = site.dt
-        self._brakes = site.vehicle.deceleration
+        self._brakes = [it.deceleration for it in site.types]
         self._requests: dict[int, None] = {}  # in the order of first requests
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -225,7 +233,7 @@ class ReservationSession:
         every reservation of a vehicle that can stop is checked again.
         """
         slots = self.manager.slots
-        stops = {v: can_stop(seen[v], self._brakes) for v in slots if v in seen}
+        stops = {v: can_stop(seen[v], self._brakes[seen[v].type]) for v in slots if v in seen}
         changed: set[int] = set()
         misfit = False
         for vehicle in sorted(stops, key=stops.__getitem__):

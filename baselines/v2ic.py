@@ -40,15 +40,14 @@ class V2IC:
         low=1, high=2000, default=200.0,
     )  # fmt: skip
     # The authors' 0.01 s is their simulation step. On 4 arms at 350 veh/h/lane the mean time loss
-    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), at an eighth of the
-    # work.
+    # is 8.9 s at 0.1 s and 9.0 s at 1 s (profile paper; fair: 8.1 s at both), for 1/8 of the work.
     period: float = real(
         "time between two pieces of advice while any vehicle waits", "s",
         low=0.01, high=10, default=1.0,
     )  # fmt: skip
 
     def start(self, site: Site) -> V2ICSession:
-        """Begin a run."""
+        """Begin a run; raises `InputError` for a period below the host's step."""
         return V2ICSession(self, site)
 
 
@@ -85,14 +84,13 @@ class V2ICSession:
     def __init__(self, controller: V2IC, site: Site) -> None:
         reach = min(controller.reach, site.intersection.approach_length)
         self.plan = Plan(marks=(reach,), wake_on_clear=True, sight=reach)
-        paths, length = site.intersection.paths, site.vehicle.length
         self.order: list[int] = []  #: ids of the vehicles, in order of registration
         self.granted: set[int] = set()  #: ids of those with the right of way
-        self._period = controller.period
+        self._period = site.period("period", controller.period)
         self._rows = site.intersection.movements.rows
-        self._limit = site.speed_limit
-        self._acceleration = site.vehicle.acceleration
-        self._crossing = [path.crossing + length for path in paths]
+        self._limit = site.limit
+        self._accelerations = [it.acceleration for it in site.types]
+        self._crossing = [path.crossing for path in site.intersection.paths]
         self._foes = [[int(q) for q in row.nonzero()[0]] for row in site.conflicts]
 
     def decide(self, view: View) -> Iterable[Command]:
@@ -115,26 +113,30 @@ class V2ICSession:
         latest = [0.0] * len(self._foes)  # leaving time of the last of each movement so far [s]
         for vehicle in self.order:
             me = seen[vehicle]
+            limit = self._limit(me.lane)
             p = self._rows[me.lane][me.manoeuvre]
             blocked = max([latest[q] for q in self._foes[p]], default=0.0)
-            distance = me.distance + self._crossing[p]
+            distance = me.distance + self._crossing[p] + me.length
+            a = self._accelerations[me.type]
             if vehicle in self.granted:
-                leaving = self.leaving_time(distance, me.speed, 0.0)
+                leaving = self.leaving_time(distance, me.speed, 0.0, a, limit)
             elif blocked > 0.0:
-                yield Advise(vehicle, advised_speed(me.distance, me.speed, blocked, self._limit))
-                leaving = self.leaving_time(distance, me.speed, blocked)
+                yield Advise(vehicle, advised_speed(me.distance, me.speed, blocked, limit))
+                leaving = self.leaving_time(distance, me.speed, blocked, a, limit)
             else:
                 self.granted.add(vehicle)
                 yield Go(vehicle)
                 yield Advise(vehicle, math.inf)
-                leaving = time_to_cover(distance, me.speed, self._acceleration, self._limit)
+                leaving = time_to_cover(distance, me.speed, a, limit)
             latest[p] = max(latest[p], leaving)
 
-    def leaving_time(self, distance: float, speed: float, blocked: float) -> float:
+    def leaving_time(
+        self, distance: float, speed: float, blocked: float, a: float, limit: float
+    ) -> float:
         """Time that a vehicle needs to leave, `distance` ahead, at its present speed [s].
 
         It is never 0, since a listed vehicle has not left, and at most `blocked`, the time until
-        it can be let go, plus the time from rest at its present place.
+        it can be let go, plus the time from rest at its present place, at acceleration `a`.
         """
-        from_rest = time_to_cover(distance, 0.0, self._acceleration, self._limit)
+        from_rest = time_to_cover(distance, 0.0, a, limit)
         return max(min(distance / (speed + CRAWL), blocked + from_rest), CRAWL)

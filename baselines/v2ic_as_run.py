@@ -1,7 +1,6 @@
 """V2I-C as it was run for the published numbers: Li and Liu's code, adapted, with its slips.
 
-`baselines.v2ic` is the intended controller. This is what was run for the paper's comparison; no
-other module knows its quirks:
+`baselines.v2ic` is the intended controller; this is what was run for the paper's comparison:
 
 1. *another junction's constants*: the reference point stays 400 m after insertion although the
    junction begins at 488.7 m. So the "stop line" is 108.7 m before the junction, and vehicles
@@ -10,14 +9,13 @@ other module knows its quirks:
    of 60 ordered pairs of foes 28 are missing, and 24 others are listed;
 3. *no stop line*: vehicles only get speeds, and one that cannot keep out of the way drives on;
 4. *free for a moment is free*: on release a vehicle is expected to leave after (v_des − v)/a,
-   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list reckon with
+   although v_des is cut to 20 m/s: for one step, the vehicles behind it in the list assume
    1.3 s instead of 11 s;
-5. *advice is for good*: the speed of the release, √(v² + 2aD) cut to 20 m/s, is never replaced,
-   so vehicles leave at 20 m/s;
+5. *advice is for good*: the speed of the release, √(v² + 2aD) up to 20 m/s, is never replaced;
 6. *speeds explode*: leaving times are distance over present speed plus 10⁻⁵ m/s, without a cap;
    advice of 0 stops a vehicle at once.
 
-The loop of the authors' driver runs every 0.01 s, and what it sets takes effect in the next step.
+The loop of the authors' script runs every 0.01 s, and what it sets takes effect in the next step.
 """
 
 from __future__ import annotations
@@ -50,8 +48,7 @@ FIRST, LAST = REFERENCE - RANGE, REFERENCE - RANGE + REGISTRATION
 LEFT = REFERENCE + PLATOON + STOP_LINE
 INSERTION = 0.1  #: SUMO inserts a vehicle this far past its own length (`departPos="base"`) [m]
 ROUNDING = 1e-9  #: tolerance when a mark and a distance are compared [m]
-#: A junction radius at which opposite far turns do not meet, as at the multi-lane junction that
-#: the conflicts were written for [m].
+#: A junction radius at which opposite far turns do not meet, as with several lanes [m].
 WIDE = 20.0
 
 
@@ -95,7 +92,7 @@ class Platoon(NamedTuple):
     movement: int  #: its index
     driven: float  #: distance since insertion [m]
     speed: float  #: [m/s]
-    #: Sorts vehicles that register in the same step, as the authors' driver spawned them.
+    #: Sorts vehicles that register in the same step, as the authors' script spawned them.
     order: tuple[float, ...]
 
 
@@ -151,10 +148,11 @@ class V2ICAsRunSession:
         self._rows = junction.movements.rows
         if junction.n != 4:
             raise InputError(f"the as-run V2I-C is for 4 arms, the intersection has {junction.n}")
+        junction.refuse_roads("the as-run V2I-C")
         self._origin = junction.approach_length - site.vehicle.length - INSERTION
         if self._origin < LEFT:
             raise InputError(
-                f"the as-run V2I-C ends {LEFT:g} m after insertion, the approach lanes leave "
+                f"the as-run V2I-C ends {LEFT:g} m after insertion, but the approach lanes leave "
                 f"{self._origin:.4g} m"
             )
         insertion = self._origin + INSERTION

@@ -16,9 +16,7 @@ class Rules:
     """The public rules: all that the vehicles have in common."""
 
     table: DecisionTable = part("the decision for every case", DecisionTable)
-    gate: str = word(
-        "which vehicles may enter while others cross, see `GATES`", GATES, default="clear"
-    )
+    gate: str = word("which vehicles enter while others cross, see `GATES`", GATES, default="clear")
     commit: str = word(
         "when a vehicle is committed, see `perception.COMMITS`", COMMITS,
         default="stoppable", label="commit rule",

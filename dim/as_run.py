@@ -1,8 +1,7 @@
 """DIM as it was run for the published numbers: the authors' rules, quirks and all.
 
 The paper describes one algorithm; the runs behind its figures followed another. This module repeats
-those runs vehicle by vehicle. We cannot tell what was intended and what was a slip, so each
-difference is a quirk with a name:
+those runs vehicle by vehicle. Intended or a slip, each difference is a quirk with a name:
 
 1. *odometer zones*: the zones are stretches of the distance driven since insertion, not of the
    road. `bound`, where the junction begins for the rules, lies 1.2–1.4 m inside it;
@@ -25,8 +24,7 @@ difference is a quirk with a name:
 10. *a loop that breaks off*: where SUMO has taken a vehicle off the road, the step ends with an
     error at that vehicle, and nothing is decided in it.
 
-All numbers are those of the authors' driver. Everything happens at the end of a step and takes
-effect in the next.
+All numbers are the authors'. Everything happens at the end of a step, with effect in the next.
 """
 
 from __future__ import annotations
@@ -42,7 +40,7 @@ from minisim.control import NOTHING, Advise, Command, Observed, Plan, Site, View
 from minisim.errors import InputError, printable
 from minisim.junction.movements import Movement
 from minisim.names import Name
-from minisim.parameters import checked, declared, part, real, word
+from minisim.parameters import Spelled, checked, declared, part, real, word
 
 #: Where the junction begins for the rules: arms -> distance driven [m] (the authors' `JUNC_BOUND`).
 BOUND = {3: 492.0, 4: 490.0, 5: 488.0}
@@ -53,8 +51,7 @@ FREED = 506.0  #: distance driven at which a place in the action list is given u
 CLEAR = 508.0  #: distance driven at which a vehicle no longer keeps the junction busy [m]
 
 #: Distance driven at which a vehicle is told 20 m/s for good [m], and no longer shown. The authors
-#: have no such limit, but in the three runs that we checked, no vehicle is told anything after
-#: 531 m.
+#: have no such limit, but in three runs that we checked, no vehicle is told anything after 531 m.
 FOLLOWED = 600.0
 SEEN_BEYOND = 10.0  #: how much farther a vehicle stays in view, to be seen past that mark [m]
 
@@ -87,8 +84,8 @@ class AsRunDim:
         "clique, as the paper describes",
         ORDERS, default="lanes",
     )  # fmt: skip
-    matrix: HarmonyMatrix | None = part(
-        "harmony of the movements; none is the paper's table",
+    matrix: Spelled[HarmonyMatrix | None] = part(
+        "harmony of the movements; none means the paper's",
         HarmonyMatrix,
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
         optional=True, default=None,
@@ -110,14 +107,14 @@ class AsRunDim:
             raise InputError(f"the as-run rules are for 3, 4 or 5 arms, the intersection has {n}")
         matrix = HarmonyMatrix.paper(n) if self.matrix is None else self.matrix
         if matrix.n != n:
-            raise InputError(f"the harmony matrix is for {matrix.n} arms, the intersection has {n}")
+            raise InputError(f"the matrix is for {matrix.n} arms, the intersection has {n}")
         if len(self.names) < n:
             raise InputError(f"names must be {n} letters, one per arm, got {self.names!r}")
         return AsRunSession(site, AsRunRules(self, matrix))
 
 
 class Car(NamedTuple):
-    """What the rules know about a vehicle: its name in the authors' driver, and how far it is."""
+    """What the rules know about a vehicle: its name in the authors' script, and how far it is."""
 
     id: int
     name: str
@@ -218,12 +215,13 @@ class AsRunSession:
 
     def __init__(self, site: Site, rules: AsRunRules) -> None:
         self.rules = rules
+        site.intersection.refuse_roads("the as-run DIM")
         self._origin = site.intersection.approach_length - site.vehicle.length - INSERTION
         zones = rules.red_start, rules.yellow_start, rules.green_start, rules.bound
         if rules.red_start > self._origin:
             raise InputError(
-                f"the as-run zones begin {rules.red_start:g} m after insertion, the approach lanes "
-                f"leave {self._origin:.4g} m"
+                f"the as-run zones begin {rules.red_start:g} m after insertion, but the approach "
+                f"lanes leave {self._origin:.4g} m"
             )
         self.plan = Plan(
             marks=tuple(self._origin - edge for edge in (*zones, FREED, CLEAR, FOLLOWED)),

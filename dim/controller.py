@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from dim.agent import GATES, Agent, Rules
 from dim.decision import ORDERS, DecisionTable, decision_table, lane_ranks
@@ -40,7 +40,9 @@ from dim.zones import Zones
 from minisim.control import Command, Go, Hold, Observed, Plan, Site, View, Wake
 from minisim.errors import InputError, choice, instance, items
 from minisim.names import Name
-from minisim.parameters import checked, declared, part, real, refuse_idle, word
+from minisim.parameters import Spelled, Takes, checked, declared, part, real, refuse_idle, word
+
+_Word: TypeAlias = Literal["inflow", "rotating", "waiting"]
 
 SIGHT_MARGIN = 0.5  #: how far views reach beyond the start of the yellow zone [m]
 
@@ -76,21 +78,23 @@ class Dim:
         "all of them; vehicles of one lane just follow each other",
         GATES, default="clear",
     )  # fmt: skip
-    priorities: tuple[int, ...] | Literal["inflow", "rotating", "waiting"] | None = checked(
+    priorities: Takes[tuple[int, ...] | _Word | None, Iterable[int] | _Word | None] = checked(
         "which lane comes first: ranks of the lanes a, b, c, …, 0 first; inflow, the one with the "
-        "highest demand; rotating, each in turn; waiting, the one that has waited longest; none is "
-        "their own order",
+        "highest demand; rotating, each in turn; waiting, the one that has waited longest; none "
+        "means their own order",
         _priorities, "ranks such as (0,1,2,3) | inflow | rotating | waiting",
         optional=True, default=None,
     )  # fmt: skip
-    zones: Zones = part("the road markings", Zones, kinds={"zones": Zones}, default=Zones())
-    matrix: HarmonyMatrix | None = part(
-        "harmony of the movements; none derives it from geometry and vehicle",
+    zones: Spelled[Zones] = part(
+        "the road markings", Zones, kinds={"zones": Zones}, default=Zones()
+    )
+    matrix: Spelled[HarmonyMatrix | None] = part(
+        "harmony of the movements; none means from geometry and vehicle",
         HarmonyMatrix,
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
         optional=True, default=None,
     )  # fmt: skip
-    perception: Perception = part(
+    perception: Spelled[Perception] = part(
         "what vehicles see of each other",
         Perception,
         kinds={"exact": ExactPerception, "noisy": NoisyPerception},
@@ -105,12 +109,12 @@ class Dim:
         'that "waiting" compares', "m",
         default=SENSOR_RANGE, low=1, high=1000,
     )  # fmt: skip
-    monitor: Monitor | None = part(
+    monitor: Spelled[Monitor | None] = part(
         "a safety monitor in every vehicle", Monitor, kinds={"on": Monitor},
         optional=True, default=None,
     )  # fmt: skip
     period: float | None = real(
-        "time between two looks, besides the wake-ups; none is what the perception needs", "s",
+        "time between two looks, besides the wake-ups; none means as the perception needs", "s",
         above=0, optional=True, default=None,
     )  # fmt: skip
 
@@ -121,7 +125,7 @@ class Dim:
             refuse_idle(self, "priorities=waiting", "sensor_range")
 
     def start(self, site: Site) -> DimSession:
-        """Begin a run; raises `InputError` if matrix, priorities or zones do not fit the site."""
+        """Begin a run; raises `InputError` if a parameter, such as the matrix, does not fit."""
         return DimSession(self, site)
 
     def ranks(self, site: Site) -> tuple[int, ...]:
@@ -138,11 +142,9 @@ class Dim:
         """The matrix in force at this site; raises `InputError` if n differs."""
         n = site.intersection.n
         if self.matrix is None:
-            return HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
+            return HarmonyMatrix.from_geometry(site.intersection, site.fleet)
         if self.matrix.n != n:
-            raise InputError(
-                f"the harmony matrix is for {self.matrix.n} arms, the intersection has {n}"
-            )
+            raise InputError(f"the matrix is for {self.matrix.n} arms, the intersection has {n}")
         return self.matrix
 
 
@@ -165,15 +167,17 @@ class DimSession:
         matrix = dim.harmony(site)
         table = decision_table(matrix, dim.order, dim.ranks(site))
         self.rules = Rules(table, dim.gate, dim.commit)
-        self.reader = Reader(site.intersection.n, zones, site.vehicle.deceleration, dim.commit)
+        brakes = tuple(it.deceleration for it in site.types)
+        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
         entry = (0.0,) if dim.gate == "harmonious" else ()
+        looks = dim.perception.period
         self.plan = Plan(
             hold_distance=zones.green,
             markings=zones.markings(site),
             marks=(zones.yellow_start, *half_green, *entry),
             wake_on_clear=True,
-            period=dim.perception.period if dim.period is None else dim.period,
+            period=dim.period or (None if looks is None else max(looks, site.dt)),
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,
         )
@@ -184,8 +188,8 @@ class DimSession:
         self._monitors = dim.monitor.start(site, matrix, self._start) if dim.monitor else None
         self._dt, self._follows, self._takes = site.dt, follows, takes
         self._agents: dict[int, Agent] = {}
-        errs = dim.perception.period is not None
-        self._tally = Tally(self.rules, self.reader, self._start) if errs else None
+        exact = looks is None
+        self._tally = None if exact else Tally(self.rules, self.reader, self._start)
 
     @property
     def counts(self) -> Mapping[str, float]:

@@ -2,8 +2,7 @@
 
 The participants are the nodes of a graph, with an edge between two movements in harmony; a clique
 can cross at the same time (paper, "Decentralized Intersection Management"). Vehicles that decide
-alone must agree, and a graph library lists cliques in an arbitrary order, so a total order of our
-own chooses among them.
+alone must agree, and graph libraries list cliques in any order, so a total order of ours chooses.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from minisim.errors import InputError, choice, instance, integer, items, show
 from minisim.junction.movements import ARM_NAMES, Movement
 
 #: "size": the largest clique and, among equals, the one with the higher-priority lanes (as the
-#: paper words it). "lanes": of all maximal cliques, the latter (as in its published runs).
+#: paper words it). "lanes": of all maximal cliques, the one with those (as in its published runs).
 ORDERS = ("size", "lanes")
 
 MAX_CASES = 1_000_000  #: more are not tried: 7 arms have 823,542 cases, 8 arms 17 million
@@ -53,9 +52,8 @@ def decide(
     There is at most one participant per lane. `order` is one of `ORDERS`; `priorities` are the
     ranks of the lanes, 0 first, by default in their own order.
 
-    Returns the movements that may cross, by lane; empty only when there are no participants. Raises
-    `InputError`: unknown movement or order, two movements of one lane, or priorities that are not
-    a permutation of the lanes.
+    Returns the movements that may cross, by lane; empty only without participants. Raises
+    `InputError` for an unknown movement or order, two movements of one lane, or wrong priorities.
     """
     participants = _participants(movements, matrix)
     choice("order", order, ORDERS)
@@ -101,8 +99,7 @@ class DecisionTable:
 
     A case is what the front vehicle of each lane wants, 0 for none, written as the integer
     Σ manoeuvre·n^lane. So every integer 1 … n^n − 1 is a case, and 0 is the empty junction. An
-    entry is computed when it is first asked for, and kept. Right of way is an integer with bit i
-    set for lane i.
+    entry is computed when first asked for, and kept. Bit i of a right of way is set for lane i.
 
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.

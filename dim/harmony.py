@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from minisim.errors import FileError, InputError, instance, integer, show
 from minisim.files import read_file, write_text
+from minisim.fleet import Fleet, Vehicles
 from minisim.junction.conflicts import CLEARANCE, conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
@@ -37,8 +38,7 @@ class HarmonyMatrix:
     """
 
     n: int  #: number of arms, 3 … 12
-    #: Shape (m, m) with m = n(n−1), read-only; rows and columns in the order a1, a2, …, b1, … True
-    #: is harmony, False conflict.
+    #: Shape (m, m), m = n(n−1), read-only, in the order a1, a2, …, b1, …; True is harmony.
     values: Bools
 
     def __post_init__(self) -> None:
@@ -52,15 +52,15 @@ class HarmonyMatrix:
     def from_geometry(
         cls,
         intersection: Intersection,
-        vehicle: VehicleType | None = None,
+        vehicles: Vehicles | None = None,
         clearance: float = CLEARANCE,
     ) -> HarmonyMatrix:
-        """Harmony if the corridors that a vehicle sweeps stay over `clearance` (0 … 10 m) apart."""
+        """Harmony if the corridors that vehicles sweep stay over `clearance` (0 … 10 m) apart."""
         instance("intersection", intersection, Intersection)
-        vehicle = VehicleType() if vehicle is None else vehicle
-        instance("vehicle", vehicle, VehicleType)
+        vehicles = VehicleType() if vehicles is None else vehicles
+        instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        return cls(intersection.n, ~conflicts(intersection, vehicle, clearance))
+        return cls(intersection.n, ~conflicts(intersection, vehicles, clearance))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
@@ -73,7 +73,7 @@ class HarmonyMatrix:
     def from_csv(cls, path: str | os.PathLike[str]) -> HarmonyMatrix:
         """Read a matrix: a header `,a1,a2,…`, then one line per movement, `a1,0,0,1,…`.
 
-        Raises `FileError` for what is unreadable or not such a table (with the line), `InputError`
+        Raises `FileError` if it is unreadable or not such a table (with the line), `InputError`
         for labels or entries that do not make a harmony matrix (with the entry).
         """
         return _parse(read_file("harmony matrix", path), f"harmony matrix {path!s}")
@@ -130,7 +130,7 @@ class HarmonyMatrix:
         return f"paper({self.n})" if paper else ""
 
     def __repr__(self) -> str:
-        # The repr of a controller is kept as provenance; the digest tells matrices apart in it.
+        # A controller's repr is kept as provenance, where the digest tells matrices apart.
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
         return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
@@ -225,16 +225,12 @@ def _arms(columns: int, where: str) -> int:
     for n in range(3, len(ARM_NAMES) + 1):
         if len(movements_of(n)) == columns:
             return n
-    raise InputError(
-        f"{where}: {columns} movements; an intersection of n arms has n(n−1), so 6, 12, 20, …"
-    )
+    raise InputError(f"{where}: {columns} movements; n arms have n(n−1), so 6, 12, 20, …")
 
 
 def _row(cells: list[str], label: str, labels: tuple[str, ...], where: str) -> list[int]:
     if cells[0] != label:
-        raise InputError(
-            f"{where}: the row is labelled {cells[0]!r}, but the column order calls for {label!r}"
-        )
+        raise InputError(f"{where}: the row is labelled {cells[0]!r}, expected {label!r}")
     for other, cell in zip(labels, cells[1:], strict=True):
         if cell not in ("0", "1"):
             raise InputError(

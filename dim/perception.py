@@ -18,8 +18,8 @@ from minisim.parameters import declared
 #: longer stop it before the junction. "paper": when it is past the middle of the green zone.
 COMMITS = ("stoppable", "paper")
 
-ROUNDING = 1e-6  #: by how much a vehicle that has passed a mark may seem to be before it [m]
-UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent, which may be any
+ROUNDING = 1e-6  #: how far short of a mark a vehicle past it may seem to be [m]
+UNKNOWN = 0  #: the manoeuvre that an ego sees if it does not know the intent
 
 #: Turns a view and an ego in it into the view that the ego sees. The ego sees itself exactly.
 See = Callable[[View, Observed], View]
@@ -31,7 +31,10 @@ class Perception(Protocol):
 
     @property
     def period(self) -> float | None:
-        """How often vehicles must look [s]; None if all see the same, so that wake-ups suffice."""
+        """How often vehicles look [s], at most every step; None if wake-ups suffice.
+
+        They do if all vehicles see the same.
+        """
 
     def start(self, site: Site) -> See:
         """Begin a run; its random numbers and its memory belong to the result."""
@@ -73,18 +76,17 @@ class Reader(NamedTuple):
 
     n: int  # arms
     zones: Zones
-    deceleration: float  # comfortable braking [m/s²]
+    decelerations: tuple[float, ...]  # comfortable braking of each type [m/s²]
     commit: str
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
 
-        One that brakes comfortably for the hold line never is, since the green zone is longer than
-        the margin of `can_stop`.
+        Not one braking comfortably for the hold line: the green zone exceeds the margin.
         """
         if self.commit == "paper":
             return vehicle.distance < self.zones.green / 2.0
-        return not can_stop(vehicle, self.deceleration)
+        return not can_stop(vehicle, self.decelerations[vehicle.type])
 
     def read(self, view: View) -> Percept:
         """Participants and crossing vehicles of a view, ordered by lane and front to back."""

@@ -1,15 +1,15 @@
 """Which lane comes first where cliques tie: priorities that all vehicles know without a message.
 
-Fixed ranks starve the last lane. The two rules here change the ranks with time, by nothing that a
-vehicle cannot know on its own. All that look at the same moment get the same ranks:
+Fixed ranks starve the last lane. The two rules here change the ranks with time, by what every
+vehicle can know on its own. Vehicles that look at the same moment get the same ranks:
 
 - "rotating" needs a shared clock, such as satellite navigation has. Each lane in turn comes first
   for some seconds, and the others follow clockwise.
 - "waiting" puts first the lane whose front vehicle passed the start of the yellow zone longest ago.
-  A vehicle that comes later has watched only since the junction came within range of its sensors:
-  before it takes part, for at least `memory` = (range − yellow zone's start) / speed limit, since
-  no vehicle drives faster. So no wait counts for more than `memory`, and every participant knows
-  all waits: a vehicle that passed before the latecomer began to watch has waited longer than that.
+  A latecomer has watched only since the junction came within range of its sensors. Before it takes
+  part, that is at least `memory` = (range − yellow zone's start) / speed limit, since no vehicle
+  drives faster. So no wait counts for more than `memory`, and every participant knows all waits: a
+  vehicle that passed before the latecomer began to watch has waited longer than that.
   Lanes that tie are ranked as in "rotating".
 """
 
@@ -31,8 +31,7 @@ CHANGING = ("rotating", "waiting")  #: priorities that change with time
 TURN_TIME = 10.0
 
 #: How far vehicles see the others' approach lanes and yellow zones [m]. Manoeuvres have been read
-#: from up to 150 m before a junction (Phillips, Wheeler, Kochenderfer, "Generalizable intention
-#: prediction", IEEE IV 2017).
+#: from 150 m (Phillips, Wheeler, Kochenderfer, "Generalizable intention prediction", IEEE IV 2017).
 SENSOR_RANGE = 100.0
 
 SAME_TIME = 1e-6  #: times that differ by less count as the same [s]: hosts round their clocks

@@ -18,18 +18,12 @@ class Zones:
     green zone, a vehicle that loses its right of way can still stop.
     """
 
-    red: float = real(
-        "length of the red zone", "m", default=30.0, low=0, high=1000, label="red zone"
-    )
-    yellow: float = real(
-        "length of the yellow zone", "m", default=6.0, above=0, high=1000, label="yellow zone"
-    )
-    # A vehicle that brakes for the hold line must never look unable to stop before the junction,
-    # or the others would wait for it.
+    red: float = real("length", "m", default=30.0, low=0, high=1000, label="red zone")
+    yellow: float = real("length", "m", default=6.0, above=0, high=1000, label="yellow zone")
+    # A vehicle that brakes for the hold line must never look unable to stop: others would wait.
     green: float = real(
-        "length of the green zone", "m", default=2.0, low=COMMIT_MARGIN, high=1000,
-        label="green zone",
-    )  # fmt: skip
+        "length", "m", default=2.0, low=COMMIT_MARGIN, high=1000, label="green zone"
+    )
     red_speed: float = real(
         "speed to which vehicles slow in the red zone; it holds up to the junction", "m/s",
         default=20.0 * KMH, above=0, high=100,
@@ -67,7 +61,7 @@ class Zones:
 
     def check(self, site: Site) -> None:
         """Raise `InputError` if a vehicle could be inserted past the start of the zones."""
-        room = site.intersection.approach_length - site.vehicle.length
+        room = site.intersection.shortest_approach - site.vehicle.length
         if self.red_start > room:
             raise InputError(
                 f"the zones are {self.red_start:g} m long, but the approach lanes leave only "

@@ -24,8 +24,7 @@ MINISIM = style.Look("minisim", style.BLUE, "o", "-")
 SUMO = style.Look("SUMO", style.ORANGE, "s", "--")
 PUBLISHED = style.Look("published", style.BLACK, "D", ":")
 
-#: The section that a trajectory figure shows: time around the parting [s], and distance around the
-#: junction entry [m].
+#: What a trajectory figure shows: time around the parting [s], distance around the entry [m].
 SHOWN_BEFORE, SHOWN_AFTER = 12.0, 28.0
 SHOWN_FROM, SHOWN_TO = -90.0, 40.0
 

@@ -20,8 +20,7 @@ from scenarios.paper import DENSITIES
 from scenarios.statistics import mean_interval
 from scenarios.sweep.cells import saturated
 
-#: Series are drawn side by side, so that their bars do not cover each other: spread over this share
-#: of the smallest step between demands.
+#: Series stand side by side, spread over this share of the smallest step between demands.
 SPREAD = 0.12
 #: Lines with few points are this far apart [veh/h/lane].
 DODGE = 2.5
@@ -41,7 +40,7 @@ class Estimate(NamedTuple):
 
 
 def mean_estimate(values: pd.Series[Any]) -> Estimate:
-    """Mean and Student-t interval, cut at 0 if no value is negative; one value is its own."""
+    """Mean and Student-t interval, cut at 0 if no value is negative; no width for one value."""
     mean, half, size = mean_interval(values.astype(float).tolist())
     half = half if size > 1 else 0.0
     low = mean - half
@@ -164,7 +163,7 @@ def log_time(axes: Axes, low: float, high: float, *, linear: float | None = None
     axes.set_yticks(([0.0] if low == 0.0 else []) + [t for t in shown if t >= (linear or 0.0)])
     axes.set_yticks([], minor=True)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    # Show a marker at 0 whole, and one at the lowest value too.
+    # Show all of a marker at 0 or at the lowest value.
     axes.set_ylim(low if linear is None else low - 0.25 * linear, high)
 
 
@@ -216,7 +215,7 @@ def _marks_legend(figure: Figure, top: float, *, paper: bool) -> None:
     if paper:
         hollow = _mark("o", 8.0, markerfacecolor="none")
         handles += [hollow, (hollow, _mark("x", 7.0))]
-        labels += ["the paper's value", "not the run that its label says"]
+        labels += ["the paper's value", "not the run named in its label"]
     handles.append(_mark(r"$\uparrow$", 8.0))
     labels.append("queue still growing at the end")
     legend(figure, handles, labels, top, fontsize=8.5)

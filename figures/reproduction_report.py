@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from figures import style
-from figures.gallery import GALLERY, SECTIONS, STUDIES, write
+from figures.gallery import GALLERY, SECTIONS, write
 from figures.studies.shared.section import Drawing, Item
 from figures.tables import Table
 from minisim.files import make_folder, write_text
@@ -28,7 +28,7 @@ def write_report(
 ) -> int:  # fmt: skip
     """Draw into `folder`/figures, then write `folder`/report.md; return the number of drawings.
 
-    `parts` are studies; without all of them, the report has only figures that need one of them.
+    `parts` are studies; unless they are all, the report has only figures that need one of them.
     `progress` is called with the figures done and the total. Raises `FileError`.
     """
     pictures = make_folder(folder / "figures")
@@ -58,7 +58,7 @@ def _report(
     yield (
         f"minisim {__version__}; the seeds 1 … {effort.seeds}, {effort.horizon:g} s per run, "
         f"{jobs} {'process' if jobs == 1 else 'processes'}. All controllers of a cell get the "
-        "same arrivals, except in `as-run`, where some met another inflow than their label says. "
+        "same arrivals, except in `as-run`, where some labels state the wrong inflow. "
         "Intervals are 95 %, Student's t over seeds."
     )
     if effort.densities is not None:
@@ -69,14 +69,10 @@ def _report(
     yield "## What was run"
     yield _made_table(made).markdown()
     yield _cost_table(studies).markdown()
-    answers = [
-        section.answer(archive.study(name))
-        for name, section in STUDIES.items()
-        if name in parts and section.answer is not None
-    ]
-    if answers:
-        yield "## Result in short"
-        yield from answers
+    verdicts = [it.study.verdict(it) for it in studies if it.study.verdict is not None]
+    if verdicts:
+        yield "## Summary"
+        yield from verdicts
     for section in SECTIONS:
         known = drawn.keys() | missing.keys()
         shown = [item for item in section.items if item.in_report and item.name in known]
@@ -108,15 +104,15 @@ def _made_table(made: Sequence[Made]) -> Table:
 
     rows = [(part.name, study_named(part.name).question, *totals([part])) for part in made]
     return Table(
-        "Studies; what the store had already was not computed again",
+        "Studies; runs already in the store were not repeated",
         ("study", "question", "runs", "simulated h", "computed now", "wall [s]", "CPU [s]",
          "failed"),
         (*rows, ("all", "", *totals(made))), labels=2,
         notes=(
             "`text` is the profile `paper` (40 km/h road, 20 km/h from the red zone on, largest "
-            "clique first) and says what the paper's rules give; `as-run` are the profiles "
-            "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s) and is what "
-            "the published numbers must be compared with; all others are the profile `fair`: one "
+            "clique first) and says what the paper's rules give; `as-run` has the profiles "
+            "`as_run` and `as_run_signals` (what the authors' code did, step 0.01 s): compare the "
+            "published numbers with it; all others are the profile `fair`: one "
             "vehicle, one limit for all. Wall time is that of the runs computed now, without "
             "drawing. CPU time is that of all runs, whenever they were made; a run that two "
             "studies share counts in both.",
@@ -164,9 +160,8 @@ def _collisions(studies: Iterable[Results]) -> str:
             if count := int(rows["collisions"].sum()):
                 hours = len(rows) * results.effort.horizon / 3600.0
                 where = f"{style.look(point.series).label}, {point.where}, {point.density:g}"
-                lines.append(
-                    f"- {results.study.name}: {where} veh/h/lane: {count} in {hours:.1f} h"
-                )
+                where = f"{results.study.name}: {where} veh/h/lane"
+                lines.append(f"- {where}: {count} in {hours:.1f} h")
     return "\n".join(lines) or "None in any run."
 
 
@@ -184,13 +179,11 @@ def _saturated(studies: Iterable[Results]) -> str:
             for where, densities in grown.items()
         ]
     head = (
-        "In these cells, queues of the junction or of one lane grew more than chance until the "
+        "In these cells, queues of the junction or of one lane grew more than by chance up to the "
         "end. Their means depend on the horizon; they are not delays that a driver could expect."
     )
     if short:
-        lines.append(
-            f"- In {short} cells, the runs are too short to tell: the roads were still filling."
-        )
+        lines.append(f"- The runs of {short} cells are too short: the roads were still filling.")
     return f"{head}\n\n" + ("\n".join(lines) or "None.")
 
 

@@ -10,13 +10,13 @@
 The names below are loaded on first use, so `import minisim` is quick.
 """
 
-from __future__ import annotations
-
 import importlib
-from typing import TYPE_CHECKING
 
 from minisim.version import __version__
 
+# Not typing's: `python -m minisim` imports this first, and may find a typing.py (or __future__.py)
+# in the working directory. Type checkers know the name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from minisim.arrivals import Arrivals, Demand
     from minisim.errors import MinisimError

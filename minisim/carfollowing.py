@@ -207,8 +207,7 @@ def insertion_speed(
 def cruise_control(v: float, v0: float, gain: float, a: float, b: float) -> float:
     """Acceleration that a cruise control asks of the engine, gain·(v0 − v) within [−b, a] [m/s²].
 
-    Source: Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without the integral term; SUMO's
-    `MSCFModel_CC::_cc`.
+    Rajamani, Vehicle Dynamics and Control, 2006, eq. 5.5 without integral; `MSCFModel_CC::_cc`.
     """
     return min(max(gain * (v0 - v), -b), a)
 

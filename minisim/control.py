@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
-Controllers may also import `junction`, `vehicle`, `parameters`, `names`, `errors`, `files`,
-`streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the engine, the
-hosts or the results; `make lint` checks this.
+Controllers may also import `junction`, `vehicle`, `fleet`, `parameters`, `names`, `errors`,
+`files`, `streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
+engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -15,14 +15,26 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
-from minisim.errors import InputError, instance, number, printable
+from minisim.errors import InputError, instance, number, printable, told
+from minisim.fleet import Fleet
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
 from minisim.names import Name
-from minisim.parameters import checked, declared, part, real, reals, switch, text, whole
+from minisim.parameters import (
+    Reals,
+    Switch,
+    checked,
+    declared,
+    part,
+    real,
+    reals,
+    switch,
+    text,
+    whole,
+)
 from minisim.vehicle import MODELS, VehicleType
 
 #: Lateral acceleration that turning vehicles accept [m/s²]: netconvert's default of
@@ -43,15 +55,29 @@ class Site:
     """What a controller may know before the first vehicle arrives."""
 
     intersection: Intersection = part("its geometry", Intersection)
-    vehicle: VehicleType = part("the vehicles' type", VehicleType)
-    speed_limit: float = real("of the roads", "m/s", above=0, high=100)
-    demand: tuple[float, ...] = reals("expected inflow of each lane", "veh/h")
+    fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
+    speed_limit: float = real("of the roads, the highest one", "m/s", above=0, high=100)
+    demand: Reals[tuple[float, ...]] = reals("expected inflow of each lane", "veh/h")
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
+    limits: Reals[tuple[float, ...]] = reals(
+        "of each arm's road; by default its own in the intersection, or else `speed_limit`",
+        "m/s", default=(),
+    )  # fmt: skip
+
+    @property
+    def vehicle(self) -> VehicleType:
+        """The vehicles' type; of several, one that is in every respect as bad as the worst."""
+        return self.fleet.worst
+
+    @property
+    def types(self) -> tuple[VehicleType, ...]:
+        """The vehicles' types; `Observed.type` is an index into them."""
+        return self.fleet.types
 
     @property
     def looks_out(self) -> bool:
-        """Whether vehicles let others pass that cross their way inside the junction.
+        """Whether vehicles give way to those crossing inside the junction.
 
         Only on SUMO's own ways, since its table of foes goes with them.
         """
@@ -61,30 +87,66 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
-        room = self.intersection.approach_length
+        self._set_limits()
+        if self.intersection.roads is not None and self.vehicle.sumo is not None:
+            raise InputError(
+                "vehicles that keep to SUMO's rules drive on roads that are all alike; leave out "
+                "roads, or take another profile, such as fair"
+            )
+        self.fleet.check(self.intersection.n)
+        room = self.intersection.shortest_approach
         if (needed := self.vehicle.length + self.vehicle.margin) >= room:
             raise InputError(
                 f"no vehicle of {self.vehicle.length:g} m can be inserted on approach lanes of "
                 f"{room:g} m; arm_length must be more than "
-                f"{self.intersection.arm_length - room + needed:g} m"
+                f"{self.intersection.junction_radius + needed:g} m"
             )
-        if entry_room(self.intersection, self.vehicle) <= 0.0:
+        if entry_room(self.intersection, self.fleet) <= 0.0:
+            tight = [it for it in self.types if entry_room(self.intersection, it) <= 0.0]
+            it = tight[0] if tight else self.vehicle
             raise InputError(
-                f"vehicles of {self.vehicle.length:g} × {self.vehicle.width:g} m do not fit lanes "
-                f"of {self.intersection.lane_width:g} m here: turning into an exit lane, one would "
-                "touch another that waits beside it"
+                f"vehicles of {it.length:g} × {it.width:g} m ({it.name}) do not fit lanes of "
+                f"{self.intersection.lane_width:g} m here: turning into an exit lane, one would "
+                "touch another that waits beside it; a larger lane_width or junction_radius helps"
             )
+
+    def limit(self, arm: int) -> float:
+        """The limit of an arm's road [m/s], before the junction and after it."""
+        return self.limits[arm] if self.limits else self.speed_limit
+
+    def _set_limits(self) -> None:
+        roads, n = self.intersection.roads or (), self.intersection.n
+        if not self.limits and any(road.speed_limit for road in roads):
+            limits = tuple(road.speed_limit or self.speed_limit for road in roads)
+            object.__setattr__(self, "limits", limits)
+            object.__setattr__(self, "speed_limit", max(limits))
+        if self.limits and len(self.limits) != n:
+            raise InputError(f"limits must be one per arm, {n} numbers, got {self.limits}")
+        for limit in self.limits:
+            number("limits [m/s]", limit, above=0, high=self.speed_limit)
+
+    def period(self, name: str, seconds: float) -> float:
+        """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""
+        return number(f"{name} [s], in steps of the host,", seconds, low=self.dt)
 
     @cached_property
     def conflicts(self) -> Bools:
         """Whether two movements from different arms must not be driven at once, shape (m, m)."""
-        return conflicts(self.intersection, self.vehicle) & self.intersection.movements.apart
+        return conflicts(self.intersection, self.fleet) & self.intersection.movements.apart
+
+
+def _fleet(value: object) -> Fleet:
+    """A fleet, or the only type that drives, as a fleet."""
+    if isinstance(value, VehicleType):
+        return Fleet((value,))
+    instance("fleet", value, Fleet)
+    return cast(Fleet, value)
 
 
 class Observed(NamedTuple):
     """One vehicle in a view.
 
-    Draw what chance makes of a vehicle by its lane and rank: its id depends on other lanes.
+    Draw random traits of a vehicle by its lane and rank: its id depends on other lanes.
     """
 
     id: int  # the same in every view of a run
@@ -96,6 +158,7 @@ class Observed(NamedTuple):
     demand_time: float = 0.0  # when it wanted to enter the road [s]
     rank: int = 0  # its place among the vehicles of its lane, from 0
     speed_factor: float = 1.0  # its driver's factor on the speed limit
+    type: int = 0  # index of its type in `Site.types`; all can see whether it is a bus
 
     @property
     def movement(self) -> Movement:
@@ -226,12 +289,12 @@ class Plan:
         "of the hold line from the junction entry", "m", default=0.0, low=0, high=1000
     )
     markings: tuple[Marking, ...] = checked("on every lane", _markings, "markings", default=())
-    marks: tuple[float, ...] = reals(
+    marks: Reals[tuple[float, ...]] = reals(
         "wake when a front bumper passes one of these distances before the junction entry; 0 is "
         "the entry itself, negative is past it",
         "m", default=(), low=-1000,
     )  # fmt: skip
-    wake_on_clear: bool = switch("wake when a rear bumper leaves the junction", default=False)
+    wake_on_clear: Switch = switch("wake when a rear bumper leaves the junction", default=False)
     period: float | None = real(
         "wake at this interval, at least the step", "s", default=None, above=0, optional=True
     )
@@ -243,7 +306,7 @@ class Plan:
         "its rear has left the junction",
         "m", default=0.0, low=0, high=1000,
     )  # fmt: skip
-    lanes_open: bool = switch("lanes start open; otherwise vehicles are held", default=False)
+    lanes_open: Switch = switch("lanes start open; otherwise vehicles are held", default=False)
 
 
 @runtime_checkable
@@ -267,7 +330,7 @@ class Counting(Session, Protocol):
 
     @property
     def counts(self) -> Mapping[str, float]:
-        """Name -> count so far, which only grows; no name may be one of a summary's own."""
+        """Name -> count so far, which only grows; no name may clash with a summary's own."""
 
 
 @runtime_checkable
@@ -326,14 +389,19 @@ class Controller(Protocol):
 
 
 def as_controller(what: str, value: object) -> Controller:
-    """Return `value` if it is a controller; `what` is what an `InputError` calls it if not."""
-    if isinstance(value, Controller) and not isinstance(value, type):
-        printable(f"the name of {what}", value.name)
-        return value
+    """Return `value` if it is a controller; `what` names it in the `InputError` if not."""
+    try:
+        if isinstance(value, Controller) and not isinstance(value, type):
+            printable(f"the name of {what}", value.name)
+            return value
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        raise InputError(f"{what} has no name: {told(error)}") from error
     lacks = [part for part in ("name", "start") if not hasattr(value, part)]
     why = f"it has no {' and no '.join(lacks)}" if lacks else "it is a class"
     named = isinstance(value, str | Mapping)
-    hint = "; make it by scenarios.controllers.controller_named" if named else ""
+    hint = "; make it with scenarios.controllers.controller_named" if named else ""
     raise InputError(f"{what} is not a controller: {why}{hint}")
 
 

@@ -35,7 +35,7 @@ class FileError(MinisimError):
 
 
 class CollisionError(MinisimError):
-    """Two bodies touched, and the run was not told to record that and go on.
+    """Two bodies touched, and the run does not record that and go on.
 
     Attributes:
         collisions: the `minisim.engine.collision.Collision`s of the last step.
@@ -44,12 +44,9 @@ class CollisionError(MinisimError):
     """
 
     def __init__(
-        self,
-        message: str,
-        collisions: tuple[Any, ...] = (),
-        replay: Callable[..., Any] | None = None,
+        self, text: str, collisions: tuple[Any, ...] = (), replay: Callable[..., Any] | None = None
     ) -> None:
-        super().__init__(message)
+        super().__init__(text)
         self.collisions = collisions
         self.replay = replay
 
@@ -134,7 +131,7 @@ def choice(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 def nearest(value: object, allowed: Iterable[str]) -> str:
-    """The question whether the nearest of `allowed` was meant, in any case of letters; else ""."""
+    """A question that suggests the nearest of `allowed`, whatever its case; "" if none is near."""
     options = {option.casefold(): option for option in allowed}
     text = value.casefold() if isinstance(value, str) else ""
     close = difflib.get_close_matches(text, options, n=1, cutoff=0.5)
@@ -197,6 +194,8 @@ def show(value: object) -> str:
         text = re.sub(r" at 0x[0-9A-Fa-f]+", "", repr(value))
     except ValueError:  # Python refuses to print integers of thousands of digits
         return f"a {type(value).__name__} too large to print"
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        return f"a {type(value).__name__} whose repr raises {type(error).__name__}"
     return text if len(text) <= 200 else f"{text[:200]}…"
 
 

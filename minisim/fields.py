@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Any, TypedDict, Unpack
+from typing import Any, Literal, Protocol, TypeAlias, TypedDict, TypeVar, Unpack
 
 from minisim.errors import (
     InputError,
@@ -25,9 +25,33 @@ from minisim.errors import (
 )
 from minisim.spelling import read
 
-#: Returns a field's value, perhaps in another form, or raises `InputError`. It takes what messages
-#: call the field, and the value.
+#: A field's title in messages and its value -> the value, perhaps in another form, or `InputError`.
 Check = Callable[[str, Any], Any]
+
+_Kept_co = TypeVar("_Kept_co", covariant=True)
+_Given_contra = TypeVar("_Given_contra", contravariant=True)
+_T = TypeVar("_T")
+
+
+class Takes(Protocol[_Kept_co, _Given_contra]):
+    """For type checkers, a field that keeps another type than its constructor takes.
+
+    Checkers read it as a descriptor, though at run time the field is an ordinary one.
+    """
+
+    def __get__(self, recipe: object, kind: Any = None, /) -> _Kept_co: ...
+    def __set__(self, recipe: object, value: _Given_contra, /) -> None: ...
+
+
+#: The field of a `part` with `kinds`: the part itself, or a text or table that describes it.
+Spelled: TypeAlias = Takes[_T, _T | str | Mapping[str, Any]]
+
+#: The field of a `switch`.
+Switch: TypeAlias = Takes[bool, bool | Literal["on", "off", "true", "false"]]
+
+#: The field of `reals`, kept as a tuple of the type `_T`; `MaybeReals` for an optional one.
+Reals: TypeAlias = Takes[_T, Iterable[float]]
+MaybeReals: TypeAlias = Takes[_T | None, Iterable[float] | None]
 
 KEY = "parameter"
 
@@ -143,7 +167,7 @@ def part(
 ) -> Any:
     """Another object, of the class or protocol `kind`.
 
-    A text, or a table as in TOML, gives it by a word in `kinds`, which maps each word to what makes
+    A text or a table (as in TOML) may name it by a word in `kinds`, which maps words to what makes
     it: `on`, `noisy(delay=0.1)`. `off` means none.
     """
     classes = kind if isinstance(kind, tuple) else (kind,)
@@ -160,9 +184,8 @@ def part(
             raise InputError(f"{title} must be {wanted}, got {show(made)}")
         return made
 
-    return checked(
-        meaning, check_part, " | ".join(map(_form, kinds.items())), kinds=kinds, **common
-    )
+    allowed = " | ".join(map(_form, kinds.items()))
+    return checked(meaning, check_part, allowed, kinds=kinds, **common)
 
 
 def _form(kind: tuple[str, Callable[..., Any]]) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, choice, instance, number, numbers, show
 from minisim.junction.movements import ARM_NAMES
-from minisim.parameters import checked, declared
+from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
 from minisim.vehicle import CruiseVehicle, VehicleType
 
@@ -24,9 +25,9 @@ ROUNDING = 1e-6
 #: Sizes of vehicles on Indian roads (Chandra, Kumar 2003, Journal of Transportation Engineering
 #: 129:155, table 1). What they can do is SUMO's default for the class (page "Vehicle Type Parameter
 #: Defaults"), with three exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
-#: a vehicle that likes to brake at 10 m/s², so it drives like a car. There is no class for
-#: auto-rickshaws: the acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
-#: Moratuwa, handle 123/19055), the brakes are those of heavy vehicles.
+#: a vehicle whose comfortable braking is 10 m/s², so it drives like a car. There is no class for
+#: auto-rickshaws: their acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
+#: Moratuwa, handle 123/19055), their brakes are those of heavy vehicles.
 _INDIAN = (
     VehicleType(name="motorcycle", length=1.87, width=0.64),
     VehicleType(
@@ -72,6 +73,17 @@ _SUMO = (
 TYPES: Mapping[str, VehicleType] = {it.name: it for it in (*_INDIAN, *_SUMO)}
 
 
+#: Fleets by name. `india` has the shares of the vehicles registered in India on 31 March 2009: 72 %
+#: two-wheelers, 13.3 % cars, jeeps and taxis, 5.5 % goods vehicles, 1.3 % buses (Ministry of Road
+#: Transport, Road Transport Year Book 2007–09). Goods vehicles are trucks here, and the 7.9 % of
+#: other vehicles are auto-rickshaws.
+MIXES: Mapping[str, Mapping[str, float]] = {
+    "india": {
+        "motorcycle": 0.72, "auto-rickshaw": 0.079, "car": 0.133, "truck": 0.055, "bus": 0.013,
+    },
+}  # fmt: skip
+
+
 def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
     types = tuple(value) if isinstance(value, list | tuple) else (value,)
     for it in types:
@@ -90,23 +102,30 @@ def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
 
 def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list | tuple) else (value,)
-    return tuple(
+    kept = tuple(
         numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
         for i, row in enumerate(rows)
     )
+    for share in itertools.chain.from_iterable(kept):
+        number("share of a type", share, low=0, high=1)
+    return kept
 
 
 @declared
 class Fleet:
     """Which types of vehicles drive, and how many of each.
 
-    Which type a vehicle has is drawn by its lane and its place there, so it depends on nothing
+    A vehicle's type is drawn by its lane and its place there, so it depends on nothing
     else.
     """
 
-    types: tuple[VehicleType, ...] = checked("of vehicles", _types, "VehicleTypes of one model")
-    shares: tuple[tuple[float, ...], ...] = checked(
-        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers ≥ 0",
+    types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(
+        "of vehicles", _types, "VehicleTypes of one model"
+    )
+    shares: Takes[
+        tuple[tuple[float, ...], ...], float | Sequence[float | Sequence[float]]
+    ] = checked(
+        "of each type: a number, or one per lane; they sum to 1", _shares, "numbers 0 … 1",
         default=((1.0,),),
     )  # fmt: skip
 
@@ -117,8 +136,7 @@ class Fleet:
         if len(counts - {1}) > 1:
             raise InputError(f"shares by lane need a number per lane, got {self.shares}")
         for lane in range(max(counts)):
-            for share in (row := self.of_lane(lane)):
-                number("share of a type", share, low=0, high=1)
+            row = self.of_lane(lane)
             if abs(sum(row) - 1.0) > ROUNDING:
                 where = f" on lane {ARM_NAMES[lane]}" if max(counts) > 1 else ""
                 given = ", ".join(
@@ -131,7 +149,7 @@ class Fleet:
         return tuple(row[min(lane, len(row) - 1)] for row in self.shares)
 
     def check(self, n: int) -> None:
-        """Raise `InputError` for shares by lane that are not those of `n` lanes."""
+        """Raise `InputError` for shares by lane unless there are `n` lanes."""
         for row in self.shares:
             if len(row) not in (1, n):
                 raise InputError(f"the fleet has shares for {len(row)} lanes, the junction has {n}")
@@ -141,9 +159,16 @@ class Fleet:
         """The names of the types."""
         return tuple(it.name for it in self.types)
 
+    def __str__(self) -> str:
+        """As `fleet_named` reads it, such as "car:0.8,bus:0.2"; the name of an only type."""
+        if len(self.types) == 1:
+            return self.types[0].name
+        shares = ("/".join(f"{share:g}" for share in row) for row in self.shares)
+        return ",".join(f"{name}:{share}" for name, share in zip(self.names, shares, strict=True))
+
     @cached_property
     def worst(self) -> VehicleType:
-        """A vehicle that is in every respect as bad as the worst: the longest, the weakest brakes.
+        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
 
         With one type it is that type.
         """
@@ -174,13 +199,18 @@ class Fleet:
         return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
 
 
+#: What has `types`: a fleet, or the only type that drives.
+Vehicles = Fleet | VehicleType
+
+
 def fleet_named(value: Any, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
-        value: a Fleet or VehicleType as it is; or the shares of `TYPES`, as a table such as
+        value: a Fleet or VehicleType, kept unchanged; or the shares of `TYPES`, as a table such as
             `{"car": 0.8, "bus": [0.2, 0.2, 0.2, 0.2]}` (one share, or one per lane) or as a text
-            such as "car:0.8,bus:0.2".
+            such as "car:0.8,bus:0.2", with shares by lane written 0.2/0.1/0.2/0.1; or the name of
+            a mix (`MIXES`) or of a type.
         base: its law drives the vehicles of a table or text.
 
     Raises:
@@ -192,36 +222,43 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
     if isinstance(value, VehicleType):
         return Fleet((value,))
     wanted = "shares of vehicle types such as car:0.8,bus:0.2"
-    if isinstance(value, str):
+    if isinstance(value, str) and ":" not in value:
+        known = {**MIXES, **{name: {name: 1.0} for name in TYPES}}
+        value = known[choice("fleet", value, known)]
+    elif isinstance(value, str):
         pairs = [part.rpartition(":") for part in value.split(",")]
         try:
-            value = {name.strip(): float(share) for name, _, share in pairs}
+            value = {
+                name.strip(): [float(share) for share in row.split("/")] for name, _, row in pairs
+            }
         except ValueError:
             raise InputError(f"fleet must be {wanted}, got {show(value)}") from None
         if len(value) < len(pairs):
-            raise InputError("fleet names a vehicle type twice")
+            raise InputError(f"fleet names a vehicle type twice: {', '.join(p[0] for p in pairs)}")
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
     if base.sumo is not None:
-        raise InputError("a fleet goes with the profiles paper and fair, not with SUMO's vehicles")
+        raise InputError("a fleet needs the profile paper or fair, not with SUMO's vehicles")
     types = [TYPES[choice("vehicle type", name, TYPES)] for name in value]
     return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
 
 
-#: Passenger car units per vehicle, by source. IRC:106-1990 (table 1) has one factor for a type that
-#: makes up 5 % of the traffic and one for 10 % or more. IRC:64-1990 has one. The Highway Capacity
-#: Manual (2000, chapter 16) counts a heavy vehicle at a junction as two cars and knows no
-#: motorcycles or auto-rickshaws.
+#: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
+#:
+#: `pcu` is IRC:106-1990 (table 1), with a factor for a type that makes up 5 % of the traffic and
+#: one for 10 % or more. `pcu-irc64` is IRC:64-1990, with one. `pcu-hcm` is the Highway Capacity
+#: Manual (2000, chapter 16), which counts a heavy vehicle at a junction as two cars, and knows
+#: neither motorcycles nor auto-rickshaws.
 PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "IRC:106": {
+    "pcu": {
         "motorcycle": (0.5, 0.75), "auto-rickshaw": (1.2, 2.0), "car": (1.0, 1.0),
         "lcv": (1.4, 2.0), "bus": (2.2, 3.7), "truck": (2.2, 3.7),
     },
-    "IRC:64": {
+    "pcu-irc64": {
         "motorcycle": (0.5, 0.5), "auto-rickshaw": (1.0, 1.0), "car": (1.0, 1.0),
         "lcv": (1.5, 1.5), "bus": (3.0, 3.0), "truck": (3.0, 3.0),
     },
-    "HCM": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
+    "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
 }  # fmt: skip
 
 #: SUMO's classes count as the types that they stand for.
@@ -231,24 +268,24 @@ _ALIKE = {
 }  # fmt: skip
 
 
-def pcu_factors(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> tuple[float, ...]:
+def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
 
-    Where a source has two factors, they are those of shares of 5 % and 10 %; in between the factor
-    is interpolated. Raises `InputError` for a source or a type without a factor.
+    Where a unit has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
+    interpolated. Raises `InputError` for an unknown unit, or a type without a factor.
     """
-    table = PCU[choice("source of passenger car units", source, PCU)]
+    table = PCU[choice("passenger car unit", unit, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    if len(fleet.types) == 1:  # the unit is made for cars alone
+    if len(fleet.types) == 1:  # the unit is defined by cars alone
         return (1.0,)
     kinds = [_ALIKE.get(name, name) for name in fleet.names]
-    rows = [table[choice(f"vehicle type in {source}", kind, table)] for kind in kinds]
+    rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)
     )
 
 
-def mean_pcu(fleet: Fleet, source: str = "IRC:106", n: int = 1) -> float:
-    """Passenger car units of the mean vehicle, over `n` lanes with the same inflow."""
-    shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
-    return float(np.dot(pcu_factors(fleet, source, n), shares))
+def mean_pcu(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
+    """Passenger car units of the mean vehicle of each of `n` lanes."""
+    factors = pcu_factors(fleet, unit, n)
+    return tuple(float(np.dot(factors, fleet.of_lane(lane))) for lane in range(n))

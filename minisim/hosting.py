@@ -107,9 +107,8 @@ class Hosted:
     def ask(self, view: View, tick: int) -> list[Command]:
         """Show the session its view at `tick` and return its commands.
 
-        Raises:
-            ControllerError: the session raised an error, named with its file and line, or its
-                answer cannot be carried out.
+        Raises `ControllerError` for an error of the session, named with its file and line, or an
+        answer that cannot be carried out.
         """
         try:
             commands = _listed(self.session.decide(view))
@@ -117,17 +116,15 @@ class Hosted:
                 self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
-        except Exception as error:  # a caller's code may raise anything
-            raise _blamed(self.controller, error, self.session, f" at {view.time:.1f} s") from error
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
+            raise _blame(self.controller, error, self.session, f" at {view.time:.1f} s") from error
         return commands
 
-    def collided(
-        self, collisions: Sequence[Collision], replay: Callable[..., Run]
-    ) -> CollisionError:
+    def collided(self, these: Sequence[Collision], replay: Callable[..., Run]) -> CollisionError:
         """The error that stops the run, with a `replay` that records what led to it."""
-        what = "; ".join(map(str, collisions))
+        what = "; ".join(map(str, these))
         where = f"scenario {self.scenario.name}, controller {name_of(self.controller)}"
-        return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(collisions), replay)
+        return CollisionError(f"{what} ({where}, seed {self.seed})", tuple(these), replay)
 
     def result(self, **measured: Any) -> Run:
         """The result; `measured` are the fields of `Run` that only the host knows."""
@@ -138,8 +135,8 @@ class Hosted:
             kinds: tuple[str, ...] = ()
             if isinstance(session, Kinds):
                 kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
-        except Exception as error:  # a caller's code may raise anything
-            raise _blamed(self.controller, error, session) from error
+        except (Exception, SystemExit) as error:  # a caller's code may raise anything
+            raise _blame(self.controller, error, session) from error
         return Run(
             scenario=self.scenario,
             controller=self.controller,
@@ -178,7 +175,7 @@ def begin(
     as_controller(show(controller), controller)
     site = scenario.site(integer("seed", seed, low=0))
     arrivals = scenario.arrivals(seed)
-    arrivals.check(site.intersection.n)
+    arrivals.check(site.intersection.n, site.intersection.allowed_by_lane)
     return Hosted(
         scenario, controller, int(seed), record, window, on_collision, site, arrivals,
         *start(controller, site),
@@ -200,15 +197,15 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         raise InputError(f"{name_of(controller)}: {error}") from error
     except MinisimError:
         raise
-    except Exception as error:  # a caller's code may raise anything
-        raise _blamed(controller, error, controller) from error
+    except (Exception, SystemExit) as error:  # a caller's code may raise anything
+        raise _blame(controller, error, controller) from error
     try:
         if not isinstance(plan, Plan) or not isinstance(session, Session):
             raise InputError(f"start() must return a Session with a Plan, got {show(session)}")
         if plan.period is not None:
-            number("period of the plan [s], in steps of the host,", plan.period, low=site.dt)
+            site.period("period of the plan", plan.period)
         road = site.intersection.approach_length
-        room = road - site.vehicle.length
+        room = site.intersection.shortest_approach - site.vehicle.length
         number("hold_distance [m] of the plan, on these roads,", plan.hold_distance, high=room)
         marks = {f"marks[{k}]": mark for k, mark in enumerate(plan.marks)}
         marks |= {f"start of marking {it.name!r}": it.start for it in plan.markings}
@@ -217,17 +214,17 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
         for name, distance in marks.items():
             number(f"{name} [m] of the plan, on these roads,", distance, high=road)
     except InputError as error:
-        raise _blamed(controller, error, controller) from error
+        raise _blame(controller, error, controller) from error
     return session, plan
 
 
-def _blamed(
-    controller: Controller, error: Exception, code: object, when: str = ""
+def _blame(
+    controller: Controller, error: BaseException, of: object, when: str = ""
 ) -> ControllerError:
     """The error that says where a controller's own code failed, and why."""
     if isinstance(error, MinisimError) and not isinstance(error, InputError):
         raise error
-    module = sys.modules.get(type(code).__module__)
+    module = sys.modules.get(type(of).__module__)
     folder = Path(getattr(module, "__file__", None) or "/").parent
     why = error if isinstance(error, InputError) else told(error, folder)
     return ControllerError(f"controller {name_of(controller)!r}{when}: {why}")

@@ -69,8 +69,7 @@ def _cache_class() -> Any:
             super().__init__(function)  # type: ignore[no-untyped-call]  # numba has no types
             folder = Path(inspect.getfile(function)).parent
             sources = numba.__version__, _digest(folder), _digest(Path(__file__).parent)
-            # numba reads no further if the version of an index differs. The rest may hold classes
-            # that no longer exist.
+            # If the version differs, numba does not read the rest, whose classes may be gone.
             self._cache_file._version = self._cache_file._source_stamp = sources
 
     return SourcesCache

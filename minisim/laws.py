@@ -1,8 +1,7 @@
 """The car-following models of a run, and how limits and hold lines bound the acceleration.
 
 Only this module depends on `Law.model`. The equations are in `minisim.carfollowing`, the table of
-models in `minisim.vehicle`. The hosts move vehicles by these functions, and `baselines.prediction`
-predicts by them.
+models in `minisim.vehicle`. Hosts move vehicles by these functions, `baselines.prediction` too.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from minisim.control import Plan, Site
 from minisim.jit import njit, njit_inline
 from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
-from minisim.vehicle import MODELS, POSITION_EPS
+from minisim.vehicle import MODELS, POSITION_EPS, VehicleType
 
 #: A held vehicle aims to stop this far before its hold line [m]; at most it stops 0.3 m before it.
 #: The margin exceeds `minisim.control.COMMIT_MARGIN`, so the vehicle never looks unable to stop.
@@ -47,28 +46,43 @@ IDM, IIDM, KRAUSS = map(list(MODELS).index, ("idm", "iidm", "krauss"))
 STOP_LINE_GAP = 1.0
 
 
-class Law(NamedTuple):
-    """The scalars of a run: car following, lines and switches (SI units)."""
+class Traits(NamedTuple):
+    """What the law needs to know of a vehicle's type (SI units)."""
 
-    dt: float
     a: float
     b: float
     b_max: float
     headway: float
     min_gap: float
     delta: float
-    model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
-    semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
     length: float
     width: float
+
+
+def traits_of(vehicle: VehicleType) -> Traits:
+    """The traits of a type."""
+    it = vehicle
+    return Traits(*map(float, (
+        it.acceleration, it.deceleration, it.max_deceleration, it.headway, it.min_gap, it.exponent,
+        it.length, it.width,
+    )))  # fmt: skip
+
+
+class Law(NamedTuple):
+    """What a run's vehicles have in common: the step, the model, lines and switches (SI units)."""
+
+    dt: float
+    model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
+    semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
-    leave: float  # s up to which a vehicle at least stays in view
+    leave: float  # s up to which a vehicle stays in view at least
+    longest: float  # length of the longest vehicle
     room: float  # see `minisim.junction.partings.turning_room`
     margin: float  # see `minisim.vehicle.VehicleType`
     sumo: bool  # vehicles keep to SUMO's rules
     sight: float  # how far before the entry a view reaches
-    depart_speed: float  # the most at insertion
+    depart_speed: float  # highest at insertion
     wake_on_clear: bool
     record_from: int  # ticks
     record_to: int
@@ -89,20 +103,13 @@ def build_law(
     near = record == "junction"
     law = Law(
         dt=site.dt,
-        a=vehicle.acceleration,
-        b=vehicle.deceleration,
-        b_max=vehicle.max_deceleration,
-        headway=vehicle.headway,
-        min_gap=vehicle.min_gap,
-        delta=vehicle.exponent,
         model=list(MODELS).index(vehicle.model),
         semi_implicit=MODELS[vehicle.model].stepwise,
-        length=vehicle.length,
-        width=vehicle.width,
         entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
-        room=turning_room(site.intersection, site.vehicle),
+        longest=vehicle.length,
+        room=turning_room(site.intersection, vehicle),
         margin=vehicle.margin,
         sumo=vehicle.sumo is not None,
         sight=plan.sight,
@@ -113,7 +120,7 @@ def build_law(
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )
-    # A whole number for a float would have every kernel compiled once more.
+    # An int in place of a float would recompile every kernel.
     whole = ("model", "record_from", "record_to")
     plain: dict[str, Any] = {
         k: float(x) for k, x in law._asdict().items() if type(x) is int and k not in whole
@@ -122,40 +129,44 @@ def build_law(
 
 
 @njit_inline
-def closeness(v: float, gap: float, v_leader: float, law: Law) -> float:
-    """The weight that this run's law gives a vehicle ahead, from 0 to infinity; the most decides.
+def closeness(v: float, gap: float, v_leader: float, me: Traits, law: Law) -> float:
+    """The weight that this run's law gives a vehicle ahead, 0 to infinity; the largest decides.
 
-    It is the ratio of the desired gap to the actual one under the IDM, and the inverse of the safe
-    speed under Krauß's law.
+    Under the IDM it is the desired gap over the actual one, under Krauß's law 1/(safe speed).
     """
     if law.model == KRAUSS:
-        v_safe = safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+        v_safe = safe_speed(gap - me.min_gap, v_leader, me.b, me.headway, law.dt)
         return 1.0 / v_safe if v_safe > 0.0 else math.inf
-    return gap_ratio(v, gap, v_leader, law.a, law.b, law.headway, law.min_gap)
+    return gap_ratio(v, gap, v_leader, me.a, me.b, me.headway, me.min_gap)
 
 
 @njit_inline
-def room_behind(gap: float, v_leader: float, law: Law) -> float:
+def room_behind(gap: float, v_leader: float, b_leader: float, me: Traits, law: Law) -> float:
     """The distance behind a leader in which a vehicle must be able to stop, times 2·b_max [m²/s²].
 
-    The leader stops no sooner than its brakes can stop it, and what corners need in a turn stays
-    free.
+    The leader stops no sooner than its brakes can, and there is room for corners in a turn. If the
+    leader's brakes are the weaker ones, they count as equal: otherwise two vehicles that stop apart
+    could touch on the way.
     """
     room = gap - law.room
     if law.semi_implicit:
-        return 2.0 * law.b_max * (room + braking_distance(v_leader, law.b_max, law.dt))
-    return 2.0 * law.b_max * room + v_leader * v_leader
+        b_max = b_leader if b_leader > me.b_max else me.b_max
+        return 2.0 * me.b_max * (room + braking_distance(v_leader, b_max, law.dt))
+    squared = v_leader * v_leader
+    if b_leader > me.b_max:
+        squared *= me.b_max / b_leader
+    return 2.0 * me.b_max * room + squared
 
 
 @njit_inline
-def short_of(room: float, v: float, v_new: float, law: Law) -> bool:
+def short_of(room: float, v: float, v_new: float, me: Traits, law: Law) -> bool:
     """Whether a stop after a step to `v_new` may take more than this room: quick and cautious."""
     top = v_new if v_new > v else v
-    return top * (top + 2.0 * law.b_max * law.dt) > room
+    return top * (top + 2.0 * me.b_max * law.dt) > room
 
 
 @njit
-def keep_room(v: float, room: float, law: Law) -> float:
+def keep_room(v: float, room: float, me: Traits, law: Law) -> float:
     """Highest acceleration after which the brakes still stop a vehicle in this room [m/s²].
 
     With it, no vehicle runs into its leader under any law at any step: a vehicle that can stop
@@ -165,115 +176,132 @@ def keep_room(v: float, room: float, law: Law) -> float:
     Source: Gipps 1981, Transportation Research B 15:105, and Krauß 1998, §3.1, with the same brakes
     for both vehicles and a reaction time of one step.
     """
-    distance = room / (2.0 * law.b_max)
+    distance = room / (2.0 * me.b_max)
     if law.semi_implicit:
-        return (stepwise_towards(0.0, distance, law.b_max, law.dt) - v) / law.dt
-    return stop_within(v, distance, law.b_max, law.dt)
+        return (stepwise_towards(0.0, distance, me.b_max, law.dt) - v) / law.dt
+    return stop_within(v, distance, me.b_max, law.dt)
 
 
 @njit_inline
-def follow(v: float, v0: float, z: float, law: Law) -> float:
+def follow(v: float, v0: float, z: float, me: Traits, law: Law) -> float:
     """The acceleration that the car-following law gives.
 
     At a desired speed of 0 it is the limit of the IDM: comfortable braking and the leader's share.
     """
     if law.model == KRAUSS:
         v_safe = 1.0 / z if z > 0.0 else math.inf
-        return (krauss(v, v0, v_safe, law.a, law.b, law.dt) - v) / law.dt
+        return (krauss(v, v0, v_safe, me.a, me.b, law.dt) - v) / law.dt
     if v0 <= 0.0:
         if law.model == IIDM:
-            return -law.b + min(law.a * (1.0 - z * z), 0.0)
-        return -law.b - law.a * z * z
+            return -me.b + min(me.a * (1.0 - z * z), 0.0)
+        return -me.b - me.a * z * z
     if law.model == IIDM:
-        return iidm(v, v0, z, law.a, law.b, law.delta)
-    return idm(v, v0, z, law.a, law.b, law.delta)
+        return iidm(v, v0, z, me.a, me.b, me.delta)
+    return idm(v, v0, z, me.a, me.b, me.delta)
+
+
+@njit_inline
+def drive(v: float, limit: float, advice: float, z: float, me: Traits, law: Law) -> float:
+    """The acceleration that the law gives at a speed limit and an advised speed.
+
+    A vehicle that is too fast for the advice brakes at b at most, unless its leader alone asks for
+    more: the IDM would add both.
+    """
+    acc = within(v, follow(v, limit, z, me, law), limit, law)
+    if advice < limit:
+        told = within(v, follow(v, advice, z, me, law), advice, law)
+        acc = min(acc, max(told, -me.b))
+    return acc
 
 
 @njit_inline
 def within(v: float, acc: float, limit: float, law: Law) -> float:
     """`acc`, unless a step of it would take a vehicle past its speed limit.
 
-    Where a·dt is large the IDM would overshoot: it takes a step for short.
+    Where a·dt is large, the IDM would overshoot: it assumes short steps.
     """
     return (limit - v) / law.dt if v < limit < v + acc * law.dt else acc
 
 
 @njit
-def insertable(gap: float, v_leader: float, law: Law) -> float:
+def insertable(gap: float, v_leader: float, me: Traits, law: Law) -> float:
     """Highest speed at which this run's law allows insertion; negative when there is none.
 
     A law without a rule allows any speed if the gap is at least the one at standstill.
     Source: `insertionFollowSpeed` of each of SUMO's models.
     """
     if law.model == IDM or law.model == IIDM:
-        return insertion_speed(gap, v_leader, law.a, law.b, law.headway, law.min_gap)
-    if gap < law.min_gap:
+        return insertion_speed(gap, v_leader, me.a, me.b, me.headway, me.min_gap)
+    if gap < me.min_gap:
         return -1.0
     if law.model == KRAUSS:
-        return safe_speed(gap - law.min_gap, v_leader, law.b, law.headway, law.dt)
+        return safe_speed(gap - me.min_gap, v_leader, me.b, me.headway, law.dt)
     return math.inf
 
 
 @njit_inline
-def braking_begins(v: float, distance: float, law: Law) -> bool:
+def braking_begins(v: float, distance: float, me: Traits, law: Law) -> bool:
     """Whether something `distance` ahead may call for comfortable braking in this step."""
-    return 2.0 * law.b * distance <= v * v + 4.0 * law.b * v * law.dt
+    return 2.0 * me.b * distance <= v * v + 4.0 * me.b * v * law.dt
 
 
 @njit_inline
-def slow_down(v: float, acc: float, target: float, distance: float, law: Law) -> float:
+def slow_down(v: float, acc: float, target: float, distance: float, me: Traits, law: Law) -> float:
     """Bound on the acceleration with which comfortable braking meets a lower limit ahead."""
     if v + acc * law.dt <= target:
         return acc
     if law.semi_implicit:
-        v_new = stepwise_towards(target, distance, law.b, law.dt)
+        v_new = stepwise_towards(target, distance, me.b, law.dt)
     else:
-        v_new = max(speed_towards(v, target, distance, law.b, law.dt), target)
-    return max((v_new - v) / law.dt, -law.b)
+        v_new = max(speed_towards(v, target, distance, me.b, law.dt), target)
+    return max((v_new - v) / law.dt, -me.b)
 
 
 @njit
-def krauss_stop(v: float, room: float, law: Law) -> float:
-    """The acceleration with which a vehicle may still stop in `room` [m], as Krauß's law has it.
+def krauss_stop(v: float, room: float, me: Traits, law: Law) -> float:
+    """The acceleration with which a vehicle may still stop in `room` [m] by Krauß's law.
 
     Source: SUMO's `MSCFModel_Krauss::stopSpeed`.
     """
-    v_new = stepwise_towards(0.0, room - STILL, law.b, law.dt) if room >= STILL else 0.0
+    v_new = stepwise_towards(0.0, room - STILL, me.b, law.dt) if room >= STILL else 0.0
     return (v_new - v) / law.dt
 
 
 @njit_inline
-def hold(v: float, s: float, law: Law) -> float:
+def hold(v: float, s: float, me: Traits, law: Law) -> float:
     """Bound on the acceleration of a vehicle without right of way.
 
     The vehicle brakes comfortably for its hold line, no earlier than it must. If that does not
-    suffice, it brakes as hard as it must to stop before the junction.
+    suffice, it brakes comfortably to stop before the junction, and if that does not, as hard as it
+    must.
     """
     to_line = law.hold - s
     if law.sumo and law.model == KRAUSS:
-        return stop_at_line(v, to_line, law)
+        return stop_at_line(v, to_line, me, law)
     if law.semi_implicit:
-        return hold_stepwise(v, to_line, law.entry - s, law.b, law.dt)
+        return hold_stepwise(v, to_line, law.entry - s, me.b, law.dt)
     distance = to_line - STOP_MARGIN
-    if v * v <= 2.0 * law.b * distance:
+    if v * v <= 2.0 * me.b * distance:
         if v == 0.0 and distance < 1e-3:
             return 0.0
-        v_new = speed_towards(v, 0.0, distance, law.b, law.dt)
+        v_new = speed_towards(v, 0.0, distance, me.b, law.dt)
         return (v_new - v) / law.dt if v_new > 0.0 else -v * v / (2.0 * max(distance, 1e-6))
-    if v * v <= 2.0 * law.b * to_line:
-        return -law.b
-    to_junction = max(law.entry - STOP_MARGIN - s, 1e-6)
-    return -max(law.b, v * v / (2.0 * to_junction))
+    to_junction = law.entry - s
+    if v * v <= 2.0 * me.b * to_junction:
+        return -me.b
+    return -v * v / (2.0 * max(to_junction - STOP_MARGIN, 1e-6))
 
 
 @njit
-def stop_at_line(v: float, to_line: float, law: Law) -> float:
-    """`hold` as SUMO has it: a vehicle stops 1 m before a line, or nearer if it must.
+def stop_at_line(v: float, to_line: float, me: Traits, law: Law) -> float:
+    """`hold` by SUMO's rule: a vehicle stops 1 m before a line, or nearer if it must.
 
     Source: `MSVehicle::planMoveInternal` (`DIST_TO_STOPLINE_EXPECT_PRIORITY`).
     """
-    braking = braking_distance(v, law.b, law.dt)
-    return krauss_stop(v, to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS), law)
+    braking = braking_distance(v, me.b, law.dt)
+    return krauss_stop(
+        v, to_line - max(min(STOP_LINE_GAP, to_line - braking), POSITION_EPS), me, law
+    )
 
 
 @njit
@@ -284,6 +312,6 @@ def hold_stepwise(v: float, to_line: float, to_entry: float, b: float, dt: float
     if needed <= distance:
         v_new = stepwise_towards(0.0, distance, b, dt) if distance >= STILL else 0.0
         return (v_new - v) / dt
-    if needed <= to_line:
+    if needed <= to_entry:
         return -b
-    return -max(b, v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6)))
+    return -v * v / (2.0 * max(to_entry - STOP_MARGIN, 1e-6))

@@ -11,7 +11,7 @@
 `declared` makes a frozen dataclass whose constructor checks every such field and raises an
 `InputError` of one sentence. Rules that link fields go into `__post_init__`, which runs
 afterwards. The class docstring gets a list of the parameters; `parameters` gives them as data, for
-help texts. Values may be given as command lines and files have them, too: `Dim(monitor="on")`.
+help texts. Values may also be words, as on command lines and in files: `Dim(monitor="on")`.
 """
 
 from __future__ import annotations
@@ -26,6 +26,11 @@ from typing import Any, NamedTuple, TypeVar, dataclass_transform, overload
 
 from minisim.errors import InputError, show
 from minisim.fields import KEY, Parameter
+from minisim.fields import MaybeReals as MaybeReals
+from minisim.fields import Reals as Reals
+from minisim.fields import Spelled as Spelled
+from minisim.fields import Switch as Switch
+from minisim.fields import Takes as Takes
 from minisim.fields import checked as checked
 from minisim.fields import part as part
 from minisim.fields import real as real

@@ -15,12 +15,16 @@ from minisim.files import AnyPath, read_file, write_text
 from minisim.junction.movements import ARM_NAMES
 
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
-#: May follow: the drivers' factors on the speed limit.
-FACTORS = "speed_factor"
+#: Optional: the drivers' factors on the speed limit, and the names of the vehicles' types.
+FACTORS, TYPES = "speed_factor", "type"
+#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
+#: that none does is (1/2)^30, one in 10^9.
+ENOUGH = 30
 
 
 def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0) -> Arrivals:
-    """Read an arrival table from a CSV file: `COLUMNS`, lanes by letter, perhaps `FACTORS`.
+    """Read an arrival table from a CSV file: `COLUMNS`, lanes by letter, perhaps `FACTORS`
+    and `TYPES`.
 
     Args:
         path: the file.
@@ -29,7 +33,8 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
             "07:00". Vehicles that come earlier are left out.
 
     Raises:
-        InputError: a start that is not a time, or is later than every vehicle.
+        InputError: a start that is not a time, or is later than every vehicle; or `ENOUGH`
+            arrivals that look like those of a junction with fewer than n arms.
         FileError: unreadable, a column that is missing or unknown, a broken line (named by its
             number), or a lane or manoeuvre that does not exist with n arms.
     """
@@ -41,10 +46,17 @@ def read_arrivals(path: AnyPath, n: int | None = None, start: float | str = 0.0)
     table = dict(zip(columns, zip(*rows, strict=True), strict=True)) if rows else {}
     time, lane, manoeuvre = (np.array(table.get(column, ()), float) for column in COLUMNS)
     factors = np.array(table.get(FACTORS, ()), float) if FACTORS in columns else None
-    arrivals = Arrivals(time, lane, manoeuvre, factors)
+    types = np.array(table.get(TYPES, ()), str) if TYPES in columns else None
+    arrivals = Arrivals(time, lane, manoeuvre, factors, types)
     if begin and len(time) and time.max() < begin:
         last = f"the last vehicle comes at {clock(time.max())}"
         raise InputError(f"{path}: no vehicle comes from {show(start)} on; {last}")
+    used = 1 + int(max(arrivals.lane.max(initial=0), arrivals.manoeuvre.max(initial=0)))
+    if n is not None and len(time) >= ENOUGH and used < n:  # manoeuvres would mean other exits
+        raise InputError(
+            f"{path} looks like arrivals of a junction with {used} arms: none comes from lane "
+            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
+        )
     return arrivals.between(begin, math.inf) if begin else arrivals
 
 
@@ -56,6 +68,8 @@ def write_arrivals(arrivals: Arrivals, path: AnyPath) -> None:
     columns = dict(zip(COLUMNS, (arrivals.time.tolist(), lanes, arrivals.manoeuvre), strict=True))
     if arrivals.speed_factor is not None:
         columns[FACTORS] = arrivals.speed_factor.tolist()
+    if arrivals.type is not None:
+        columns[TYPES] = arrivals.type.tolist()
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(columns)
@@ -107,7 +121,7 @@ def _header(where: str, header: list[str]) -> list[str]:
         raise FileError(f"{where}: separate columns by commas, not by {mark[0]!r}")
     for column in header:
         try:
-            choice("column", column, (*COLUMNS, FACTORS))
+            choice("column", column, (*COLUMNS, FACTORS, TYPES))
         except InputError as error:
             raise FileError(f"{where}: {error}") from None
         if header.count(column) > 1:
@@ -117,7 +131,7 @@ def _header(where: str, header: list[str]) -> list[str]:
     return header
 
 
-def _row(where: str, columns: list[str], cells: list[str], arms: int) -> list[float]:
+def _row(where: str, columns: list[str], cells: list[str], arms: int) -> list[float | str]:
     if len(cells) != len(columns):
         point = "; write decimals with a point" * (len(cells) > len(columns))
         wanted = f"{len(columns)} values, {', '.join(columns)}"
@@ -125,8 +139,12 @@ def _row(where: str, columns: list[str], cells: list[str], arms: int) -> list[fl
     return [_value(where, *pair, arms) for pair in zip(columns, cells, strict=True)]
 
 
-def _value(where: str, column: str, cell: str, arms: int) -> float:
-    """The number that a cell stands for: a lane's index, a manoeuvre, seconds or a factor."""
+def _value(where: str, column: str, cell: str, arms: int) -> float | str:
+    """What a cell stands for: a lane's index, a manoeuvre, seconds, a factor or a type's name."""
+    if column == TYPES:
+        if not cell:
+            raise FileError(f"{where}: the type is missing")
+        return cell
     if column == "lane":
         lanes = list(ARM_NAMES[:arms])
         if cell not in lanes:

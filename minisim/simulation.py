@@ -71,7 +71,7 @@ class Simulation:
         self.site, plan = hosted.site, hosted.plan
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
-            raise InputError("on_collision 'teleport' goes with a CruiseVehicle")
+            raise InputError("on_collision 'teleport' needs a CruiseVehicle")
         self._road = build_road(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
@@ -81,7 +81,7 @@ class Simulation:
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
         self._traced = 0
-        self._bodies = np.zeros((16 * self.site.intersection.n, 5))
+        self._bodies = np.zeros((16 * self.site.intersection.n, 6))
         self._observed = np.zeros(len(self._vehicles) + 1, OBSERVED)
         self._seen = 0
         self._collisions: dict[tuple[int, int], Collision] = {}
@@ -150,7 +150,7 @@ class Simulation:
             collisions=self.collisions,
             columns=collect_trips(self._vehicles, demand, movements, self.site.dt, end),
             trace=np.concatenate([*self._traces, self._trace[:0]]),
-            rows=self._vehicles[["id", "path"]].copy(),
+            rows=self._vehicles[["id", "path", "type"]].copy(),
         )
 
     def _decide(self) -> None:
@@ -163,7 +163,7 @@ class Simulation:
             case Advise(vehicle, speed):
                 self._vehicles["advice"][self._row[vehicle]] = speed
             case Brake(vehicle, asked) if not self._vehicles["cleared"][self._row[vehicle]]:
-                limited = min(asked, self._law.b_max)
+                limited = min(asked, float(self._vehicles["b_max"][self._row[vehicle]]))
                 brake = -limited if limited > 0.0 else math.inf
                 self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):

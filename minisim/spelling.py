@@ -60,7 +60,9 @@ def call_of(value: Mapping[str, Any]) -> Call:
     named = {str(key): one for key, one in value.items()}
     name = named.pop("name", None)
     if not isinstance(name, str):
-        raise InputError(f"a table that describes a recipe needs a name, a text; got {show(value)}")
+        raise InputError(
+            f"a table that describes a recipe needs a text as its name; got {show(value)}"
+        )
     return Call(name, named=named)
 
 
@@ -90,7 +92,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
     """Call `make`, a class or function, with the arguments of `call`; messages call it `title`.
 
     Declared parameters (`minisim.parameters`) take words and nested recipes; other values must fit
-    a simple annotation. `InputError` tells of an unknown parameter or a value that is not allowed.
+    a simple annotation. Raises `InputError` for an unknown parameter or a value not allowed.
     """
     try:
         signature = inspect.signature(make)
@@ -105,7 +107,7 @@ def build(title: str, make: Callable[..., Any], call: Call) -> Any:
         return make(*given.args, **given.kwargs)
     except MinisimError as error:
         raise InputError(f"{title}: {error}") from None
-    except Exception as error:  # the caller's own class may raise anything
+    except (Exception, SystemExit) as error:  # the caller's own class may raise anything
         raise InputError(f"{title} cannot be made: {type(error).__name__}: {error}") from error
 
 

@@ -36,9 +36,10 @@ from minisim.errors import (
     number,
     show,
 )
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
-from minisim.parameters import declared, part, real, reals, text, word
+from minisim.parameters import Reals, declared, part, real, reals, text, word
 from minisim.results.run import Run
 from minisim.simulation import simulate
 from minisim.vehicle import VehicleType
@@ -62,13 +63,11 @@ class ContractError(MinisimError, AssertionError):
 class SmallScenario:
     """A scenario for tests: SUMO's passenger car at 14 m/s, and roads that empty at the end."""
 
-    bearings: tuple[float, ...] = reals(
+    bearings: Reals[tuple[float, ...]] = reals(
         "of the arms, clockwise from north", "deg", default=(0.0, 90.0, 180.0, 270.0)
     )
-    side: Literal["left", "right"] = word("of driving", ("left", "right"), default="left")
-    density: float = real(
-        "mean inflow while demand lasts", "veh/h/lane", default=350.0, low=0, high=MAX_DENSITY
-    )
+    side: Literal["left", "right"] = word("of the road", ("left", "right"), default="left")
+    density: float = real("mean inflow", "veh/h/lane", default=350.0, low=0, high=MAX_DENSITY)
     demand_time: float = real("vehicles come until then", "s", default=300.0, above=0, high=1e6)
     drain: float = real("how much longer the run goes on", "s", default=0.0, low=0, high=1e6)
     warmup: float = real("nothing before it is measured", "s", default=0.0, low=0)
@@ -79,7 +78,7 @@ class SmallScenario:
     name: str = text("of the scenario", default="small")
     profile_name: str = text("of its profile", default="test")
     depart_speed: float | None = real(
-        "the most at insertion; none is the highest safe one", "m/s", default=None, optional=True
+        "highest at insertion; none means the highest safe", "m/s", default=None, optional=True
     )
 
     def __post_init__(self) -> None:
@@ -99,7 +98,9 @@ class SmallScenario:
     def site(self, seed: int) -> Site:
         """What a controller may know about it."""
         demand = Demand(density=self.density).rates(self.intersection.n)
-        return Site(self.intersection, self.vehicle, self.speed_limit, demand, self.dt, seed)
+        return Site(
+            self.intersection, Fleet((self.vehicle,)), self.speed_limit, demand, self.dt, seed
+        )
 
     def arrivals(self, seed: int) -> Arrivals:
         """Arrivals in the first `demand_time` seconds."""
@@ -136,8 +137,7 @@ def check_controller(
 
     A controller is a recipe: it compares, hashes, prints and pickles like a value, and runs
     leave no trace in it. Its sessions answer views with valid commands. The same seed gives the
-    same trips, even from a pickled copy or after other runs. No vehicles collide, and all are
-    served once the demand is over.
+    same trips, even from a pickled copy or after other runs. None collides, and all are served.
 
     Args:
         controller: to check.
@@ -172,7 +172,7 @@ def check_controller(
         _check_served(controller, first)
         again = _disturbed(controller, scenario, run)
         for other, problem in (
-            (again, "a second run with the same seed gave other trips; a run left its traces"),
+            (again, "a second run with the same seed gave other trips; a run left traces"),
             (_watched(copy), "a pickled copy gave other trips"),
         ):
             trips = run(scenario, other, 1, on_collision="record").trips
@@ -298,11 +298,9 @@ def _simulate_in(host: str | Simulate) -> Simulate:
 def _check_arrivals(controller: Controller, run: Run) -> None:
     drawn = run.scenario.arrivals(run.seed)
     met = Arrivals(run.columns.demand_time, run.columns.lane, run.columns.manoeuvre)
-    same = all(
-        getattr(met, of).tolist() == getattr(drawn, of).tolist()
-        for of in ("time", "lane", "manoeuvre")
-    )
-    _require(same, controller, "the run did not meet the arrivals of its scenario and seed")
+    columns = ("time", "lane", "manoeuvre")
+    same = all(getattr(met, of).tolist() == getattr(drawn, of).tolist() for of in columns)
+    _require(same, controller, "the run did not use the arrivals of its scenario and seed")
 
 
 def _check_served(controller: Controller, run: Run) -> None:
@@ -310,7 +308,7 @@ def _check_served(controller: Controller, run: Run) -> None:
     lanes = ", ".join(sorted({ARM_NAMES[lane] for lane in waiting}))
     unserved = f"{len(waiting)} of {len(run.columns.lane)} vehicles were never served"
     where = f"on {run.site.intersection.n} arms (lanes {lanes})"
-    after = f"{run.scenario.horizon:.0f} s after the first could come"
+    after = f"within {run.scenario.horizon:.0f} s"
     _require(not waiting, controller, f"{unserved} {where}, {after}")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from minisim.errors import InputError
-from minisim.parameters import declared, real, switch, text, word
+from minisim.parameters import Switch, declared, real, switch, text, word
 
 #: SUMO's `POSITION_EPS` [m].
 POSITION_EPS = 0.1
@@ -30,7 +30,7 @@ class Model(NamedTuple):
 def _idm_braking(a: float, b: float) -> float:
     """How hard the IDM brakes, plus a quarter [m/s²].
 
-    It brakes at k²/b, less up to a by its free-road term; k = v²/2s is just enough. So
+    It brakes at k²/b minus its free-road term, at most a; k = v²/2s is just enough. So
     k²/b − a = k at k = (b + √(b² + 4ab))/2.
     """
     return 1.25 * (b + math.sqrt(b * b + 4.0 * a * b)) / 2.0
@@ -90,7 +90,7 @@ class VehicleType:
     )  # fmt: skip
     sumo: str | None = word(
         "the version of SUMO whose vehicles it drives like, from insertion to arrival, at stop "
-        "lines and inside the junction; only with krauss; none for minisim's own rules",
+        "lines and inside the junction; only with krauss; none means minisim's own rules",
         ("1.18",), optional=True, default=None, label="SUMO version of a vehicle",
     )  # fmt: skip
     name: str = text(
@@ -105,10 +105,10 @@ class VehicleType:
 
     def __post_init__(self) -> None:
         if self.model == "cc" and not isinstance(self, CruiseVehicle):
-            raise InputError("the car-following model 'cc' goes with a CruiseVehicle")
+            raise InputError("the car-following model 'cc' needs a CruiseVehicle")
         if self.sumo is not None and self.model not in ("krauss", "cc"):
             raise InputError(
-                f"sumo={self.sumo!r} goes with the car-following model 'krauss', not {self.model!r}"
+                f"sumo={self.sumo!r} needs the car-following model 'krauss', not {self.model!r}"
             )
         if self.max_deceleration < self.needed_braking:
             raise InputError(
@@ -187,12 +187,12 @@ class CruiseVehicle(VehicleType):
         "upper bound before and inside the junction (maxSpeed)", "m/s",
         default=55.55, above=0, high=100,
     )  # fmt: skip
-    obeys: bool = switch(
+    obeys: Switch = switch(
         "whether it keeps to limits and lights by itself, but late: it brakes once it is in a "
         "turn, runs amber and stops dead at red (SUMO's speed mode 31; false is 0)", default=False,
     )  # fmt: skip
     sumo: str = word(
-        "the version of SUMO whose radar it has; that of the published runs saw more",
+        "the version of SUMO whose radar it has; 1.18, of the published runs, sees more",
         ("1.18", "1.28"), default="1.18", label="SUMO version of a CruiseVehicle",
     )  # fmt: skip
     model: str = word(

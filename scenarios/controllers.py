@@ -61,7 +61,7 @@ class Entry(NamedTuple):
     name: str  # without parameters
     make: type[Any]  # declares the parameters; its docstring's first line is the help text
     variants: tuple[Variant, ...] = (Variant(),)  # those that have a look or are rivals
-    as_run: str = ""  # what the bare name means under the profile `as_run`, if not the same
+    as_run: str = ""  # what the bare name means under the profile `as_run`, if different
 
 
 def _rival(look: Look) -> tuple[Variant]:
@@ -112,7 +112,7 @@ SAFE = tuple(name for name in VARIANTS if cover_of(CONTROLLERS[name.partition(":
 #: A class of a caller's own: module or file, class, arguments.
 _CLASS = re.compile(r"(.+?):([A-Za-z_]\w*)(?:\((.*)\))?", re.DOTALL)
 
-#: The same with a slip: a dot for the colon, no brackets, or one too few.
+#: The same with a slip: a dot for the colon, no brackets, or one missing.
 _ALMOST = re.compile(r"([\w./-]+)[:.]([A-Z]\w*)(|\W.*)", re.DOTALL)
 
 #: What is allowed besides the known names.
@@ -138,6 +138,12 @@ def controller_named(
     return as_controller(call.name, build(name, maker_of(name), call))
 
 
+def label_of(series: str) -> str:
+    """What figures and reports call a variant; the name itself if it has no look."""
+    variant = VARIANTS.get(series)
+    return variant.look.label if variant and variant.look else series
+
+
 def read_spec(spec: str | Mapping[str, Any]) -> Call:
     """Split a controller's text or table into its name and arguments; raises `InputError`."""
     if isinstance(spec, Mapping):
@@ -156,9 +162,7 @@ def read_spec(spec: str | Mapping[str, Any]) -> Call:
         return Call(spec)
     call = parse_arguments(head, rest)
     if call.places or not call.named:
-        raise InputError(
-            f"parameters of {head} are written {head}:key=value,key=value, got {show(spec)}"
-        )
+        raise InputError(f"parameters are written {head}:key=value,key=value, got {show(spec)}")
     return call
 
 

@@ -1,7 +1,6 @@
 """Turns a path on which the protocol is unsafe into arrivals that make simulated vehicles collide.
 
-The model has no clock: it gives the order of the vehicles, and the simulator finds out when the
-last one has to come.
+The model has no clock: it gives the order of the vehicles; we find out when the last has to come.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from minisim.arrivals import Arrivals
 from minisim.simulation import simulate
 from scenarios.scenario import Scenario
 
-#: The largest delay of the last vehicle [s]. No vehicle takes that long from the start of the
-#: yellow zone through the junction.
+#: The largest delay of the last vehicle [s]: longer than any drive from yellow zone to exit.
 LATEST = 10.0
 
 #: Simulated time after the last demand [s]: twice 500 m at 10 m/s.

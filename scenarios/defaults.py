@@ -13,6 +13,8 @@ AXES: dict[str, Any] = {
     "split": "balanced",
     "turns": "uniform",
     "density": 350.0,
+    "unit": "veh",
+    "fleet": None,
     "arrivals": None,
     "controller": "dim",
     "humans": 0.0,

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from minisim.errors import InputError, MinisimError
 from minisim.files import markdown_table, write_table, write_text
-from minisim.parameters import declared, real, reals, whole
+from minisim.parameters import Reals, declared, real, reals, whole
 from minisim.results.metrics import heading
 from minisim.version import __version__
 from scenarios.controllers import controller_named
@@ -46,7 +46,7 @@ PROFILE = "fair"
 class Tour:
     """What the tour simulates."""
 
-    densities: tuple[float, ...] = reals(
+    densities: Reals[tuple[float, ...]] = reals(
         "mean inflows per lane", "veh/h/lane", default=(150.0, 200.0, 250.0, 300.0, 350.0)
     )
     seeds: int = whole("runs per point", low=2, default=5)

@@ -30,8 +30,7 @@ _texts: dict[Path, bytes] = {}
 def load_class(module: str, name: str) -> type:
     """A class, given its own name and the name of its module or the path of its file.
 
-    `InputError` for no such module or class, or one that cannot be imported; it names the file and
-    line if they are known.
+    `InputError` for no such module or class, or one that cannot be imported, with file and line.
     """
     loaded = _module(*_place(module))
     kind = getattr(loaded, name, None)
@@ -51,7 +50,7 @@ def has_source(module: str) -> bool:
 
 
 def is_maker(kind: type) -> bool:
-    """Whether a class can make controllers, as far as it tells."""
+    """Whether a class can make controllers, as far as it shows."""
     return hasattr(kind, "start") and not getattr(kind, "_is_protocol", False)
 
 
@@ -166,9 +165,7 @@ def _check_own(module: ModuleType | None, file: Path) -> None:
     """Raise `InputError` if a module was imported from another file."""
     origin = getattr(module, "__file__", None) or ""
     if module is not None and Path(origin).resolve() != file.resolve():
-        raise InputError(
-            f"{file} has the name of another module, {module.__name__}; rename the file"
-        )
+        raise InputError(f"{file} has the name of another module, {module.__name__}; rename it")
 
 
 @contextmanager

@@ -41,8 +41,7 @@ SPLITS = ("balanced", "4:3:2:1", "4:1:4:1")
 
 #: Mean inflow per lane [veh/h] -> green [s] in the published fixed-time runs: Webster's, rounded as
 #: in the paper's table. The 5 and 7 s follow from the trips, whose cycles last 28 and 36 s. The
-#: 61.75 s is in the network file, and the 19.25 s (the table prints 19.75) is in that of the
-#: adaptive signal.
+#: 61.75 s is in the network file, the 19.25 s (printed 19.75) in that of the adaptive signal.
 GREENS = {150: 5.0, 200: 7.0, 250: 10.75, 300: 19.25, 350: 61.75}
 
 #: The published signals' phases begin with netconvert's first link: south, east, north, west.
@@ -174,8 +173,8 @@ def replay(
         scenario(split, density, arms, controller, profile=profile),
         recorded=published_arrivals(split, density, arms, controller),
     )
-    vehicle, junction = made.profile.vehicle, made.intersection
-    if vehicle.sumo is None or junction.ways is None:
+    vehicle, road = made.profile.vehicle, made.intersection
+    if vehicle.sumo is None or road.ways is None:
         return made
     turnarounds, network = TURNAROUNDS[split] if arms == 4 else "", ""
     if sumo != "1.18":
@@ -190,9 +189,7 @@ def replay(
         network = "waiting" if controller == "fts" and split == RENAMED else "signals"
     ways = published_ways(arms, turnarounds, network)
     return replace(
-        made,
-        intersection=replace(junction, ways=ways),
-        profile=replace(made.profile, vehicle=vehicle),
+        made, intersection=replace(road, ways=ways), profile=replace(made.profile, vehicle=vehicle)
     )
 
 

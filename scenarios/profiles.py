@@ -19,7 +19,7 @@ class Profile:
     vehicle: VehicleType = part("the type of all vehicles", VehicleType)
     speed_limit: float = real("of the roads", "m/s", above=0, high=100)
     depart_speed: float | None = real(
-        "the most at insertion; None is the highest safe speed up to the limit", "m/s",
+        "highest at insertion; none means the highest safe one up to the limit", "m/s",
         low=0, optional=True, default=None,
     )  # fmt: skip
     dt: float = real("step", "s", low=0.001, high=0.5, default=0.1)
@@ -54,9 +54,9 @@ _CRUISING = CruiseVehicle(
 
 #: How the published numbers arose: SUMO's `CC` vehicle as the authors' route file defines it
 #: (length 4, minGap 2, maxSpeed 20, accel 50, decel 1000, tauEngine 0.5, ccAccel 4; its `ccDccel`
-#: is a slip of the pen, so that SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed
-#: limits ignored, step 0.01 s, in SUMO 1.18. `deceleration` is for controllers and hold lines,
-#: which the authors' DIM has none of: the strongest braking that the cruise control asks for.
+#: is a typing error, so SUMO's default 1.5 holds), headway 1.5 s, inserted at rest, speed
+#: limits ignored, step 0.01 s, in SUMO 1.18. `deceleration` is for controllers and hold lines
+#: (the authors' DIM has none): the strongest braking that the cruise control asks for.
 AS_RUN = Profile(
     name="as_run",
     vehicle=_CRUISING,
@@ -65,11 +65,11 @@ AS_RUN = Profile(
     dt=0.01,
 )
 
-#: `AS_RUN` in SUMO's speed mode 31, set by the driver of the fixed-time signal at unequal inflow.
+#: `AS_RUN` in SUMO's speed mode 31, which the fixed-time signal's script sets at unequal inflow.
 AS_RUN_OBEYING = replace(AS_RUN, name="as_run_obeying", vehicle=replace(_CRUISING, obeys=True))
 
-#: How the published numbers of the two signals arose where the inflow was balanced, and those of
-#: the adaptive one also at 4:1:4:1: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
+#: How the published numbers of both signals arose at balanced inflow, and those of the adaptive
+#: signal at 4:1:4:1 too: SUMO's Krauss without its random part, tau 1 (`carFollowModel`
 #: is not given), accel 50, decel 1000, length 4, minGap 2; drivers' speed factors N(1, 0.1), which
 #: SUMO gives by default (0.80 … 1.24 in the published trips); inserted at rest on roads of
 #: 14 m/s, with steps of 0.01 s.

@@ -15,8 +15,7 @@ from minisim.junction.paths import Way
 from minisim.recorded import read_arrivals
 
 #: The letters of the arms, clockwise from north, in the authors' networks since 10 August 2023,
-#: when the runs at 4:1:4:1 were made (in `my_network.net.xml` as of then, b+ comes from the south
-#: and c+ from the east).
+#: when the runs at 4:1:4:1 were made (in their `my_network.net.xml`, b+ is south and c+ east).
 RENAMED, RENAMED_ARMS = "4:1:4:1", "acbd"
 
 #: Numbers of arms of the published junctions.
@@ -33,14 +32,12 @@ def published_ways(arms: int, turnarounds: str | None = None, network: str = "")
 
     Args:
         arms: how many.
-        turnarounds: arms at whose far end the road leads back; None is as in the networks of the
-            authors.
+        turnarounds: arms at whose far end the road leads back; None: as in the authors' networks.
         network: "signals" for that of the signals, "waiting" for that of the fixed-time signal at
-            4:1:4:1; both have 4 arms. They differ in the places to wait inside for vehicles that
-            turn far: none, and one on each such way, where the others have two.
+            4:1:4:1. They differ in the places to wait inside for vehicles that turn far: none, and
+            one on each such way, where the others of 4 arms have two.
 
-    Raises:
-        InputError: another number of arms.
+    Raises `InputError` for another number of arms.
     """
     choice("arms of a published junction", str(arms), [str(n) for n in PUBLISHED_ARMS])
     name = "_".join(filter(None, (f"{arms}way", network)))

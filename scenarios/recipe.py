@@ -6,7 +6,7 @@ run.summary()
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from dim import Dim, Mixed
@@ -14,8 +14,8 @@ from minisim.control import Controller, as_controller
 from minisim.errors import InputError, show
 from minisim.hosting import REACTIONS
 from minisim.names import name_of
-from minisim.parameters import checked, declared, part, real, text, whole, word
-from minisim.results.metrics import Metric, asked_metrics
+from minisim.parameters import Spelled, Takes, checked, declared, part, real, text, whole, word
+from minisim.results.metrics import Asked, Metric, asked_metrics
 from minisim.results.run import Run
 from scenarios.controllers import controller_named
 from scenarios.loading import metrics_named
@@ -39,7 +39,7 @@ class Recipe:
     """
 
     scenario: Scenario = part("what is simulated", Scenario)
-    controller: Controller = checked(
+    controller: Spelled[Controller] = checked(
         "decides which vehicles go; a text or table as for `controller_named` means the same",
         _controller, "Controller",
     )  # fmt: skip
@@ -48,14 +48,12 @@ class Recipe:
         "share of human drivers among the vehicles of DIM",
         low=0, high=1, default=0.0, label="share of humans",
     )  # fmt: skip
-    label: str = text(
-        "what rows call the controller; its own name if empty", empty=True, default=""
-    )
+    label: str = text("what rows call the controller; if empty, its name", empty=True, default="")
     on_collision: str = word(
         "a collision ends the run, is noted, or removes a vehicle (SUMO, cruise control)",
         REACTIONS, default="stop",
     )  # fmt: skip
-    metrics: tuple[str | Metric, ...] = checked(
+    metrics: Takes[tuple[str | Metric, ...], str | Iterable[Asked]] = checked(
         "columns besides the usual ones (`minisim.results.metrics`)",
         lambda _, value: metrics_named(value),
         "names, module:name and Metrics", default=(),
@@ -93,6 +91,5 @@ class Recipe:
 
         if any(metric.needs == "trajectories" for metric in asked_metrics(self.metrics)):
             options["record"] = options.get("record") or "junction"
-        return (host or simulate)(
-            self.scenario, self.driven, self.seed, on_collision=self.on_collision, **options
-        )
+        options["on_collision"] = self.on_collision
+        return (host or simulate)(self.scenario, self.driven, self.seed, **options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from minisim.arrivals import Arrivals, Demand
 from minisim.control import Site
 from minisim.errors import InputError, number
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from minisim.recorded import clock
@@ -19,11 +20,14 @@ class Scenario:
     intersection: Intersection = part("the geometry", Intersection)
     demand: Demand = part("what to draw arrivals from", Demand)
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
+    fleet: Fleet | None = part(
+        "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
+    )
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
     )
     warmup: float = real(
-        "nothing before it is measured: no trip demanded, no close call, no count; only "
+        "trips demanded, close calls and counts before it are left out; only "
         "collisions always count", "s", low=0, default=0.0,
     )  # fmt: skip
     recorded: Arrivals | None = part(
@@ -33,11 +37,15 @@ class Scenario:
     def __post_init__(self) -> None:
         number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
-        self.demand.rates(n)
+        allowed = self.intersection.allowed_by_lane
+        self.demand.rates(n, allowed)
         if self.demand.turns is not None and len(self.demand.turns) != n - 1:
             raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        self.vehicles.check(n)
         if self.recorded is not None:
-            self.recorded.check(n)
+            self.recorded.check(n, allowed)
+            if self.recorded.type is not None:
+                self.vehicles.indices(self.recorded.type)
             if len(self.recorded) and (first := self.recorded.time[0]) >= self.horizon:
                 raise InputError(
                     f"no vehicle comes within the horizon of {self.horizon:g} s: the first "
@@ -46,19 +54,26 @@ class Scenario:
                 )
 
     @property
+    def vehicles(self) -> Fleet:
+        """The fleet, or the profile's vehicle as one."""
+        return self.fleet or Fleet((self.profile.vehicle,))
+
+    @property
     def profile_name(self) -> str:
         """The name of its profile."""
         return self.profile.name
 
     @property
     def depart_speed(self) -> float | None:
-        """The most at insertion [m/s]; None means the highest safe one."""
+        """Highest speed at insertion [m/s]; None means the highest safe one."""
         return self.profile.depart_speed
 
     @property
     def density(self) -> float:
         """Mean inflow per lane [veh/h], as demanded or as recorded."""
-        return self.demand.density if self.recorded is None else sum(self.rates) / len(self.rates)
+        if self.recorded is None:
+            return self.demand.density
+        return sum(self.rates) / len(self.intersection.approaches)
 
     @property
     def rates(self) -> tuple[float, ...]:
@@ -66,13 +81,13 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        return self.demand.rates(n)
+        return self.demand.rates(n, self.intersection.allowed_by_lane)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
         return Site(
             intersection=self.intersection,
-            vehicle=self.profile.vehicle,
+            fleet=self.vehicles,
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,
@@ -83,4 +98,5 @@ class Scenario:
         """The arrival table for one seed, the same for every controller."""
         if self.recorded is not None:
             return self.recorded.between(0.0, self.horizon)
-        return self.demand.draw(self.intersection.n, self.horizon, seed)
+        junction = self.intersection
+        return self.demand.draw(junction.n, self.horizon, seed, junction.allowed_by_lane)

@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from minisim.errors import InputError, integer, numbers
 
-#: Of every interval here.
+#: The level of all intervals.
 CONFIDENCE = 0.95
 
-#: A queue is growing if its increase exceeds this many standard deviations of chance; a normal
-#: variable does so in 1 % of cases.
+#: A queue grows if it gains more standard deviations than this; by chance, 1 % of normal ones do.
 GROWTH_SCORE = 2.326
 
 #: The shortest horizon that can show growth, in travel times on a free road. In a shorter one, the
@@ -95,8 +94,7 @@ def ks_distance(first: npt.ArrayLike, second: npt.ArrayLike) -> float:
     """Largest distance between two empirical distribution functions, sup |F₁(x) − F₂(x)|.
 
     The statistic of Kolmogorov and Smirnov (Smirnov 1939): 0 for equal samples, 1 for samples that
-    do not overlap; scipy's takes a second to import. `InputError` for an empty sample or a value
-    that is not finite.
+    do not overlap; scipy's takes a second to import. `InputError` for an empty or infinite sample.
     """
     samples = [np.sort(np.asarray(numbers("sample", s))) for s in (first, second)]
     if not all(map(len, samples)):

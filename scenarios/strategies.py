@@ -20,14 +20,19 @@ from typing import Literal
 
 from minisim.arrivals import Demand
 from minisim.control import Controller
-from minisim.errors import MissingExtraError
+from minisim.errors import InputError, MissingExtraError
+from minisim.fleet import TYPES, Fleet
+from minisim.junction.conflicts import entry_room
 from minisim.junction.geometry import MIN_ANGLE, Intersection
+from minisim.junction.movements import movements_of
+from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
 from scenarios.controllers import SAFE, controller_named
-from scenarios.profiles import FAIR, PAPER, PROFILES
+from scenarios.profiles import FAIR, PAPER
 from scenarios.scenario import Scenario
 
 try:
+    from hypothesis import assume, reject
     from hypothesis import strategies as st
 except ImportError as error:
     raise MissingExtraError("strategies need hypothesis: pip install 'minisim[testing]'") from error
@@ -63,6 +68,41 @@ def intersections(draw: st.DrawFn, min_arms: int = 3, max_arms: int = 6) -> Inte
 
 
 @st.composite
+def roads(draw: st.DrawFn, n: int) -> tuple[Road, ...]:
+    """Roads of n arms: own lengths, limits and widths, some of them one-way."""
+    maybe = {
+        "length": st.sampled_from([None, 90.0, 250.0]),
+        "speed_limit": st.sampled_from([None, 3.0, 8.0, 20.0]),
+        "lane_width": st.sampled_from([None, 2.8, 4.0]),
+        "traffic": st.sampled_from(["both", "both", "in", "out"]),
+    }
+    made = st.builds(Road, **maybe)
+    return tuple(draw(st.lists(made, min_size=n, max_size=n)))
+
+
+@st.composite
+def uneven(draw: st.DrawFn, max_density: float = 250.0) -> Scenario:
+    """Short scenarios on junctions whose roads differ, and where some turns are forbidden."""
+    angles = draw(bearings(max_arms=5))
+    own = draw(roads(len(angles)))
+    names = movements_of(len(angles)).names
+    try:
+        intersection = Intersection(
+            angles, side=draw(st.sampled_from(SIDES)), arm_length=150.0, roads=own,
+            forbidden=tuple(draw(st.sets(st.sampled_from(names), max_size=3))),
+        )  # fmt: skip
+        density = draw(floats(20.0, max_density))
+        made = Scenario(
+            name="uneven", intersection=intersection, demand=Demand(density=density),
+            profile=draw(st.sampled_from([PAPER, FAIR])), horizon=120.0,
+        )  # fmt: skip
+        made.site()
+    except InputError:  # nothing may enter or leave, or a path is too tight
+        reject()
+    return made
+
+
+@st.composite
 def vehicles(draw: st.DrawFn) -> VehicleType:
     """Passenger cars: 3 … 6 m long, 1.5 … 2 m wide, driven in any ordinary way."""
     made = VehicleType(
@@ -76,6 +116,24 @@ def vehicles(draw: st.DrawFn) -> VehicleType:
         model=draw(st.sampled_from(["idm", "iidm"])),
     )
     return replace(made, max_deceleration=draw(floats(max(6.0, made.needed_braking), 12.0)))
+
+
+@st.composite
+def fleets(draw: st.DrawFn, intersection: Intersection) -> Fleet:
+    """One to five of the ready types and of random ones that fit a junction, with any shares."""
+    others = [draw(vehicles()) for _ in range(draw(st.integers(0, 2)))]
+    own = [replace(it, name=f"own {k}", model="idm") for k, it in enumerate(others)]
+    fitting = [it for it in (*TYPES.values(), *own) if entry_room(intersection, it) > 0.0]
+    some = st.lists(st.sampled_from(fitting), min_size=1, max_size=5, unique_by=lambda it: it.name)
+    types = draw(some)
+    weights = draw(st.lists(st.integers(1, 9), min_size=len(types), max_size=len(types)))
+    model = draw(st.sampled_from(["idm", "iidm", "krauss"]))
+    fleet = Fleet(
+        tuple(replace(it, model=model) for it in types),
+        tuple((weight / sum(weights),) for weight in weights),
+    )
+    assume(entry_room(intersection, fleet) > 0.0)
+    return fleet
 
 
 @st.composite
@@ -112,24 +170,6 @@ def scenarios(
         demand=draw(demands(intersection.n, max_density)),
         profile=draw(st.sampled_from([PAPER, FAIR])),
         horizon=horizon,
-    )
-
-
-@st.composite
-def emptying(draw: st.DrawFn) -> Scenario:
-    """A random junction with demand for a minute, and an hour in which to serve it."""
-    intersection = replace(draw(intersections()), arm_length=draw(st.sampled_from([80.0, 150.0])))
-    demand = draw(demands(intersection.n))
-    arrivals = demand.draw(intersection.n, 60.0, seed=draw(st.integers(0, 1000)))
-    return Scenario(
-        name="random",
-        intersection=intersection,
-        demand=demand,
-        profile=PROFILES[
-            draw(st.sampled_from(sorted(set(PROFILES) - {"as_run"})))
-        ],  # its signals are dead
-        horizon=3600.0,
-        recorded=arrivals,
     )
 
 

@@ -144,6 +144,19 @@ class ScriptedSession(NamedTuple):
 
 
 @dataclass(frozen=True)
+class EveryStep:
+    """A controller that is asked at every step, too."""
+
+    controller: Controller
+    name: str = "every-step"
+
+    def start(self, site: Site) -> Session:
+        session = self.controller.start(site)
+        plan = dataclasses.replace(session.plan, period=site.dt)
+        return ScriptedSession(plan, session.decide)
+
+
+@dataclass(frozen=True)
 class Deadly:
     """A controller that kills its process, as a bug in compiled code or a lack of memory would.
 

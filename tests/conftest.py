@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, Phase, settings
 
 from scenarios.cli.shared import terminal
 
-# On a busy machine a command would tell its progress on stderr.
+# On a busy machine a command would print its progress on stderr.
 terminal.SILENCE = math.inf
 
 # No deadline and no `too_slow`: compilation and a busy machine are no failures.
@@ -20,11 +20,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile("thorough", settings.get_profile("ci"), max_examples=600)
-# For `make mutants`: nobody reads a mutant's counterexample, so it is not made small.
+# For `make mutants`: no one reads a mutant's counterexample, so it is not shrunk.
 settings.register_profile(
-    "mutants",
-    settings.get_profile("ci"),
-    max_examples=20,
-    phases=[Phase.explicit, Phase.generate],
+    "mutants", settings.get_profile("ci"), max_examples=20, phases=[Phase.explicit, Phase.generate]
 )
 settings.load_profile("ci")

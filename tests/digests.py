@@ -128,9 +128,8 @@ def recipe_of(case: Case) -> Recipe:
     if "confidence" in extra:
         changes["perception"] = NoisyPerception(0.15, "missed", confidence=extra["confidence"])
     controller = replace(controller, **changes) if changes else controller
-    return Recipe(
-        scenario, controller, case.seed, humans=extra.get("humans", 0.0), on_collision="record"
-    )
+    humans = extra.get("humans", 0.0)
+    return Recipe(scenario, controller, case.seed, humans=humans, on_collision="record")
 
 
 def run_of(case: Case) -> Run:

@@ -6,7 +6,7 @@
     python tests/mutants.py table                  # how many, by module
     python tests/mutants.py sample 80              # names of mutants drawn at random, to `run`
 
-mutmut itself has pytest collect the tests anew for every mutant, which takes longer than running
+mutmut itself has pytest collect the tests again for every mutant, which takes longer than running
 them. Here they are collected once, and each mutant is tried in a fork of that process by the tests
 that reach the changed function, fast ones first, up to the first that fails.
 """
@@ -117,9 +117,7 @@ def _affordable(tests: Iterable[str]) -> list[str]:
 def _verdicts() -> dict[str, dict[str, int | None]]:
     """Module -> mutant -> exit code of its tests, None for those not tried yet."""
     return {
-        path.name.removesuffix(".meta"): json.loads(path.read_text(encoding="utf-8"))[
-            "exit_code_by_key"
-        ]
+        path.name.removesuffix(".meta"): json.loads(path.read_bytes())["exit_code_by_key"]
         for path in sorted(Path("mutants/dim").rglob("*.py.meta"))
     }
 

@@ -14,7 +14,7 @@ from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict, check_greens, shortest_detector
 from minisim.control import Site, View
 from minisim.names import Name
-from minisim.parameters import declared, real, switch
+from minisim.parameters import Switch, declared, real, switch
 
 #: Length of a waiting vehicle with its gap; fixed in SUMO's code [m].
 PLACE = 7.5
@@ -30,24 +30,19 @@ class Actuated:
     junction. If the last vehicle left it less than `max_gap` ago, the green goes on for the rest
     of `detector_gap`, in which that vehicle reaches the line. The green is rounded up to a whole
     second and never exceeds `max_green`. A vehicle that stands on the loop leaves no gap. Between
-    loop and line, a vehicle prolongs the green too; without `presence`, `min_green` has to serve
-    those already there when a green starts.
+    loop and line, a vehicle prolongs the green too; without `presence`, `min_green` must serve it.
     """
 
     name = Name("actuated")
 
-    max_gap: float = real(
-        "gap between two vehicles that ends the green", "s", low=0, high=3600, default=3.0
-    )
+    max_gap: float = real("gap that ends the green", "s", low=0, high=3600, default=3.0)
     detector_gap: float = real(
-        "time from the loop to the line at the speed limit; the loop is nearer where the vehicles "
+        "time from the loop to the line at the speed limit; the loop is nearer if the vehicles "
         "between could not all leave within `min_green`", "s",
         above=0, high=3600, default=2.0,
     )  # fmt: skip
-    passing_time: float = real(
-        "time of a waiting vehicle over the line", "s", low=0.1, high=60, default=1.9
-    )
-    presence: bool = switch(
+    passing_time: float = real("of a vehicle over the line", "s", low=0.1, high=60, default=1.9)
+    presence: Switch = switch(
         "whether vehicles between loop and line prolong the green; SUMO does not see them",
         default=True,
     )
@@ -77,10 +72,15 @@ class GapSession(PhaseSession):
     def __init__(self, signal: Actuated, site: Site) -> None:
         self._signal = signal
         self._detector = signal.detector(site)
-        past = self._detector - site.vehicle.length  # front bumper of a vehicle off the loop
-        marks = (past, 0.0) if signal.presence else (past,)
+        # Where the front bumper of a vehicle off the loop is.
+        fronts = tuple(dict.fromkeys(self._detector - it.length for it in site.types))
+        past = min(fronts)
+        marks = (*fronts, 0.0) if signal.presence else fronts
         # Presence counts as if the vehicle had left the loop and driven to the line at the limit.
-        self._ago = min(max(past, 0.0) / site.speed_limit, signal.max_gap - site.dt)
+        self._ago = [
+            min(max(past, 0.0) / site.limit(lane), signal.max_gap - site.dt)
+            for lane in range(site.intersection.n)
+        ]
         super().__init__(site, self._detector, signal.min_green, signal.amber, marks, signal.order)
         self._passed: set[int] = set()  # vehicles in view whose rear has left the loop
         self._left = [-math.inf] * site.intersection.n  # when the last one did so [s]
@@ -95,7 +95,7 @@ class GapSession(PhaseSession):
                 since = past / v.speed if self._exact and v.speed > 0.0 else 0.0
                 self._left[v.lane] = view.time - since
             elif self._signal.presence and v.distance >= 0.0:
-                self._left[v.lane] = max(self._left[v.lane], view.time - self._ago)
+                self._left[v.lane] = max(self._left[v.lane], view.time - self._ago[v.lane])
         self._passed = {v.id for v in passed}
 
     def judge(self, view: View, lane: int, elapsed: float) -> Verdict:

@@ -11,7 +11,7 @@ from baselines.signals.heads import lane_order
 from baselines.signals.phases import PhaseSession, Verdict
 from minisim.control import Site, View
 from minisim.names import Name
-from minisim.parameters import declared, real, switch
+from minisim.parameters import Switch, declared, real, switch
 
 #: Time after which an idle signal looks again [s]; fixed in SUMO's code.
 IDLE = 1.0
@@ -25,23 +25,20 @@ class Adaptive:
     than `min_time_loss` on the last `detector_range` metres prolongs its lane's green by the time
     it needs to reach the stop line at the speed limit, if that is before `max_green`. A green also
     goes on while the other lanes are empty. Time loss is relative to the speed that the driver
-    would like (`MSE2Collector`). Defaults are SUMO's, except for greens and amber, which are from
-    the authors' network.
+    would like (`MSE2Collector`). Defaults are SUMO's; greens and amber are the authors'.
     """
 
     name = Name("adaptive")
 
-    detector_range: float = real(
-        "length of the detectors before the junction", "m", low=1, high=1000, default=100.0
-    )
+    detector_range: float = real("length of the detectors", "m", low=1, high=1000, default=100.0)
     min_time_loss: float = real(
-        "time lost from which on a vehicle prolongs the green", "s",
+        "time lost from which a vehicle prolongs the green", "s",
         low=0, high=3600, default=1.0,
     )  # fmt: skip
     # The authors' network: `minDur`, `maxDur` and its amber.
     min_green: float = real("shortest green", "s", low=0.5, high=3600, default=3.0)
     max_green: float = real("longest green", "s", low=0.5, high=3600, default=50.0)
-    extend_max_green: bool = switch(
+    extend_max_green: Switch = switch(
         "whether a green may last longer than `max_green` while the other lanes are empty (SUMO's "
         "`extendMaxDur`)", default=False,
     )  # fmt: skip
@@ -64,7 +61,7 @@ class DelaySession(PhaseSession):
         reach = signal.detector_range
         super().__init__(site, reach, signal.min_green, signal.amber, (reach,), signal.order)
         self._signal = signal
-        self._speed_limit = site.speed_limit
+        self._limit = site.limit
         self._entered: dict[int, tuple[float, float]] = {}  # vehicle: time [s], distance [m]
 
     def see(self, view: View) -> None:
@@ -83,9 +80,10 @@ class DelaySession(PhaseSession):
         present = phases.on_detector(view, signal.detector_range)
         approaching = [v for v in present if v.distance > 0.0]
         self._entered = {v.id: self._entered[v.id] for v in approaching}
-        limit, now = self._speed_limit, view.time
+        now = view.time
         times = []
         for v in approaching:
+            limit = self._limit(v.lane)
             lost = time_loss(*self._entered[v.id], now, v.distance, limit * v.speed_factor)
             if v.lane == lane and lost > signal.min_time_loss:
                 times.append(self.duration(v.distance / limit))
@@ -102,6 +100,6 @@ class DelaySession(PhaseSession):
 def time_loss(entered: float, start: float, now: float, distance: float, limit: float) -> float:
     """∫ (1 − v/limit) dt of a vehicle that came onto a detector at `entered`, `start` m away [s].
 
-    That is the time since then, less what the way since then takes at the limit [m/s].
+    That is the time since then, less what the same way takes at the limit [m/s].
     """
     return now - entered - (start - distance) / limit

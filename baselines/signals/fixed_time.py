@@ -13,7 +13,7 @@ from baselines.signals.webster import MIN_GREEN, SignalTiming, timing_of, webste
 from minisim.control import Command, Plan, Site, View, Wake
 from minisim.errors import InputError, number, numbers
 from minisim.names import Name
-from minisim.parameters import checked, declared, real, refuse_idle, switch
+from minisim.parameters import Switch, Takes, checked, declared, real, refuse_idle, switch
 
 #: What the head of a lane shows, in order.
 _STAGES = (Colour.GREEN, Colour.AMBER, Colour.RED)
@@ -35,22 +35,19 @@ class FixedTime:
 
     name = Name("fixed-time")
 
-    greens: tuple[float, ...] | float | None = checked(
-        "green of each lane, or one number for all; none is Webster's, from the expected demand",
+    greens: Takes[tuple[float, ...] | float | None, Iterable[float] | float | None] = checked(
+        "green of each lane, or one number for all; none means Webster's for the expected demand",
         _greens, "0.5 … 3600 | one per lane, such as (20,10,20,10)", "s",
         optional=True, default=None,
     )  # fmt: skip
     amber: float = real("amber after each green", "s", low=0, high=60, default=2.0)
-    saturation_flow: float = real(
-        "saturation flow of a lane", "veh/h", low=1, high=1e5, default=1500.0
-    )
-    # Highway Capacity Manual 2000, ch. 10: amber and all-red, and a start-up loss of 2 s less the
-    # 2 s of amber that drivers still use.
+    saturation_flow: float = real("of a lane", "veh/h", low=1, high=1e5, default=1500.0)
+    # HCM 2000, ch. 10: amber and all-red; 2 s of start-up loss, less 2 s of amber that drivers use.
     lost_time: float | None = real(
-        "time of each phase in which no vehicle leaves; none is amber and all-red", "s",
+        "time of each phase in which no vehicle leaves; none means amber and all-red", "s",
         low=0, high=120, optional=True, default=None,
     )  # fmt: skip
-    equal_greens: bool = switch(
+    equal_greens: Switch = switch(
         "whether Webster's cycle is divided equally, as in the paper's unbalanced runs",
         default=False,
     )
@@ -78,38 +75,42 @@ class FixedTime:
         longer, flow = change - lost, self.saturation_flow
         capped = False
         if self.greens is None:
+            lanes = site.intersection.approaches
             optimum = webster(
-                site.demand, saturation_flow=flow, lost_time_per_phase=lost,
+                [site.demand[lane] for lane in lanes],
+                saturation_flow=flow, lost_time_per_phase=lost,
                 equal_greens=self.equal_greens, min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
             )  # fmt: skip
-            greens, capped = tuple(green - longer for green in optimum.greens), optimum.capped
+            green_of, capped = dict(zip(lanes, optimum.greens, strict=True)), optimum.capped
+            greens = tuple(
+                green_of[lane] - longer if lane in green_of else 0.0 for lane in range(n)
+            )
         else:
             greens = self.greens if isinstance(self.greens, tuple) else (self.greens,) * n
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
-        cycle = self._program(greens).cycle
+        cycle = self._program(greens, site).cycle
         return timing_of(greens, cycle, site.demand, flow, longer=longer, capped=capped)
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
-        return FixedTimeSession(site, self._program(self.timing(site).greens))
+        return FixedTimeSession(site, self._program(self.timing(site).greens, site))
 
-    def _program(self, greens: Sequence[float]) -> Program:
-        return Program(full_order(self.order, len(greens)), greens, self.amber, self.all_red)
+    def _program(self, greens: Sequence[float], site: Site) -> Program:
+        return Program(full_order(self.order, site.intersection), greens, self.amber, self.all_red)
 
 
 class Program:
     """Lanes that are green in turn, over and over; the first turns green at time 0.
 
-    What it shows follows from the time alone. `order` holds the lanes in the order of their greens;
-    times are in seconds.
+    What it shows follows from the time [s] alone. `order` holds the lanes in order of their greens.
     """
 
     def __init__(
         self, order: Sequence[int], greens: Sequence[float], amber: float, all_red: float
     ) -> None:
-        self._order = order
+        self._order, self._lanes = order, len(greens)
         stages = [time for lane in order for time in (greens[lane], amber, all_red)]
         self._starts = list(accumulate(stages[:-1], initial=0.0))  # of stages within a cycle [s]
         self.cycle = math.fsum(greens[lane] + amber + all_red for lane in order)  # [s]
@@ -117,7 +118,7 @@ class Program:
     def colours(self, time: float) -> list[Colour]:
         """What the heads of all lanes show from `time` [s] on."""
         k, stage = divmod(self._stage(time) % len(self._starts), len(_STAGES))
-        shown = [Colour.RED] * len(self._order)
+        shown = [Colour.RED] * self._lanes
         shown[self._order[k]] = _STAGES[stage]
         return shown
 

@@ -1,7 +1,7 @@
 """What all signals share: heads that prevent collisions, and the order of the greens.
 
 A head turns green only when no vehicle in the junction conflicts with its lane, so safety does not
-depend on the length of an amber. If vehicles look out for those that cross (`VehicleType`), it
+depend on the length of an amber. If vehicles give way to those crossing (`VehicleType`), it
 turns green at once, as the published signals did. At the end of a green, vehicles that can no
 longer stop comfortably keep their right of way; all others stop.
 """
@@ -28,6 +28,7 @@ from minisim.control import (
     stopping_distance,
 )
 from minisim.errors import InputError, choice, integer, items
+from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import checked
 from minisim.vehicle import CruiseVehicle
@@ -55,19 +56,20 @@ class Heads:
 
     def __init__(self, site: Site) -> None:
         self._rows = site.intersection.movements.rows
-        ways = [list(row[1:]) for row in self._rows]
+        allowed = site.intersection.allowed
+        ways = [[way for way in row[1:] if allowed[way]] for row in self._rows]
         # Nested lists: a plain lookup is much faster than one in a small array.
         crossed = np.array([site.conflicts[way].any(axis=0) for way in ways])
         self._crossed = crossed.tolist()  # lane, then movement
         self._exclusive = [[bool(row[way].any()) for way in ways] for row in crossed]  # by lanes
-        b, dt = site.vehicle.deceleration, site.dt
-        self._stops = lambda v: can_stop(v, b)
+        brakes, dt = [it.deceleration for it in site.types], site.dt
+        self._stops = lambda v: can_stop(v, brakes[v.type])
         self._open = [Colour.GREEN]
         if isinstance(site.vehicle, CruiseVehicle) and site.vehicle.obeys:
             self._open += [Colour.AMBER]
-            self._stops = lambda _: True  # dead, see there
+            self._stops = lambda _: True  # on the spot, see `obeys`
         elif site.looks_out:  # SUMO's own rule (`MSVehicle::planMoveInternal`)
-            self._stops = lambda v: braking_distance(v.speed, b, dt) <= v.distance
+            self._stops = lambda v: braking_distance(v.speed, brakes[v.type], dt) <= v.distance
         self._at_once = site.looks_out
         self._let_go: set[int] = set()
         self.colours = [Colour.RED] * len(ways)
@@ -119,20 +121,21 @@ def lane_order() -> Any:
         )
 
     return checked(
-        "lanes in the order of their greens, by letter or number (a is 0); none is a, b, c…",
+        "lanes in the order of their greens, by letter or number (a is 0); none means a, b, c…",
         check, "lanes such as (c,b,a,d)", optional=True, default=None,
     )  # fmt: skip
 
 
-def full_order(order: tuple[int, ...] | None, n: int) -> tuple[int, ...]:
-    """The order of n lanes; raises `InputError` unless it lists each of them once."""
-    if order is None:
-        return tuple(range(n))
-    if sorted(order) != list(range(n)):
-        raise InputError(
-            f"order must be the lanes a … {ARM_NAMES[n - 1]} (0 … {n - 1}), each once, got {order}"
-        )
-    return order
+def full_order(order: tuple[int, ...] | None, intersection: Intersection) -> tuple[int, ...]:
+    """The order of the lanes that vehicles come on.
+
+    Raises `InputError` unless it lists each of them once.
+    """
+    lanes = intersection.approaches
+    if order is not None and sorted(order) != list(lanes):
+        named = ", ".join(f"{ARM_NAMES[lane]} ({lane})" for lane in lanes)
+        raise InputError(f"order must be the lanes {named}, each once, got {order}")
+    return lanes if order is None else order
 
 
 def committed(lane: Iterable[Observed], stops: Callable[[Observed], bool]) -> list[Observed]:

@@ -22,8 +22,7 @@ class LongestQueue:
 
     One phase per approach: one lane carries all turns, so any two approaches have movements that
     conflict. Of equal queues, the one whose last green was longest ago goes first; further ties go
-    in the order a, b, c…. An empty junction keeps its green. A lane may wait long while others
-    always have more vehicles.
+    in the order a, b, c…. An empty junction keeps its green. A lane of few vehicles may wait long.
     """
 
     name = Name("longest-queue")
@@ -31,7 +30,7 @@ class LongestQueue:
     # 5–10 s are usual; the code of Genders & Razavi (arXiv 1909.00395) has 5 s for roads of
     # several lanes. A change costs some 3 s, so single lanes need the upper end.
     interval: float = real(
-        "green between two looks, counted from the green that is really shown", "s",
+        "green between two looks, counted from when the green is shown", "s",
         low=0.5, high=3600, default=10.0,
     )  # fmt: skip
     detector_range: float = real(

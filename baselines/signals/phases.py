@@ -1,8 +1,7 @@
 """What is common to signals that end their phases by a rule: one phase per approach.
 
 Between two phases the old lane shows amber. The new one turns green once no vehicle crosses its
-way any more (`Heads`). A phase is timed from when its green is shown, so the shortest and longest
-greens are what drivers see.
+way any more (`Heads`). A phase is timed from when its green is shown, so drivers see its length.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ class PhaseSession:
         sight = min(max(detector_range, stopping_sight(site)), road)
         marks = tuple(min(mark, road) for mark in marks)
         self.plan = Plan(marks=marks, wake_on_clear=True, sight=sight)
-        self._order = full_order(order, site.intersection.n)
+        self._order = full_order(order, site.intersection)
         self._heads = Heads(site)
         self._dt = site.dt
         self._exact = site.looks_out  # times its events like SUMO
@@ -99,7 +98,7 @@ class PhaseSession:
         while view.time + self._early >= self._due:
             self._rang = self._due
             self._go_on(view)
-        wanted = [Colour.RED] * len(self._order)
+        wanted = [Colour.RED] * len(self._heads.colours)
         wanted[self._lane] = self._colour
         commands = self._heads.show(view, wanted)
         if self._began is None and self._heads.colours[self._lane] is Colour.GREEN:

@@ -28,8 +28,7 @@ class SignalTiming:
     cycle: float  #: [s]
     greens: tuple[float, ...]  #: of each lane [s]
     flow_ratio: float  #: Webster's Y, the sum over the lanes of inflow over saturation flow
-    #: Degree of saturation x = qC/(sg) of each lane, with its effective green g. Above 1 its queue
-    #: grows while demand lasts.
+    #: Degree of saturation x = qC/(sg) by lane, g its effective green; above 1 its queue grows.
     saturation: tuple[float, ...]
     capped: bool = False  #: whether the optimum cycle was cut to a maximum (or does not exist)
 
@@ -45,7 +44,7 @@ def webster(
 ) -> SignalTiming:
     """Cycle and effective greens, one phase per lane: C0 = (1.5L + 5)/(1 − Y), g = (y/Y)(C0 − L).
 
-    Only if Y > 0.95, the cycle is at most `max_cycle`, even if no optimum exists (Y ≥ 1). A lane
+    `max_cycle` caps the cycle only if Y > 0.95, even if no optimum exists (Y ≥ 1). A lane
     whose share is below `min_green` gets `min_green`. That lengthens the cycle; in a capped cycle
     the other lanes share the rest. `rates` are the inflows of the lanes [veh/h]; L is
     `lost_time_per_phase` [s] times their number. `equal_greens` divides the greens equally.
@@ -84,10 +83,10 @@ def timing_of(
     greens: Iterable[float], cycle: float, rates: Iterable[float], saturation_flow: float,
     *, longer: float = 0.0, capped: bool = False,
 ) -> SignalTiming:  # fmt: skip
-    """Greens and cycle [s] under the inflows `rates` [veh/h]; effective greens are `longer` [s]."""
+    """Greens and cycle [s] for inflows `rates` [veh/h]; effective greens last `longer` [s] more."""
     greens, rates = tuple(greens), tuple(rates)
     saturation = tuple(
-        rate * cycle / (saturation_flow * (green + longer))
+        rate * cycle / (saturation_flow * (green + longer)) if rate else 0.0
         for rate, green in zip(rates, greens, strict=True)
     )
     return SignalTiming(cycle, greens, sum(rates) / saturation_flow, saturation, capped)

@@ -4,8 +4,7 @@ The numbers are from the Highway Capacity Manual (HCM, 7th edition), chapter 20,
 control, base values for a two-lane major street: for drivers at a stop sign on the minor street,
 in streams of rank 2 (right turns), 3 (straight on) and 4 (left turns) in right-hand traffic. At a
 junction of equal roads, an all-way stop (HCM chapter 21), all drivers stop and none accepts gaps.
-Drivers here do both: among themselves, the first to stop goes first, and they accept gaps between
-vehicles that need not stop.
+Drivers here do both: the first of them to stop goes first, and they accept gaps in other traffic.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from minisim.control import Observed, Site
 from minisim.junction.conflicts import CLEARANCE
 from minisim.junction.partings import parting
 from minisim.junction.turns import Turn, turns
-from minisim.parameters import declared, real, reals, word
+from minisim.parameters import Reals, declared, real, reals, word
 from minisim.streams import Draws
 
 #: What others go by to tell a human's way. "motion": only what its place and heading show.
@@ -33,11 +32,11 @@ class Humans:
     """How people drive. Triples are for the near turn, straight on, and the far turn."""
 
     # Critical gaps: HCM exhibit 20-17; follow-up times: exhibit 20-18.
-    critical_gaps: tuple[float, float, float] = reals(
+    critical_gaps: Reals[tuple[float, float, float]] = reals(
         "a driver goes first if a vehicle that need not stop arrives no sooner than this", "s",
         count=3, low=0, high=60, default=(6.2, 6.5, 7.1),
     )  # fmt: skip
-    follow_up: tuple[float, float, float] = reals(
+    follow_up: Reals[tuple[float, float, float]] = reals(
         "shortest time between two drivers of one lane", "s",
         count=3, low=0, high=60, default=(3.3, 4.0, 3.5),
     )  # fmt: skip
@@ -49,15 +48,13 @@ class Humans:
     )  # fmt: skip
     # The HCM's all-way stop has a departure headway of 3.9 s where nothing is in the way, including
     # 2.0 s for moving up (exhibit 21-15, case 1); highway design takes 2.0 s at a stop sign
-    # (AASHTO). A driver must look for longer than a vehicle with the right of way takes to move
-    # off, which is a few steps.
+    # (AASHTO). A vehicle with the right of way needs less to move off: a few steps.
     reaction: float = real(
         "time from standing at the line to moving, where nothing is in the way", "s",
         low=0.5, high=60, default=1.9,
     )  # fmt: skip
-    # 29 % of right and 25 % of left turns in right-hand traffic (Sullivan et al. 2015, Accid.
-    # Anal. Prev. 74:1).
-    unsignalled: tuple[float, float] = reals(
+    # 29 % of right, 25 % of left turns in the USA (Sullivan et al. 2015, Accid. Anal. Prev. 74:1).
+    unsignalled: Reals[tuple[float, float]] = reals(
         "share of near and of far turns that no indicator announces",
         count=2, low=0, high=1, default=(0.29, 0.25),
     )  # fmt: skip
@@ -72,12 +69,12 @@ class Driver(NamedTuple):
     """One vehicle's driver."""
 
     human: bool  #: otherwise the vehicle follows DIM
-    careless: float  #: 0 … 1; it signals no turn that a larger share of drivers leaves unsignalled
+    careless: float  #: 0 … 1; it signals a turn only if at most this share of drivers does not
     gap: float  #: factor on the critical gaps
 
 
 class Drivers:
-    """The drivers of a run, by lane and rank in it; a human at one share is one at any larger."""
+    """The drivers of a run, by lane and rank in it; a human at one share is human at any larger."""
 
     def __init__(self, humans: Humans, share: float, seed: int) -> None:
         self._share = share
@@ -126,4 +123,4 @@ class Readings:
                 return alike
             turn = shown
         meant = [q for q in alike if self.turns[q] is turn]
-        return meant or alike  # motion belies silence, or the lane has no way straight on
+        return meant or alike  # motion contradicts silence, or the lane has no way straight on

@@ -143,7 +143,9 @@ class _Humans:
     def __init__(self, mixed: Mixed, site: Site, readings: Readings) -> None:
         humans, zones = mixed.humans, mixed.dim.zones
         self._humans, self._drivers, self._readings = humans, readings.drivers, readings
-        self._clearing = clearing_distances(site.intersection, site.vehicle).tolist()
+        self._clearing = [
+            clearing_distances(site.intersection, it, site.fleet).tolist() for it in site.types
+        ]
         self._line = zones.green + LINE
         self._yellow = zones.yellow_start + ROUNDING
         self._dt = site.dt
@@ -201,11 +203,10 @@ class _Humans:
         mean_gap = self._humans.critical_gaps[self._readings.turns[own]]
         gap = self._drivers[vehicle.lane, vehicle.rank].gap * mean_gap
         comes = [v for v in rolling if v.distance <= max(self._yellow, gap * v.speed)]
-        clearing = self._clearing[own]
         trust = self._humans.trust
         # The distances are minus infinity where ways do not conflict.
         return not any(
-            clearing[way] + min(other.distance, 0.0) > 0.0
+            self._clearing[other.type][own][way] + min(other.distance, 0.0) > 0.0
             for other in (*there, *comes)
             for way in self._readings.possible(other, trust)
         )

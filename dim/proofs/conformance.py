@@ -57,7 +57,7 @@ class CheckedSession:
         self._going: set[int] = set()
 
     def decide(self, view: View) -> Iterable[Command]:
-        """DIM's commands; `ConformanceError` if one, or what has happened, is not possible."""
+        """DIM's commands; `ConformanceError` if one, or an event before it, is impossible."""
         commands = list(self._session.decide(view))
         self._follow(view)
         self.state = self.protocol.look(self.state)
@@ -82,7 +82,7 @@ class CheckedSession:
                 movement = self.protocol.matrix.movements[bit.bit_length() - 1]
                 self._take(view, Event("leave", *movement))
         for vehicle in inside.keys() - self._inside.keys():
-            raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle} is inside unseen")
+            raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle} entered unseen")
         for lane in sorted(fronts.keys() - {k for k, f in enumerate(self.state.fronts) if f}):
             self._take(view, Event("arrive", lane, fronts[lane].manoeuvre))
         self._fronts = {lane: v.id for lane, v in fronts.items()}
@@ -91,7 +91,7 @@ class CheckedSession:
         """Move on a front vehicle that is still before the junction."""
         front = self.state.fronts[vehicle.lane]
         if front is None:
-            raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle.id} came unseen")
+            raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle.id} arrived unseen")
         lane, manoeuvre, paper = vehicle.lane, vehicle.manoeuvre, self.protocol.commit == "paper"
         if paper and front.phase == WAITING and front.goes:
             self._take(view, Event("roll", lane, manoeuvre))
@@ -105,7 +105,7 @@ class CheckedSession:
         """Take a front vehicle into the junction; return its movement as a bit."""
         front = self.state.fronts[lane]
         if front is None:
-            raise ConformanceError(f"at {view.time:.1f} s a vehicle of lane {lane} went unseen")
+            raise ConformanceError(f"at {view.time:.1f} s a vehicle of lane {lane} left unseen")
         manoeuvre, phase, _ = front
         if phase == WAITING and self.protocol.commit == "paper":
             self._take(view, Event("roll", lane, manoeuvre))

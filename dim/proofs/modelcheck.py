@@ -89,9 +89,8 @@ def is_stuck(protocol: Protocol, state: State) -> bool:
 def starvation(protocol: Protocol) -> tuple[Lasso | None, ...]:
     """For each lane, the shortest way for its front vehicle to wait forever, or None.
 
-    None is a proof over all states that it cannot, if all vehicles look between any two events, a
-    vehicle that can go on eventually does, and a turn of the rotating priority is long enough for
-    a decision.
+    None proves over all states that it cannot, if all vehicles look between any two events, a
+    vehicle that can go on eventually does, and a rotating priority lasts long enough to decide.
     """
     instance("protocol", protocol, Protocol)
     reached: Reached = {protocol.start: None}

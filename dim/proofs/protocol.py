@@ -28,9 +28,9 @@ from minisim.parameters import declared, part, word
 #: "waiting": the lane whose front vehicle came first, as if every vehicle remembered it forever.
 PRIORITIES = ("fixed", "rotating", "waiting")
 
-#: Phases of a front vehicle. It has been waiting since it came; or, with commit="paper" only, it
-#: has had the right of way and may be anywhere up to the point where it is committed, and may roll
-#: on there without the right of way; or it is committed.
+#: Phases of a front vehicle. It has been waiting since it came; or it is rolling (commit="paper"
+#: only): it has had the right of way, may be anywhere before the point where it is committed, and
+#: may roll on there without the right of way; or it is committed.
 WAITING: Final = 0
 ROLLING: Final = 1
 COMMITTED: Final = 2
@@ -79,9 +79,7 @@ class Protocol:
     matrix: HarmonyMatrix = part("harmony of the movements", HarmonyMatrix)
     order: str = word("which clique is preferred", ORDERS, default="size")
     gate: str = word("what may enter while others cross", GATES, default="clear")
-    commit: str = word(
-        "when a vehicle is committed", COMMITS, label="commit rule", default="stoppable"
-    )
+    commit: str = word("when a vehicle commits", COMMITS, label="commit rule", default="stoppable")
     priorities: str = word("which lane comes first at a tie", PRIORITIES, default="fixed")
 
     @property
@@ -100,8 +98,7 @@ class Protocol:
             yield TURN, state._replace(turn=(state.turn + 1) % self.matrix.n, decided=False)
 
     def arrivals(self, state: State) -> Iterator[Step]:
-        """A vehicle comes to the front of a lane: at the start of the yellow zone, or behind one
-        that has just entered the junction."""
+        """A vehicle comes to the front of a lane: at the yellow zone, or when another enters."""
         for lane, front in enumerate(state.fronts):
             if front is None:
                 came = (*state.came, lane) if self.priorities == "waiting" else ()
@@ -136,8 +133,7 @@ class Protocol:
         """All vehicles decide (Algorithm 1, lines 4 to 12).
 
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
-        are, and the gate "harmonious" keeps out any that conflict with a crossing one. Of the
-        others, only the best clique goes.
+        are, and "harmonious" keeps out those in conflict. Of the others, the best clique goes.
         """
         n, rows, bits = self.matrix.n, self.matrix.movements.rows, self.matrix.movements.bits
         there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]

@@ -22,8 +22,7 @@ from dim.perception import Percept
 from minisim.errors import InputError
 
 #: Up to this number of arms, the participants are listed in every order (120 per case with 5 arms);
-#: beyond it, only as each participant would list them: itself first, then the others around the
-#: junction, in either direction.
+#: beyond it, only as each would list them: itself first, then the others around, either way.
 ALL_ORDERS = 5
 
 Lanes = int  #: a set of lanes, bit i for lane i
@@ -98,9 +97,7 @@ def analyse(
     table = DecisionTable(matrix, order, priorities)
     n, total = matrix.n, len(table)
     if total > MAX_CASES:
-        raise InputError(
-            f"{n} arms have {total} cases, too many to try them all (at most {MAX_CASES})"
-        )
+        raise InputError(f"{n} arms have {total} cases, too many to try all (at most {MAX_CASES})")
     checks = Case(table)
     failures: Counter[str] = Counter()
     examples: dict[str, Movements] = {}
@@ -158,7 +155,7 @@ def brute_force(movements: Movements, matrix: HarmonyMatrix) -> Cliques:
 
 
 def preferred(cliques: Iterable[Lanes], by_priority: Sequence[int]) -> tuple[Lanes, ...]:
-    """What remains of tied cliques by the paper's wording, with the lanes by priority.
+    """Which tied cliques the paper's wording prefers, with the lanes by priority.
 
     "The clique with the highest priority lanes" holds the first lane, if any does, then the second…
     """
@@ -236,9 +233,8 @@ class Case:
                 choose(maximal_cliques(order, matrix), table.order, table.priorities)
                 for order in node_orders(movements, matrix.n)
             )
-            self._same_order[graph] = all(
-                sum(1 << m.origin for m in clique) == decision for clique in chosen
-            )
+            decisions = {sum(1 << m.origin for m in clique) for clique in chosen}
+            self._same_order[graph] = decisions == {decision}
         return self._same_order[graph]
 
 
@@ -246,8 +242,7 @@ def most_cliques(k: int) -> int:
     """The most maximal cliques that any graph of k ≥ 1 nodes can have.
 
     Moon & Moser, "On cliques in graphs", Israel J. Math. 3 (1965): 3^(k/3), or as close to it as
-    groups of 2, 3 and 4 nodes can come. That graph has cliques of only one size, so this is also
-    the bound for cliques that tie.
+    groups of 2, 3 and 4 nodes can come. All cliques of that graph have one size, so they tie.
     """
     if k < 2:
         return 1

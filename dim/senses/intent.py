@@ -1,8 +1,7 @@
 """How a vehicle's intent is shown, how others read it, and how sure they are.
 
 A driver may turn without a signal, and a shown intent may be misread, by each reader on its own or
-by all alike. A table of probabilities, true manoeuvre × read manoeuvre, describes both, and tells
-how likely a reading is to be right.
+by all alike. A table of probabilities, true × read manoeuvre, tells how sure a reading is.
 """
 
 from __future__ import annotations
@@ -63,11 +62,9 @@ class Lane:
         others = [m for m in range(1, len(self.silent) + 1) if m != shown]
         return others[int(chance / self.error * len(others))]
 
-    def confidence(
-        self, draws: Draws, manoeuvre: int, read: int, vehicle: int, *when: int
-    ) -> float:
+    def confidence(self, draws: Draws, manoeuvre: int, read: int, vehicle: int, *at: int) -> float:
         """How sure the reader is: of many readings with this confidence, this share is right."""
-        chances = draws.uniform(_SURE, vehicle, *when), draws.uniform(_MISTAKEN, vehicle, *when)
+        chances = draws.uniform(_SURE, vehicle, *at), draws.uniform(_MISTAKEN, vehicle, *at)
         return confidence(self.doubt[read - 1], read == manoeuvre, chances)
 
 
@@ -91,11 +88,8 @@ def confusion(straight: int, silent: tuple[float, ...], error: float, kind: str)
 
 def doubts(table: Table) -> tuple[float, ...]:
     """How likely each reading is to be wrong, by Bayes' rule for equally frequent manoeuvres."""
-    columns = list(zip(*table, strict=True))
-    return tuple(
-        1.0 - column[m] / sum(column) if sum(column) > 0.0 else 0.0
-        for m, column in enumerate(columns)
-    )
+    columns = enumerate(zip(*table, strict=True))
+    return tuple(1.0 - of[m] / sum(of) if sum(of) > 0.0 else 0.0 for m, of in columns)
 
 
 def confidence(doubt: float, right: bool, chances: tuple[float, float]) -> float:

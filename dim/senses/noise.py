@@ -17,7 +17,7 @@ from dim.perception import ROUNDING, UNKNOWN, See, see_all
 from dim.senses.intent import KINDS, Lane
 from dim.senses.sight import Bodies, Body
 from minisim.control import Observed, Site, View
-from minisim.parameters import declared, real, reals, switch, word
+from minisim.parameters import Reals, Switch, declared, real, reals, switch, word
 from minisim.streams import Draws
 
 #: Error of published manoeuvre classifiers: Phillips, Wheeler, Kochenderfer (IEEE IV 2017), more
@@ -29,6 +29,10 @@ CLASSIFIER = 0.15
 #: baseline naturalistic driving", AAP 74, 2015). SAE 2012-01-0261 (Ponziani): 25 % of all turns.
 UNSIGNALLED = (0.29, 0.25)
 
+#: 10 Hz, like rotating lidars and V2V safety messages [s]. So what happens is seen up to one frame
+#: late, or 0.6 m at 20 km/h.
+FRAME = 0.1
+
 _ALL = -1  # stands for all observers or all moments in a draw
 _POSITION, _SPEED = 8, 9  # what a draw is for; above the purposes in `dim.senses.intent`
 
@@ -37,51 +41,52 @@ _POSITION, _SPEED = 8, 9  # what a draw is for; above the purposes in `dim.sense
 class NoisyPerception:
     """How vehicles misperceive each other; by default they do not.
 
-    Parameters of errors that never happen are allowed: a series may begin without errors.
+    Parameters of errors that never happen are allowed, so a series can start without errors.
     """
 
     intent_error: float = real(
         "probability that a shown intent is misread", low=0, high=1, default=0.0
     )
     kind: str = word(
-        "how: a turn's signal is not seen, or a manoeuvre is taken for any other one alike",
+        "how: a turn's signal is missed, or any other manoeuvre is equally likely to be read",
         KINDS, default="missed", label="kind of intent error",
     )  # fmt: skip
-    shared: bool = switch(
+    shared: Switch = switch(
         "whether all observers err alike (a dirty lamp, the sun), or each on its own", default=True
     )
-    persistent: bool = switch(
-        "whether an error lasts as long as the vehicles meet, or every frame errs anew",
+    persistent: Switch = switch(
+        "whether an error lasts as long as the vehicles meet, or is redrawn each frame",
         default=True,
     )
-    unsignalled: tuple[float, float] = reals(
+    unsignalled: Reals[tuple[float, float]] = reals(
         "shares of near and of far turns without a signal, which all others take for straight on; "
         "0.29 and 0.25 are published",
         count=2, low=0, high=1, default=(0.0, 0.0), label="unsignalled shares of turns",
     )  # fmt: skip
     confidence: float | None = real(
         "an intent read with less confidence is unknown: the vehicle may take any manoeuvre; none "
-        "takes every reading as it is",
+        "believes every reading",
         above=0, high=1, optional=True, default=None,
     )  # fmt: skip
     sensor_range: float | None = real(
-        "how far a vehicle sees, from centre to centre; none has no end", "m",
+        "how far a vehicle sees, from centre to centre; none means no limit", "m",
         low=1, high=1000, optional=True, default=None,
     )  # fmt: skip
     # Views do not hold vehicles that have left the junction, so such vehicles block nothing.
-    occlusion: bool = switch("whether bodies block the line of sight", default=False)
+    occlusion: Switch = switch("whether bodies block the line of sight", default=False)
     delay: float = real("age of what is seen of the others", "s", low=0, high=10, default=0.0)
     position_noise: float = real(
-        "standard deviation of the others' positions along the lane, drawn anew each frame", "m",
+        "standard deviation of the others' positions along the lane, redrawn each frame", "m",
         low=0, high=20, default=0.0,
     )  # fmt: skip
     speed_noise: float = real(
-        "standard deviation of the others' speeds, drawn anew each frame", "m/s",
+        "standard deviation of the others' speeds, redrawn each frame", "m/s",
         low=0, high=20, default=0.0,
     )  # fmt: skip
-    # 10 Hz, like rotating lidars and V2V safety messages. So what happens is seen up to one frame
-    # late, or 0.6 m at 20 km/h.
-    frame: float = real("time between two looks", "s", low=0.01, high=1, default=0.1)
+    frame: float | None = real(
+        f"time between two looks, at least the host's step; none is {FRAME:g} or a longer step",
+        "s", low=0.01, high=1, optional=True, default=None,
+    )  # fmt: skip
 
     @property
     def misreads(self) -> bool:
@@ -93,10 +98,12 @@ class NoisyPerception:
         """The time between two looks [s], see `Perception`."""
         moved = max(self.delay, self.position_noise, self.speed_noise) > 0.0
         errs = self.misreads or moved or self.occlusion or self.sensor_range is not None
-        return self.frame if errs else None
+        return (self.frame or FRAME) if errs else None
 
     def start(self, site: Site) -> See:
-        """Begin a run; if nothing errs, perception is exact."""
+        """Begin a run; if nothing errs, perception is exact. `InputError` for too short a frame."""
+        if self.frame is not None:
+            site.period("frame of the perception", self.frame)
         return see_all if self.period is None else _Senses(self, site).see
 
 
@@ -105,6 +112,7 @@ class _Senses:
 
     def __init__(self, recipe: NoisyPerception, site: Site) -> None:
         self._recipe = recipe
+        self._frame = recipe.frame or max(FRAME, site.dt)
         self._draws = Draws(site.seed, "perception")
         self._bodies = Bodies(site)
         self._lanes = [
@@ -120,7 +128,7 @@ class _Senses:
         """What one vehicle sees."""
         recipe = self._recipe
         seen = self._late(view) if recipe.delay else view
-        moment = math.floor(seen.time / recipe.frame + ROUNDING)
+        moment = math.floor(seen.time / self._frame + ROUNDING)
         vehicles: Iterable[Observed] = with_ego(seen.vehicles, ego) if recipe.delay else seen[1]
         if recipe.occlusion or recipe.sensor_range is not None:
             vehicles = self._visible(seen, vehicles, ego)
@@ -167,7 +175,7 @@ class _Senses:
     def _sense(self, vehicle: Observed, observer: int, moment: int) -> Observed:
         """One vehicle as an observer perceives it."""
         recipe, draws = self._recipe, self._draws
-        id, lane, manoeuvre, distance, speed, length, demand_time, rank, factor = vehicle
+        _, lane, manoeuvre, distance, speed, _, _, rank, *_ = vehicle
         key = self._key(lane, rank)
         if recipe.misreads and manoeuvre != UNKNOWN:
             when = _ALL if recipe.persistent else moment
@@ -176,9 +184,7 @@ class _Senses:
             distance += recipe.position_noise * draws.normal(_POSITION, key, observer, moment)
         if recipe.speed_noise:
             speed += recipe.speed_noise * draws.normal(_SPEED, key, observer, moment)
-        return Observed(
-            id, lane, manoeuvre, distance, max(speed, 0.0), length, demand_time, rank, factor
-        )
+        return vehicle._replace(manoeuvre=manoeuvre, distance=distance, speed=max(speed, 0.0))
 
     def _read(self, lane: int, manoeuvre: int, vehicle: int, observer: int, when: int) -> int:
         """What a manoeuvre is taken for, or `UNKNOWN`."""

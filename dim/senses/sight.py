@@ -16,12 +16,14 @@ Point = tuple[float, float]
 
 
 class Body(NamedTuple):
-    """Where a vehicle is: centre [m] and unit heading."""
+    """Where a vehicle is: centre [m] and unit heading; and half its length and width [m]."""
 
     x: float
     y: float
     ux: float
     uy: float
+    half_length: float
+    half_width: float
 
 
 class Bodies:
@@ -34,18 +36,17 @@ class Bodies:
              path.crossing)
             for path in site.intersection.paths
         ]  # fmt: skip
-        self._length = site.vehicle.length
-        self.half_length = site.vehicle.length / 2.0
-        self.half_width = site.vehicle.width / 2.0
+        self._halves = [(it.length / 2.0, it.width / 2.0) for it in site.types]
 
     def body(self, vehicle: Observed) -> Body:
         """A vehicle's body: the chord of its path between its bumpers (like `Path.pose`)."""
         way = self._ways[self._rows[vehicle.lane][vehicle.manoeuvre]]
         x, y = locate(*way, -vehicle.distance)
-        rear_x, rear_y = locate(*way, -vehicle.distance - self._length)
+        half, wide = self._halves[vehicle.type]
+        rear_x, rear_y = locate(*way, -vehicle.distance - 2.0 * half)
         norm = math.hypot(x - rear_x, y - rear_y)
         ux, uy = (x - rear_x) / norm, (y - rear_y) / norm
-        return Body(x - ux * self.half_length, y - uy * self.half_length, ux, uy)
+        return Body(x - ux * half, y - uy * half, ux, uy, half, wide)
 
     def hidden(self, eye: Body, target: Body, others: Iterable[Body]) -> bool:
         """Whether bodies block all lines from the eye's centre to a body's centre and corners."""
@@ -55,9 +56,9 @@ class Bodies:
         return all(any(self._crosses(start, end, body) for body in blocking) for end in ends)
 
     def _outline(self, body: Body) -> tuple[Point, ...]:
-        x, y, ux, uy = body
-        ax, ay = ux * self.half_length, uy * self.half_length
-        bx, by = -uy * self.half_width, ux * self.half_width
+        x, y, ux, uy, half, wide = body
+        ax, ay = ux * half, uy * half
+        bx, by = -uy * wide, ux * wide
         return (
             (x, y),
             (x + ax + bx, y + ay + by), (x + ax - bx, y + ay - by),
@@ -66,12 +67,12 @@ class Bodies:
 
     def _crosses(self, start: Point, end: Point, body: Body) -> bool:
         """Whether a line from one point to another meets a body's rectangle (Liang & Barsky)."""
-        x, y, ux, uy = body
+        x, y, ux, uy, long, wide = body
         sx, sy, dx, dy = start[0] - x, start[1] - y, end[0] - start[0], end[1] - start[1]
         first, last = 0.0, 1.0
         for at, step, half in (
-            (sx * ux + sy * uy, dx * ux + dy * uy, self.half_length),
-            (sy * ux - sx * uy, dy * ux - dx * uy, self.half_width),
+            (sx * ux + sy * uy, dx * ux + dy * uy, long),
+            (sy * ux - sx * uy, dy * ux - dx * uy, wide),
         ):
             if step == 0.0:
                 if abs(at) > half:

@@ -6,8 +6,7 @@
 - `disagreement_s`: how long there were participants that had chosen different cliques [s].
 - `deadlock_s`: how long participants waited while none crossed or had the right of way [s].
 
-The last three compare the run with the truth, which no vehicle knows. If every reading is right,
-they are 0.
+The last three compare with the truth, which no vehicle knows. If every reading is right, all are 0.
 """
 
 from __future__ import annotations
@@ -78,15 +77,13 @@ class Tally:
                 rightly.add(vehicle.id)
         return rightly
 
-    def _choices(
-        self, truth: Percept, sights: Mapping[int, View], table: DecisionTable
-    ) -> set[int]:
+    def _choices(self, true: Percept, sights: Mapping[int, View], table: DecisionTable) -> set[int]:
         """The cliques that the participants have chosen, each from the case that it sees."""
-        seen = [sights[v] for v in truth.participants]
+        seen = [sights[v] for v in true.participants]
         if seen and all(sight is seen[0] for sight in seen):
             return set()
         choices = set()
-        for vehicle, sight in zip(truth.participants, seen, strict=True):
+        for vehicle, sight in zip(true.participants, seen, strict=True):
             percept = self._reader.read(sight)
             frozen = bool(percept.crossing) and self._rules.gate == "clear"
             if vehicle in percept.participants and not frozen:

@@ -43,8 +43,7 @@ def write_animation(
     """Write `seconds` of a run as an animation in the format of the file's suffix.
 
     The run must have been recorded with `record="all"` over the time shown. There are `fps` frames
-    per second, at most one per step, and 50 in a GIF; `progress` is called with the frames done and
-    the total.
+    per second, at most one per step, and 50 in a GIF; `progress` gets frames done and the total.
 
     Raises:
         InputError: an unknown suffix, a time that was not recorded, or a number out of range.
@@ -139,9 +138,10 @@ class Picture:
         self._lamps = PolyCollection(
             [], facecolors="#FFB000", edgecolors=style.INK, linewidths=0.5, zorder=8
         )
+        self._harmed = LineCollection([], colors=style.BLACK, linewidths=1.6, zorder=9)
         self._crashes = LineCollection([], colors=style.BLACK, linewidths=3.0, zorder=9)
         self._holds = drawing.draw_hold_lines(axes, run.site.intersection, run.plan)
-        added = (self._bodies, self._glass, self._lamps, self._crashes)
+        added = (self._bodies, self._glass, self._lamps, self._harmed, self._crashes)
         for artist in (self._ways, *added):
             axes.add_collection(artist)
         return (self._ways, self._holds, *added)
@@ -151,7 +151,9 @@ class Picture:
         demand = f"{scenario.density:.0f} veh/h/lane"
         if getattr(scenario, "recorded", None) is not None:
             demand = f"{len(self.run.columns.lane)} recorded arrivals"
-        self._text(0.03, 8.5, 16, "left", bold=True).set_text(self.title)
+        title = self._text(0.03, 8.5, 16, "left", bold=True)
+        title.set_text(self.title)
+        title.set_fontsize(16 * min(1.0, 0.8 * WIDTH * DPI / title.get_window_extent().width))
         self._text(0.03, 8.18, 12, "left", colour=style.MUTED).set_text(
             f"{demand} · profile {scenario.profile_name} · seed {self.run.seed}"
         )
@@ -161,6 +163,8 @@ class Picture:
         ]  # fmt: skip
         if self._film.human.any():
             vehicles.append((style.INK, "outline: human"))
+        if self.run.collisions:
+            vehicles.append((style.BLACK, "collided"))
         zones = [
             (style.ZONES.get(name, style.SKY), words + MEANINGS.get(name, ""))
             for name, words in drawing.zone_words(self.run.plan).items()
@@ -171,7 +175,7 @@ class Picture:
 
     def _key(self, y: float, entries: Sequence[tuple[str, str]], *, pointed: bool) -> None:
         """One line of the legend, `y` inches from the bottom: swatches and what they mean."""
-        x = 0.03
+        x, gap = 0.03, 0.04 if len(entries) < 5 else 0.015
         for colour, name in entries:
             tip = 0.012 if pointed else 0.0
             shoulder = 0.038 - tip
@@ -182,7 +186,7 @@ class Picture:
             ))  # fmt: skip
             label = self._text(x + 0.048, y, 12, "left")
             label.set_text(name)
-            x += 0.048 + label.get_window_extent().width / (WIDTH * DPI) + 0.04
+            x += 0.048 + label.get_window_extent().width / (WIDTH * DPI) + gap
 
     def _text(
         self, x: float, y: float, size: float, align: str, *, colour: str = style.INK, **font: Any
@@ -195,7 +199,8 @@ class Picture:
         now = film.at(time)
         near = film.rows(now, 1.1 * self._reach)
         x, y, angle = film.x[near], film.y[near], film.angle[near]
-        body, glass = drawing.body_shape(run.site.vehicle)
+        shapes = zip(*map(drawing.body_shape, run.site.types), strict=True)
+        body, glass = (np.stack(shape)[film.type[near]] for shape in shapes)
         states = np.array([style.FREE, style.WAITING, style.RIGHT_OF_WAY])
         self._bodies.set_verts(list(drawing.place(body, x, y, angle)))
         self._bodies.set_facecolor(states[film.state[near]].tolist())
@@ -205,11 +210,9 @@ class Picture:
         self._glass.set_verts(list(drawing.place(glass, x, y, angle)))
         self._lamps.set_verts(film.lamps(near) if time % 0.8 < 0.45 else [])
         self._ways.set_segments(film.ways(near))
-        opened = film.open_lanes(near)
-        colours = [
-            style.RIGHT_OF_WAY if i in opened else style.INK for i in range(run.site.intersection.n)
-        ]
-        self._holds.set_color(colours)
+        opened, lanes = film.open_lanes(near), range(run.site.intersection.n)
+        self._holds.set_color([style.RIGHT_OF_WAY if i in opened else style.INK for i in lanes])
+        self._harmed.set_segments(film.crossed_out(near, time))
         self._crashes.set_segments(film.crashes(time))
 
     def _write_numbers(self, time: float) -> None:

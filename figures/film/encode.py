@@ -1,7 +1,6 @@
 """Frames into files: GIF, MP4 and a web page that plays by itself.
 
-Frames are images of one size that arrive one by one. Only the previous one is kept, so a long film
-needs no more memory than a short one.
+Frames are images of one size that arrive one by one; only the previous one is kept in memory.
 """
 
 from __future__ import annotations

@@ -42,20 +42,25 @@ class Frames:
         self.turn = np.array([indicator(path) for path in paths])
         self.exit = np.array([p.exit for p in paths])
         self.entry = paths[0].entry
-        clear = self.exit[self.path] + site.vehicle.length
+        self.type = run.columns.type[frame["vehicle"].to_numpy()]
+        clear = self.exit[self.path] + np.array([it.length for it in site.types])[self.type]
         released = frame["right_of_way"].to_numpy() & (self.s <= clear)
         self.still = frame["speed_mps"].to_numpy() <= HALTING
         self.state = np.where(released, RELEASED, np.where(self.still, STANDING, DRIVING))
         human = np.array(run.kinds or [""] * len(run.columns.lane)) == "human"
         self.human = human[frame["vehicle"].to_numpy()]
+        harmed = np.full(len(human), np.inf)
+        for collision in run.collisions:
+            for vehicle in collision.vehicles:
+                harmed[vehicle] = min(harmed[vehicle], collision.time)
+        self.harmed = harmed[frame["vehicle"].to_numpy()]
         ticks = np.round(frame["time_s"].to_numpy() / site.dt).astype(np.int64)
         shown, first = np.unique(ticks, return_index=True)
         bounds = np.append(first, len(ticks)).tolist()
         parts = [slice(*ends) for ends in pairwise(bounds)]
         self._steps: dict[int, slice] = dict(zip(shown.tolist(), parts, strict=True))
         self.busiest = float(shown[int(np.argmax(np.diff(bounds)))] * site.dt)
-        crashed = np.isin(frame["vehicle"], [v for c in run.collisions for v in c.vehicles])
-        gone = frame[(self.s > clear) & ~crashed].groupby("vehicle")["time_s"].min()
+        gone = frame[(self.s > clear) & np.isinf(self.harmed)].groupby("vehicle")["time_s"].min()
         cleared = np.sort(gone.to_numpy())
         # A vehicle that was clear before the first frame does not count as served.
         self.cleared = cleared[cleared > frame["time_s"].iloc[0]]
@@ -104,18 +109,27 @@ class Frames:
 
     def lamps(self, rows: Rows) -> list[Floats]:
         """Turn indicators of turning vehicles that have not left the junction."""
-        vehicle = self.run.site.vehicle
-        half, size = vehicle.width / 2.0, 0.36
-        front = np.array([(0.1, -size), (0.1, size), (-2 * size, size), (-2 * size, -size)])
-        rear = front - (vehicle.length - 2 * size + 0.2, 0.0)
+        size = 0.36
+        lamp = np.array([(0.1, -size), (0.1, size), (-2 * size, size), (-2 * size, -size)])
+        sides = self.turn[self.path[rows]]
+        turning = (self.s[rows] <= self.exit[self.path[rows]]) & (sides != 0)
+        rows, sides = rows[turning], sides[turning]
+        half = np.array([it.width / 2.0 for it in self.run.site.types])[self.type[rows]]
+        back = np.array([it.length - 2 * size + 0.2 for it in self.run.site.types])[self.type[rows]]
         lamps: list[Floats] = []
-        rows = rows[self.s[rows] <= self.exit[self.path[rows]]]
-        for side in (-1, 1):
-            shown = rows[self.turn[self.path[rows]] == side]
-            for shape in (front, rear):
-                moved = shape - (0.0, side * half)
-                lamps += list(drawing.place(moved, self.x[shown], self.y[shown], self.angle[shown]))
+        for behind in (0.0 * back, back):
+            shapes = lamp - np.stack([behind, sides * half], axis=-1)[:, None]
+            lamps += list(drawing.place(shapes, self.x[rows], self.y[rows], self.angle[rows]))
         return lamps
+
+    def crossed_out(self, rows: Rows, time: float) -> list[Floats]:
+        """Two strokes across each of these vehicles that has collided."""
+        vehicle = self.run.site.vehicle
+        half = vehicle.width / 2.0
+        rows = rows[self.harmed[rows] <= time + self.run.site.dt / 2.0]
+        where = (self.x[rows], self.y[rows], self.angle[rows])
+        strokes = (np.array([(0.0, y), (-vehicle.length, -y)]) for y in (half, -half))
+        return [stroke for shape in strokes for stroke in drawing.place(shape, *where)]
 
     def crashes(self, time: float) -> list[Floats]:
         """A ring around each recent collision."""
@@ -127,9 +141,10 @@ class Frames:
             if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
                 continue
             movements = map(site.intersection.parse, collision.movements)
+            lengths = [site.types[self.run.columns.type[id]].length for id in collision.vehicles]
             centres = [
-                site.intersection.path(movement).pose(s, site.vehicle.length)[0]
-                for movement, s in zip(movements, collision.positions, strict=True)
+                site.intersection.path(movement).pose(s, length)[0]
+                for movement, s, length in zip(movements, collision.positions, lengths, strict=True)
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings

@@ -34,7 +34,7 @@ def verification_figure(analysis: Analysis, intersection: Intersection) -> Figur
     verdict = f"false: {', '.join(false)}" if false else "every claim holds in each of them"
     title = f"{analysis.n} arms, {analysis.cases} cases, order {analysis.order}: {verdict}"
     style.write(figure, 0.06, 0.93, title, 12.5, bold=True)
-    _draw_counts(panels[0], analysis.sizes, "Who goes", "vehicles with the right of way")
+    _draw_counts(panels[0], analysis.sizes, "Right of way", "vehicles with the right of way")
     _draw_counts(panels[1], analysis.ties, "Ties", "cliques of the largest size")
     for axes, (size, (movements, count)) in zip(panels[2:], worst, strict=True):
         told = explain(movements, analysis.matrix, analysis.order, analysis.priorities)

@@ -58,7 +58,7 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
         colour = style.RIGHT_OF_WAY if goes else style.WAITING
         front = path.entry - plan.hold_distance
         end = path.exit + (3.0 if goes else 5.5)  # keep arrowheads in one exit lane apart
-        drawing.draw_way(axes, path, front, end, colour, strong=goes)
+        drawing.draw_way(axes, path, front, end, colour, bold=goes)
         drawing.draw_vehicle(axes, path, front - 0.15, vehicle, colour)
         middle = plan.hold_distance + vehicle.length / 2.0
         x, y = _beside(intersection, movement.origin, middle, 0.075 * reach)
@@ -105,5 +105,5 @@ def _draw_graph(axes: Axes, explanation: Explanation, intersection: Intersection
 def _beside(intersection: Intersection, arm: int, before: float, room: float) -> Floats:
     """A point `room` metres off an approach lane, `before` metres before the junction."""
     middle, kerb, *_ = drawing.lane_strip(intersection, arm, before, before)
-    across = (kerb - middle) / intersection.lane_width
+    across = (kerb - middle) / intersection.lane_widths[arm]
     return np.asarray(kerb + across * room)

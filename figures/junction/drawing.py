@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from figures import style
 from minisim.control import Marking, Plan
+from minisim.junction.curves import join
 from minisim.junction.geometry import Arm, Intersection
 from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
@@ -28,21 +29,25 @@ KERB_POINTS = 24
 
 def outline(intersection: Intersection, reach: float) -> Floats:
     """Edge of the asphalt, shape (k, 2) [m]; the arms reach `reach` from the centre."""
-    width, arms = intersection.lane_width, intersection.arms
+    halves, arms = intersection.half_widths, intersection.arms
     points: list[Floats] = []
-    for arm, following in zip(arms, (*arms[1:], arms[0]), strict=True):
+    for k, (arm, half) in enumerate(zip(arms, halves, strict=True)):
         ahead, clockwise = _axes_of(arm)
-        points += [ahead * reach - clockwise * width, ahead * reach + clockwise * width]
-        points += [*_kerb(arm, following, width, intersection.junction_radius)]
+        points += [ahead * reach - clockwise * half, ahead * reach + clockwise * half]
+        following = (k + 1) % len(arms)
+        widths = half, halves[following]
+        points += [*_kerb(arm, arms[following], widths, intersection.junction_radius)]
     return np.array(points)
 
 
 def lane_strip(intersection: Intersection, arm: int, start: float, end: float) -> Floats:
     """Corners (4, 2) [m] of the approach lane from `start` to `end` before the junction entry."""
     ahead, clockwise = _axes_of(intersection.arms[arm])
-    across = clockwise * _keep(intersection) * intersection.lane_width
-    far = ahead * (intersection.junction_radius + start)
-    near = ahead * (intersection.junction_radius + end)
+    width, offset = intersection.lane_widths[arm], intersection.offsets[arm]
+    across = clockwise * _keep(intersection) * width
+    inner = clockwise * _keep(intersection) * (offset - width / 2.0)
+    far = ahead * (intersection.junction_radius + start) + inner
+    near = ahead * (intersection.junction_radius + end) + inner
     return np.array([far, far + across, near + across, near])
 
 
@@ -56,7 +61,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
         outline(intersection, far), facecolor=style.ASPHALT, edgecolor="#9AA2AD", linewidth=1.0,
         joinstyle="round", zorder=1,
     ))  # fmt: skip
-    every = range(intersection.n)
+    every = intersection.approaches
     for marking in plan.markings:  # the thin edges close the joints between zones
         strips = [lane_strip(intersection, i, marking.start, marking.end) for i in every]
         colour = style.ZONES.get(marking.name, style.SKY)
@@ -65,13 +70,17 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
         ))  # fmt: skip
     for i, arm in enumerate(intersection.arms):
         ahead, _ = _axes_of(arm)
-        middle = np.outer([intersection.junction_radius, far], ahead)
-        axes.plot(*middle.T, color=style.PAINT, linewidth=1.2, dashes=(6, 5), zorder=3)
-        entry = lane_strip(intersection, i, 0.15, -0.15)
-        axes.add_patch(Polygon(entry, facecolor=style.PAINT, linewidth=0, zorder=3))
-    for arm in intersection.arms:  # their names, beside the approach lanes
-        ahead, clockwise = _axes_of(arm)
-        beside = clockwise * _keep(intersection) * (intersection.lane_width + 0.055 * reach)
+        if intersection.offsets[i]:
+            middle = np.outer([intersection.junction_radius, far], ahead)
+            axes.plot(*middle.T, color=style.PAINT, linewidth=1.2, dashes=(6, 5), zorder=3)
+        else:
+            _draw_direction(axes, intersection, i, reach)
+        if i in every:
+            entry = lane_strip(intersection, i, 0.15, -0.15)
+            axes.add_patch(Polygon(entry, facecolor=style.PAINT, linewidth=0, zorder=3))
+    for arm, half in zip(intersection.arms, intersection.half_widths, strict=True):
+        ahead, clockwise = _axes_of(arm)  # their names, beside the approach lanes
+        beside = clockwise * _keep(intersection) * (half + 0.055 * reach)
         edge = 0.93 * reach - np.abs(beside)
         along = min(edge[k] / abs(ahead[k]) for k in (0, 1) if abs(ahead[k]) > 1e-9)
         x, y = ahead * along + beside
@@ -83,7 +92,7 @@ def draw_junction(axes: Axes, intersection: Intersection, plan: Plan, reach: flo
 
 
 def zone_words(plan: Plan) -> dict[str, str]:
-    """Zone -> its name and place for a legend, so that it is known without its colour."""
+    """Zone -> its name and place for a legend, to tell zones apart without colour."""
     zones: dict[str, list[Marking]] = {}
     for marking in plan.markings:
         zones.setdefault(marking.name, []).append(marking)
@@ -94,9 +103,15 @@ def zone_words(plan: Plan) -> dict[str, str]:
 
 
 def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
-    """Where vehicles without the right of way stop: one line per lane, shape (n, 2, 2) [m]."""
+    """Where vehicles without the right of way stop: one line per lane, shape (n, 2, 2) [m].
+
+    A lane on which no vehicle comes has one of no length.
+    """
     at = plan.hold_distance
-    return np.array([lane_strip(intersection, i, at, at)[:2] for i in range(intersection.n)])
+    lines = np.array([lane_strip(intersection, i, at, at)[:2] for i in range(intersection.n)])
+    closed = [i for i in range(intersection.n) if i not in intersection.approaches]
+    lines[closed] = np.nan
+    return lines
 
 
 def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
@@ -117,13 +132,13 @@ def body_shape(vehicle: VehicleType) -> tuple[Floats, Floats]:
 
 
 def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.ArrayLike) -> Floats:
-    """Move a shape (k, 2) to n poses, shape (n, k, 2); angles clockwise from north [deg]."""
+    """A shape (k, 2), or one each, at n poses, (n, k, 2); angles clockwise from north [deg]."""
     angle = np.radians(np.atleast_1d(np.asarray(angle_deg, dtype=float)))
     heading = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
     left = np.stack([-heading[:, 1], heading[:, 0]], axis=-1)
     origin = np.stack([np.atleast_1d(x), np.atleast_1d(y)], axis=-1)
-    along = shape[None, :, :1] * heading[:, None, :]
-    across = shape[None, :, 1:] * left[:, None, :]
+    along = shape[..., :1] * heading[:, None, :]
+    across = shape[..., 1:] * left[:, None, :]
     return np.asarray(origin[:, None, :] + along + across)
 
 
@@ -137,16 +152,14 @@ def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour:
     axes.add_patch(Polygon(glass, facecolor=style.PAINT, alpha=0.75, linewidth=0, zorder=7))
 
 
-def draw_way(
-    axes: Axes, path: Path, start: float, end: float, colour: str, *, strong: bool
-) -> None:
+def draw_way(axes: Axes, path: Path, start: float, end: float, colour: str, *, bold: bool) -> None:
     """Draw a path from `start` to `end` as an arrow; a weak one is dashed, and above others."""
     width = axes.bbox.width * 72.0 / axes.figure.dpi / np.ptp(axes.get_xlim())  # points per metre
     neck = end - HEAD / width
-    look: dict[str, Any] = {"color": colour, "zorder": 5 if strong else 5.5}
+    look: dict[str, Any] = {"color": colour, "zorder": 5 if bold else 5.5}
     axes.plot(
-        *path.position(np.linspace(start, neck, 48)).T, linewidth=2.6 if strong else 1.5,
-        linestyle="-" if strong else (0, (4, 2.5)), dash_capstyle="butt", **look,
+        *path.position(np.linspace(start, neck, 48)).T, linewidth=2.6 if bold else 1.5,
+        linestyle="-" if bold else (0, (4, 2.5)), dash_capstyle="butt", **look,
     )  # fmt: skip
     axes.add_patch(FancyArrowPatch(
         *path.position(np.array([neck, end])), shrinkA=0, shrinkB=0, linewidth=0,
@@ -182,17 +195,32 @@ def _keep(intersection: Intersection) -> float:
     return 1.0 if intersection.side == "left" else -1.0
 
 
-def _kerb(arm: Arm, following: Arm, width: float, radius: float) -> Floats:
+def _draw_direction(axes: Axes, intersection: Intersection, arm: int, reach: float) -> None:
+    """Draw an arrow on a one-way road."""
+    ahead, _ = _axes_of(intersection.arms[arm])
+    ends = np.outer(np.array([0.86, 0.72]) * reach, ahead)
+    if arm not in intersection.approaches:
+        ends = ends[::-1]
+    axes.add_patch(FancyArrowPatch(
+        *ends, arrowstyle="-|>", mutation_scale=12, color=style.PAINT, linewidth=1.4, zorder=3
+    ))  # fmt: skip
+
+
+def _kerb(arm: Arm, following: Arm, widths: tuple[float, float], radius: float) -> Floats:
     """The kerb from one arm to the next clockwise, shape (k, 2): an arc tangent to both.
 
     It meets both road edges at distance `radius` from the centre. If the edges cross farther out,
-    it shrinks to the point where they cross.
+    it shrinks to the point where they cross. `widths` are half of each road's; between roads of
+    different widths it is the curve of `minisim.junction.curves`.
     """
     ahead, clockwise = _axes_of(arm)
     next_ahead, next_clockwise = _axes_of(following)
     half = math.radians((following.bearing - arm.bearing) % 360.0) / 2.0
+    width, next_width = widths
     start = ahead * radius + clockwise * width
-    end = next_ahead * radius - next_clockwise * width
+    end = next_ahead * radius - next_clockwise * next_width
+    if width != next_width:
+        return np.asarray(join(start, -ahead, end, next_ahead, KERB_POINTS).points)
     if abs(half - math.pi / 2.0) < 1e-3:
         return np.array([start, end])
     signed = radius * math.tan(half) - width

@@ -64,7 +64,7 @@ def _draw_map(axes: Axes, scenario: Scenario) -> None:
     for path in intersection.paths:
         if path.movement.origin == 0:
             start, end = path.entry - plan.hold_distance, path.exit + 6.0
-            drawing.draw_way(axes, path, start, end, style.BLUE, strong=False)
+            drawing.draw_way(axes, path, start, end, style.BLUE, bold=False)
     left, top = -0.94 * MAP_REACH, 0.94 * MAP_REACH  # no junction in the paper has a road there
     axes.plot([left, left + 20.0], [top, top], color=style.INK, linewidth=2.2, zorder=9,
               solid_capstyle="butt")  # fmt: skip
@@ -120,8 +120,8 @@ def webster_table() -> Table:
         tuple(rows),
         notes=(
             "Saturation flow 1500 veh/h, 2 s lost per phase. The paper rounds 5.08 and 7.11, and "
-            "prints 19.75 where its own network file and the formula have 19.25. The formula of "
-            "its text divides by C0 − L where it must multiply. The delay is Webster's for the "
+            "prints 19.75 where its own network file and the formula have 19.25. The formula in "
+            "its text divides by C0 − L where it should multiply. The delay is Webster's for the "
             "long run; a run of an hour near x = 1 has less.",
         ),
     )  # fmt: skip

@@ -21,8 +21,7 @@ COLLIDING = {
     "v2ic": "the published conflict matrix is that of right-hand traffic (cause 14)",
 }  # fmt: skip
 
-#: Discrepancy -> the run or file here that shows it. The others are known from the authors' code
-#: and files; no run here isolates them.
+#: Discrepancy -> the run or file here that shows it. The others follow from the authors' files.
 SHOWN = {
     2: "as-run beside text, which changes vehicle, speeds and zones all at once",
     9: "the last arrivals of the published trips, last_arrival_s in scenarios/data/reference.csv",
@@ -109,5 +108,5 @@ SECTION = Section(
              comparison_table, (study,))
         for study in paper.HEADINGS
     ),
-    paper.agreement, ending, appendix=True,
+    ending, appendix=True,
 )  # fmt: skip

@@ -30,7 +30,7 @@ def needed_capacities(results: Results) -> list[Capacity]:
     known = capacities(results)
     if not known:
         raise MissingRunsError(
-            "the store has no search for a capacity that ran to its end; make it with: "
+            "the store has no finished search for a capacity; make one with: "
             f"{results.effort.command('capacity')}"
         )
     return known
@@ -74,8 +74,8 @@ def capacity_table(results: Results) -> Table:
             for name in dict.fromkeys(c.series for c in known)
         ),
         notes=(
-            f"{_extent(results)}; “<” and “>”: every demand tried was too much for a seed, or none "
-            "was. Served means that the queue grows by less than 2 % of the arrivals.",
+            f"{_extent(results)}; “<” (“>”): for some seed, every (no) demand tried was too "
+            "much. Served means that the queue grows by less than 2 % of the arrivals.",
         ),
     )  # fmt: skip
 
@@ -84,8 +84,8 @@ def _extent(results: Results) -> str:
     search = results.effort.search
     return (
         f"{results.effort.warning}Mean and 95 % interval over {search.seeds} seeds of "
-        f"{search.horizon:g} s, with the {search.step / 2.0:g} veh/h/lane by which the search "
-        "rounds"
+        f"{search.horizon:g} s, with the search's rounding of {search.step / 2.0:g} "
+        "veh/h/lane"
     )
 
 

@@ -29,7 +29,7 @@ def confidence_figure(results: Results) -> Figure:
         outcomes.dress(axes, outcome, outcome, "lowest confidence that is believed", ticks)
     title = (
         f"Believing only confident readings: lanes first, {CLASSIFIER:.0%} of intents persistently "
-        "misread by all alike"
+        "misread by all"
     )
     note = f"{outcomes.NOTE}  {missing_note(results)}"
     plots.frame(figure, title, outcomes.KIND_LOOKS.values(), note)

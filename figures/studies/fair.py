@@ -13,8 +13,8 @@ from figures import plots, style
 from figures.studies.shared.section import Item, Section
 from figures.tables import Table
 from scenarios.controllers import RIVALS
-from scenarios.studies.fair import GATES, MEASURES, OTHERS, Crossing, losses, tried
-from scenarios.studies.shared.archive import MissingRunsError, missing_note
+from scenarios.studies.fair import GATES, MEASURES, OTHERS, Crossing, needed_losses, tried
+from scenarios.studies.shared.archive import missing_note
 from scenarios.studies.shared.study import Results, with_total_delay
 
 
@@ -39,17 +39,6 @@ def fair_figure(results: Results) -> Figure:
     return figure
 
 
-def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
-    """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
-    known = {} if results.good.empty else losses(results.good)
-    if not known:
-        raise MissingRunsError(
-            "the store has no two demands at which DIM and another controller ran with two common "
-            f"seeds; make them with: {results.effort.command('fair')}"
-        )
-    return known
-
-
 def crossing_figure(results: Results) -> Figure:
     """The demands at which DIM does worse than each rival, with both gates."""
     known = needed_losses(results)
@@ -70,14 +59,14 @@ def crossing_figure(results: Results) -> Figure:
     plots.frame(figure, title, looks, missing_note(results))
     words = (
         "pale bar: demands at which DIM does worse     marker and line: where that begins, with "
-        "its 95 % interval     hollow: at none or all of these demands in the mean"
+        "its 95 % interval     hollow: at none or all of these demands, on average"
     )
     style.write(figure, plots.LEFT, 0.845, words, 8.5)
     return figure
 
 
 def loss_table(results: Results) -> Table:
-    """From which demand on DIM does worse than each rival."""
+    """The demand from which DIM does worse than each rival."""
     known = needed_losses(results)
     low, high = tried(known.values())
     rows = []
@@ -87,42 +76,18 @@ def loss_table(results: Results) -> Table:
             texts = ((cell.point, cell.interval) if cell else ("–", "–") for cell in cells)
             rows.append((style.look(rival).label, measure, *chain.from_iterable(texts)))
     return Table(
-        "Demand from which on DIM does worse [veh/h/lane]",
+        "Demand from which DIM does worse [veh/h/lane]",
         ("than", "measure", "paper's gate", "95 % interval", "harmonious gate", "95 % interval"),
         tuple(rows), labels=2,
         notes=(
             f"{missing_note(results)}  "
             "Four arms, profile fair, complete means; paired differences over common arrivals, "
             f"linear between the demands tried, {low:g} to {high:g}. “a to b”: worse between a and "
-            "b only, for beyond the capacity of both their order may turn again. “all”: at every "
-            "demand tried, in the mean; “c at the latest” then says that only from c on it is "
-            "sure. “never”: at none in the mean; “c at the earliest” says that from c on it may "
-            "be.",
+            "b only: beyond both capacities their order may reverse. “all”: at every demand tried, "
+            "on average; “c at the latest” then means that it is certain only from c on. “never”: "
+            "at none, on average; “c at the earliest” means that it is possible from c on.",
         ),
     )  # fmt: skip
-
-
-def answer(results: Results) -> str:
-    """The answer to the question that the paper leaves open."""
-    try:
-        known = needed_losses(results)
-    except MissingRunsError as error:
-        return f"From which demand on DIM loses is not known: {error}."
-    low, high = tried(known.values())
-    lines = []
-    for rival in OTHERS:
-        losing = []
-        for measure in MEASURES:
-            found = (str(known.get((measure, gate, rival), "not run")) for gate in GATES)
-            losing.append(f"{measure} {' → '.join(found)}")
-        lines.append(f"- {style.look(rival).label}: {'; '.join(losing)}")
-    return "\n".join([
-        "Demands at which DIM does worse than each, veh/h/lane on four arms, paper's gate → "
-        "harmonious gate; from the first on, with its 95 % interval, to the highest tried "
-        f"({high:g}) unless an end is given; \"all\" from the lowest tried ({low:g}) on, in the "
-        "mean:\n",
-        *lines,
-    ])  # fmt: skip
 
 
 def _draw_crossing(axes: Axes, crossing: Crossing, gate: str, y: float) -> None:
@@ -148,8 +113,7 @@ SECTION = Section(
     "When does DIM lose?",
     (
         Item("fair", "every controller up to 800 veh/h/lane", fair_figure, ("fair",)),
-        Item("losses", "demand from which on DIM loses", crossing_figure, ("fair",)),
+        Item("losses", "demand from which DIM loses", crossing_figure, ("fair",)),
         Item("losses-table", "losses in numbers", loss_table, ("fair",)),
     ),
-    answer,
 )

@@ -35,7 +35,7 @@ def fairness_figure(results: Results) -> Figure:
         plots.density_axis(axes)
     plots.log_time(worst, 0.0, 500.0, linear=0.1)
     for axes, top in ((spread, 1.0), (by_lane, by_lane.get_ylim()[1])):
-        axes.set_ylim(-0.025 * top, top)  # markers at 0 are whole
+        axes.set_ylim(-0.025 * top, top)  # room for markers at 0
     title = "Fixed, rotating and longest-waiting priority on four arms, profile fair"
     plots.frame(figure, title, map(style.look, PRIORITIES), missing_note(results), marks=0.865)
     return figure
@@ -56,8 +56,5 @@ def _draw_lanes(axes: Axes, rows: pd.DataFrame) -> None:
 
 SECTION = Section(
     "Fairness",
-    (
-        Item("fairness", "fixed, rotating and longest-waiting priority", fairness_figure,
-             ("fairness",)),
-    ),
-)  # fmt: skip
+    (Item("fairness", "fixed, rotating and waiting priority", fairness_figure, ("fairness",)),),
+)

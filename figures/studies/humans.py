@@ -48,7 +48,7 @@ def human_figure(results: Results) -> Figure:
     panels[0].set_ylabel("mean delay of all vehicles [s], logarithmic", **style.LABEL)
     note = (
         f"{missing_note(results)}  Delay is time loss and departure delay, up to the end of the "
-        "run for vehicles that had not left it."
+        "run for vehicles still there."
     )
     title = "Human drivers among vehicles of DIM on four arms, profile fair"
     plots.frame(figure, title, [*LOOKS.values(), stop], note, ncols=3, marks=0.832)

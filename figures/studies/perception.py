@@ -45,7 +45,7 @@ def perception_figure(results: Results, series: str) -> Figure:
         for place, ((shared, persistent), look) in enumerate(LOOKS.items()):
             line = outcomes.select(signalled, kind=kind, shared=shared, persistent=persistent)
             cells = [exact, *(outcomes.select(line, rate=rate) for rate in RATES[1:])]
-            # Side by side, so that error bars do not overlap. Ticks are evenly spaced; rates not.
+            # Side by side, so that error bars do not overlap; ticks are evenly spaced.
             places = [k + 0.13 * (place - 1.5) for k in range(len(RATES))]
             outcomes.draw(axes, places, cells, outcome, look)
         level = outcomes.estimated(silent, outcome)
@@ -73,7 +73,7 @@ def perception_table(results: Results) -> Table:
         manner = MANNERS[bool(shared), bool(persistent)] if rate or silent else ""
         listed.append((style.look(str(series)).label, error, manner, *_outcomes(cell)))
     return Table(
-        f"What misread intents do, {CLASSIFIER:.0%} of them misread, on four arms, {DENSITY:g} "
+        f"What misread intents do at an error rate of {CLASSIFIER:.0%}, four arms, {DENSITY:g} "
         "veh/h/lane",
         ("controller", "error", "manner", "crossings", f"collisions / {CROSSINGS:,} crossings",
          f"false grants / {CROSSINGS:,}", "disagreement [% of time]", "deadlock [% of time]",

@@ -136,5 +136,4 @@ SECTION = Section(
         ),
         Item("lanes", "waiting time by lane at 350 veh/h/lane", lane_table, BOTH),
     ),
-    paper.agreement,
 )  # fmt: skip

@@ -29,35 +29,36 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             s = vehicles[i]["s"]
             p = vehicles[i]["path"]
-            if s < law.entry - law.length:
+            if s < law.entry - law.longest:
                 break
-            if vehicles[i]["status"] != DRIVING or s > ends[p, 0] + 2.0 * law.length:
+            length = vehicles[i]["length"]
+            if vehicles[i]["status"] != DRIVING or s > ends[p, 0] + 2.0 * length:
                 continue
             if count == len(bodies):
                 return True
             inside |= s >= law.entry
             past, crossing = s - law.entry, ends[p, 0] - law.entry
             x, y = place(shape[p], headings[p], crossing, past)
-            x_rear, y_rear = place(shape[p], headings[p], crossing, past - law.length)
+            x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
             along = math.hypot(x - x_rear, y - y_rear)
             ux, uy = (x - x_rear) / along, (y - y_rear) / along
-            bodies[count, 0] = x - ux * law.length / 2.0
-            bodies[count, 1] = y - uy * law.length / 2.0
+            bodies[count, 0] = x - ux * length / 2.0
+            bodies[count, 1] = y - uy * length / 2.0
             bodies[count, 2] = ux
             bodies[count, 3] = uy
+            bodies[count, 4] = length / 2.0 + TOUCH_MARGIN
+            bodies[count, 5] = road.types[vehicles[i]["type"]].width / 2.0 + TOUCH_MARGIN
             count += 1
     if not inside:
         return False
-    half_length = law.length / 2.0 + TOUCH_MARGIN
-    half_width = law.width / 2.0 + TOUCH_MARGIN
-    reach = 4.0 * (half_length * half_length + half_width * half_width)
     for i in range(count):
         for j in range(i):
             dx = bodies[i, 0] - bodies[j, 0]
             dy = bodies[i, 1] - bodies[j, 1]
-            if dx * dx + dy * dy < reach and rectangles_meet(
+            long, wide = bodies[i, 4] + bodies[j, 4], bodies[i, 5] + bodies[j, 5]
+            if dx * dx + dy * dy < long * long + wide * wide and rectangles_meet(
                 dx, dy, bodies[i, 2], bodies[i, 3], bodies[j, 2], bodies[j, 3],
-                half_length, half_width,
+                bodies[i, 4], bodies[i, 5], bodies[j, 4], bodies[j, 5],
             ):  # fmt: skip
                 return True
     return False
@@ -66,13 +67,18 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
 @njit
 def rectangles_meet(
     dx: float, dy: float, ux: float, uy: float, wx: float, wy: float,
-    half_length: float, half_width: float,
+    u_length: float, u_width: float, w_length: float, w_width: float,
 ) -> bool:  # fmt: skip
-    """Separating-axis test of equal rectangles with headings u and w, centres (dx, dy) apart."""
+    """Separating-axis test of rectangles with headings u and w, centres (dx, dy) apart.
+
+    Lengths and widths are halved.
+    """
     cos = abs(ux * wx + uy * wy)
     sin = abs(ux * wy - uy * wx)
-    along = half_length + half_length * cos + half_width * sin
-    across = half_width + half_length * sin + half_width * cos
+    along = u_length + w_length * cos + w_width * sin
+    across = u_width + w_length * sin + w_width * cos
     if abs(dx * ux + dy * uy) > along or abs(dy * ux - dx * uy) > across:
         return False
+    along = w_length + u_length * cos + u_width * sin
+    across = w_width + u_length * sin + u_width * cos
     return abs(dx * wx + dy * wy) <= along and abs(dy * wx - dx * wy) <= across

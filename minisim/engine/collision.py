@@ -30,7 +30,7 @@ class Collision(NamedTuple):
     time: float  #: [s]
     vehicles: tuple[int, int]  #: their ids (rows of the trip table), the smaller one first
     movements: tuple[str, str]  #: of both, such as ("a2", "c3")
-    positions: tuple[float, float]  #: front bumpers, from the road entry [m]
+    positions: tuple[float, float]  #: `s` of both front bumpers [m], see `minisim.junction.paths`
     speeds: tuple[float, float]  #: [m/s]
 
     def __str__(self) -> str:
@@ -45,7 +45,7 @@ def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> li
     """All collisions at this moment: pymunk decides near the junction, the gap within a lane."""
     rows, bodies = near_bodies(vehicles, site)
     pairs = [(rows[i], rows[j]) for i, j in touching(bodies)]
-    pairs += _overlaps_in_lane(vehicles, road, site.vehicle.length)
+    pairs += _overlaps_in_lane(vehicles, road)
     names = site.intersection.movements.names
     collisions = []
     for pair in pairs:
@@ -57,11 +57,12 @@ def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> li
 
 def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
     """Rows and bodies of all vehicles in and near the junction."""
-    paths, length, width = site.intersection.paths, site.vehicle.length, site.vehicle.width
+    paths, longest = site.intersection.paths, site.vehicle.length
     rows, bodies = [], []
     for i in np.flatnonzero(vehicles["status"] == DRIVING).tolist():
         path, s = paths[vehicles["path"][i]], float(vehicles["s"][i])
-        if path.entry - length <= s <= path.exit + 2 * length:
+        length, width = float(vehicles["length"][i]), site.types[vehicles["type"][i]].width
+        if path.entry - longest <= s <= path.exit + 2 * length:
             centre, heading = path.pose(s, length)
             rows.append(i)
             (x, y), (ux, uy) = centre.tolist(), heading.tolist()
@@ -69,21 +70,22 @@ def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
     return rows, bodies
 
 
-def _overlaps_in_lane(vehicles: Records, road: Road, length: float) -> list[tuple[int, int]]:
+def _overlaps_in_lane(vehicles: Records, road: Road) -> list[tuple[int, int]]:
     """Row pairs (j, i) in which the front of vehicle i has reached the rear of j ahead of it."""
     s, path, lane = vehicles["s"], vehicles["path"], vehicles["lane"]
+    rears = s - vehicles["length"]
     driving = vehicles["status"] == DRIVING
     exits, branch = road.ends[:, 0], road.branch
     pairs = []
     for i in np.flatnonzero(driving).tolist():
         p = path[i]
         for j in np.flatnonzero(driving[:i] & (lane[:i] == lane[i])).tolist():
-            rear = s[j] - length
+            rear = rears[j]
             if rear <= s[i] and rear < branch[path[j], p]:
                 pairs.append((j, i))
         j = int(vehicles["ahead"][i])
         on_exit = j >= 0 and driving[j] and s[i] >= exits[p]
-        if on_exit and s[j] - length - exits[path[j]] <= s[i] - exits[p]:
+        if on_exit and rears[j] - exits[path[j]] <= s[i] - exits[p]:
             pairs.append((j, i))
     return pairs
 

@@ -30,7 +30,8 @@ def insert(
             continue
         if cruise is not None and blocked(vehicles, road, law, cruise, lane):
             continue
-        s, p = law.length + law.margin, vehicles[i]["path"]
+        mine, p = road.types[vehicles[i]["type"]], vehicles[i]["path"]
+        s = road.ends[p, 3] + mine.length + law.margin
         section = 0
         while s >= road.section_start[p, section + 1]:
             section += 1
@@ -38,17 +39,18 @@ def insert(
         v = road.section_speed[p, section] * factor
         for k in range(section + 1, road.section_start.shape[1] - 1):
             room = max(road.section_start[p, k] - s, 0.0)
-            v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * law.b * room))
+            v = min(v, math.sqrt((road.section_speed[p, k] * factor) ** 2 + 2.0 * mine.b * room))
         # It must be able to stop before the junction, where other vehicles may be.
-        v = min(v, law.depart_speed, math.sqrt(2.0 * law.b_max * max(law.entry - s, 0.0)))
+        v = min(v, law.depart_speed, math.sqrt(2.0 * mine.b_max * max(law.entry - s, 0.0)))
         if lanes[lane]["open"] == 0:
-            v = min(v, math.sqrt(2.0 * law.b * max(law.hold - STOP_MARGIN - s, 0.0)))
+            v = min(v, math.sqrt(2.0 * mine.b * max(law.hold - STOP_MARGIN - s, 0.0)))
         j = i - 1
         if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
-            safe = insertable(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
+            gap = vehicles[j]["s"] - vehicles[j]["length"] - s
+            safe = insertable(gap, vehicles[j]["v"], mine, law)
             if safe < 0.0:
                 continue
-            room = room_behind(vehicles[j]["s"] - law.length - s, vehicles[j]["v"], law)
+            room = room_behind(gap, vehicles[j]["v"], vehicles[j]["b_max"], mine, law)
             v = min(v, safe, math.sqrt(max(room, 0.0)))
         lanes[lane]["next"] = i + 1
         vehicles[i]["status"] = DRIVING

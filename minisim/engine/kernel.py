@@ -22,13 +22,12 @@ from minisim.laws import (
     Law,
     braking_begins,
     closeness,
-    follow,
+    drive,
     hold,
     keep_room,
     room_behind,
     short_of,
     slow_down,
-    within,
 )
 
 #: Reasons to return, as bits.
@@ -54,7 +53,7 @@ def advance(
     Args:
         cruise: what vehicles under cruise control need beside `law`; None under any other law.
         trace: the recording, filled from line `traced` on.
-        bodies: scratch space (k, 5) for the k vehicles that can be in or near the junction at once.
+        bodies: scratch space (k, 6) for the k vehicles that can be in or near the junction at once.
         observed: filled with what a view shows at the end, see `observe`.
 
     Returns:
@@ -108,7 +107,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
     the arithmetic.
     """
     overlap = False
-    branch, ends = road.branch, road.ends
+    branch, ends, types = road.branch, road.ends, road.types
     start, speed = road.section_start, road.section_speed
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
@@ -117,7 +116,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             me = vehicles[i]
             if me["status"] != DRIVING:
                 continue
-            s, v, p = me["s"], me["v"], me["path"]
+            s, v, p, mine = me["s"], me["v"], me["path"], types[me["type"]]
             released = is_open or me["go"] != 0
 
             # The vehicle ahead in the lane, until its rear has left the shared path. If it has
@@ -127,10 +126,10 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
             j = i - 1
             while j >= first:
                 ahead = vehicles[j]
-                rear = ahead["s"] - law.length
+                rear = ahead["s"] - ahead["length"]
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
-                    z = closeness(v, rear - s, ahead["v"], law)
-                    room = room_behind(rear - s, ahead["v"], law)
+                    z = closeness(v, rear - s, ahead["v"], mine, law)
+                    room = room_behind(rear - s, ahead["v"], ahead["b_max"], mine, law)
                     overlap |= rear <= s
                     break
                 if s >= ends[p, 0]:
@@ -138,16 +137,17 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 j -= 1
 
             # A vehicle that cannot stop before the junction sees past a leader that may turn off.
-            near = s < ends[p, 0] and v * v > 2.0 * law.b_max * (law.entry - s)
+            near = s < ends[p, 0] and v * v > 2.0 * mine.b_max * (law.entry - s)
             j = min(j, front) - 1
             while near and j >= first:
                 ahead = vehicles[j]
-                rear = ahead["s"] - law.length
+                rear = ahead["s"] - ahead["length"]
                 if ahead["status"] == DRIVING and rear < branch[ahead["path"], p]:
-                    room = min(room, room_behind(rear - s, ahead["v"], law))
+                    new = room_behind(rear - s, ahead["v"], ahead["b_max"], mine, law)
+                    room = min(room, new)
                 j -= 1
 
-            # From the junction on, also the last vehicle before it bound for the same exit lane.
+            # From the junction on, also the last vehicle ahead bound for the same exit lane.
             # Both positions are measured from that lane, so a vehicle that is still on another arc
             # counts as if it were on this one.
             j = -1
@@ -157,27 +157,28 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
                 j = lanes[int(ends[p, 2])]["last"]
             if j >= 0 and vehicles[j]["status"] == DRIVING:
                 ahead = vehicles[j]
-                rear = ahead["s"] - law.length - ends[ahead["path"], 0]
+                rear = ahead["s"] - ahead["length"] - ends[ahead["path"], 0]
                 gap = rear - (s - ends[p, 0])
                 if s >= law.entry or i == front:
-                    z = max(z, closeness(v, gap, ahead["v"], law))
+                    z = max(z, closeness(v, gap, ahead["v"], mine, law))
                 if rear >= 0.0:
-                    room = min(room, room_behind(gap, ahead["v"], law))
+                    room = min(room, room_behind(gap, ahead["v"], ahead["b_max"], mine, law))
                 overlap |= gap <= 0.0 and s >= ends[p, 0]
 
             section, factor = me["section"], me["factor"]
             limit = speed[p, section] * factor
-            acc = within(v, follow(v, min(limit, me["advice"]), z, law), limit, law)
+            acc = drive(v, limit, me["advice"], z, mine, law)
             k = section + 1
-            while braking_begins(v, start[p, k] - s, law):
-                acc = min(acc, slow_down(v, acc, speed[p, k] * factor, start[p, k] - s, law))
+            while braking_begins(v, start[p, k] - s, mine, law):
+                lower = speed[p, k] * factor
+                acc = min(acc, slow_down(v, acc, lower, start[p, k] - s, mine, law))
                 k += 1
             if not released and s < law.entry:
-                acc = min(acc, hold(v, s, law))
-            if short_of(room, v, v + acc * law.dt, law):
-                acc = min(acc, keep_room(v, room, law))
+                acc = min(acc, hold(v, s, mine, law))
+            if short_of(room, v, v + acc * law.dt, mine, law):
+                acc = min(acc, keep_room(v, room, mine, law))
             brake = me["brake"] if v > 0.0 else max(me["brake"], 0.0)  # stays standing
-            me["a"] = max(min(acc, brake), -law.b_max)
+            me["a"] = max(min(acc, brake), -mine.b_max)
     return overlap
 
 
@@ -219,7 +220,9 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
                 lanes[lane]["front"] = i + 1
                 vehicles[i]["ahead"] = lanes[exit_arm]["last"]
                 lanes[exit_arm]["last"] = i
-            if vehicles[i]["cleared"] == 0 and s >= max(ends[p, 0] + law.length, law.leave):
+            if vehicles[i]["cleared"] == 0 and s >= max(
+                ends[p, 0] + vehicles[i]["length"], law.leave
+            ):
                 vehicles[i]["cleared"] = 1
                 vehicles[i]["brake"] = math.inf
                 if law.wake_on_clear:
@@ -258,7 +261,7 @@ def record(
         is_open = lanes[lane]["open"] != 0
         for i in range(lanes[lane]["first"], lanes[lane]["next"]):
             s = vehicles[i]["s"]
-            past = s - law.length - road.ends[vehicles[i]["path"], 0]
+            past = s - vehicles[i]["length"] - road.ends[vehicles[i]["path"], 0]
             if vehicles[i]["status"] != DRIVING or s < law.record_start or past > law.record_past:
                 continue
             trace[traced]["tick"] = tick
@@ -289,9 +292,10 @@ def observe(vehicles: Records, lanes: Records, law: Law, observed: Records) -> i
             seen["manoeuvre"] = me["manoeuvre"]
             seen["distance"] = distance
             seen["speed"] = me["v"]
-            seen["length"] = law.length
+            seen["length"] = me["length"]
             seen["demand_time"] = me["demand_tick"] * law.dt
             seen["rank"] = me["rank"]
             seen["speed_factor"] = me["factor"]
+            seen["type"] = me["type"]
             count += 1
     return count

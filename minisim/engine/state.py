@@ -7,15 +7,17 @@ arguments keep a call into the compiled kernel cheap, since unboxing arrays is m
 
 from __future__ import annotations
 
-from typing import NamedTuple, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
 from minisim.control import LATERAL_ACCELERATION, Observed, Plan, Site
+from minisim.jit import COMPILED
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path
+from minisim.laws import Traits, traits_of
 from minisim.streams import Draws
 
 Floats = npt.NDArray[np.float64]
@@ -32,15 +34,18 @@ VEHICLE = np.dtype(
         ("rank", np.int64),  # its place among the vehicles of its lane
         ("manoeuvre", np.int64),
         ("path", np.int64),  # index of the movement
+        ("type", np.int64),  # index into `Road.types`
         ("demand_tick", np.int64),
+        ("length", np.float64),  # of its type [m]
+        ("b_max", np.float64),  # the most that its brakes can do [m/s²]
         ("factor", np.float64),  # the driver's factor on the speed limit
         ("status", np.int64),
-        ("s", np.float64),  # front bumper, from the road entry [m]
+        ("s", np.float64),  # front bumper on its path [m], see `minisim.junction.paths`
         ("v", np.float64),  # [m/s]
         ("a", np.float64),  # of the step just taken [m/s²]
         ("section", np.int64),  # of the speed profile
         ("mark", np.int64),  # next wake-up mark
-        ("ahead", np.int64),  # last vehicle before it bound for the same exit lane, or -1
+        ("ahead", np.int64),  # last vehicle ahead bound for the same exit lane, or -1
         ("cleared", np.int64),  # rear bumper has left the junction
         ("go", np.int64),  # has a right of way of its own
         ("advice", np.float64),  # cap on its speed [m/s]
@@ -64,6 +69,9 @@ LANE = np.dtype(
     ]
 )
 
+#: The fields of `minisim.laws.Traits`.
+TRAITS = np.dtype([(name, np.float64) for name in Traits._fields])
+
 #: One line of a trajectory recording.
 TRACE = np.dtype([
     ("tick", np.int64), ("row", np.int64), ("s", np.float64), ("v", np.float64), ("a", np.float64),
@@ -79,13 +87,16 @@ OBSERVED = np.dtype([(name, _TYPES[kind]) for name, kind in get_type_hints(Obser
 class Road(NamedTuple):
     """The paths as arrays; p counts movements, k sections of the speed profile."""
 
-    ends: Floats  #: (p, 3): `s` of the junction exit and of the road's end [m], index of exit arm
+    #: (p, 4): `s` of the junction exit and of the road's end [m], index of exit arm, `s` of the
+    #: road's beginning [m]
+    ends: Floats
     shape: Floats  #: (p, ARC_SEGMENTS + 1, 2): polyline from entry to exit [m]
     headings: Floats  #: (p, 4): unit vectors in (x, y) and out (x, y)
     section_start: Floats  #: (p, k) [m], infinite past the last section
     section_speed: Floats  #: (p, k): limit from there on [m/s]
     branch: Floats  #: (p, p) [m], see `minisim.junction.partings.branch`
     marks: Floats  #: (j,): `s` of the wake-up marks, ascending, the last one infinite [m]
+    types: Any  #: `Traits` of each type of vehicle, as records where the kernel is compiled
 
 
 def build_road(site: Site, plan: Plan) -> Road:
@@ -94,37 +105,45 @@ def build_road(site: Site, plan: Plan) -> Road:
     profiles = [_speed_profile(path, site, plan) for path in paths]
     width = max(len(profile) for profile in profiles) + 1
     start = np.full((len(paths), width), np.inf)
-    speed = np.full((len(paths), width), site.speed_limit)
+    speed = np.full((len(paths), width), site.speed_limit)  # of sections that never begin
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
     marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
     return Road(
-        ends=np.array([(p.exit, p.length, float(p.exit_arm)) for p in paths]),
+        ends=np.array([(p.exit, p.length, float(p.exit_arm), p.start) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
         section_speed=speed,
         branch=np.array(branch(site.intersection, site.vehicle)),
         marks=np.array([*marks, np.inf]),
+        types=_types(site),
     )
+
+
+def _types(site: Site) -> Any:
+    """The traits of the types, as the kernel reads them fastest."""
+    traits = tuple(map(traits_of, site.types))
+    records = np.array([tuple(it) for it in traits], TRAITS)
+    return records.view(np.recarray) if COMPILED else traits
 
 
 def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
     """Piecewise-constant limit along a path: ascending (start [m], speed [m/s])."""
-    road = site.speed_limit
-    turn = min(road, site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION))
-    stretches = [(path.entry, path.exit, turn)]
+    before, behind = site.limit(path.movement.origin), site.limit(path.exit_arm)
+    turn = site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION)
+    stretches = [(0.0, path.exit, before), (path.entry, path.exit, turn)]
+    stretches += [(path.exit, np.inf, behind)]
     stretches += [
         (path.entry - m.start, path.entry - m.end, m.speed)
         for m in plan.markings
         if m.speed is not None
     ]
-    edges = sorted({0.0, *(max(s, 0.0) for start, end, _ in stretches for s in (start, end))})
+    edges = sorted({max(s, 0.0) for *ends, _ in stretches for s in ends if s < np.inf})
     profile: list[tuple[float, float]] = []
     for edge in edges:
-        inside = [speed for start, end, speed in stretches if start <= edge < end]
-        limit = min([road, *inside])
+        limit = min(speed for start, end, speed in stretches if start <= edge < end)
         if not profile or profile[-1][1] != limit:
             profile.append((edge, limit))
     return profile
@@ -141,6 +160,10 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     index_of = site.intersection.movements.index_of
     vehicles["path"] = index_of[vehicles["lane"], vehicles["manoeuvre"]]
     vehicles["demand_tick"] = np.ceil(arrivals.time[order] / site.dt - 1e-6)
+    vehicles["type"] = types_of(site, arrivals)[order]
+    kinds = vehicles["type"]
+    vehicles["length"] = np.array([it.length for it in site.types], float)[kinds]
+    vehicles["b_max"] = np.array([it.max_deceleration for it in site.types], float)[kinds]
     factors = arrivals.speed_factor
     vehicles["factor"] = _speed_factors(site, vehicles) if factors is None else factors[order]
     for name in ("ahead", "depart_tick", "arrival_tick"):
@@ -150,13 +173,21 @@ def build_vehicles(site: Site, arrivals: Arrivals) -> Records:
     return vehicles
 
 
+def types_of(site: Site, arrivals: Arrivals) -> Ints:
+    """Index of each vehicle's type, as recorded or drawn, in the order of the arrivals."""
+    if arrivals.type is not None:
+        return site.fleet.indices(arrivals.type)
+    return site.fleet.drawn(arrivals.lane, arrivals.rank, site.seed)
+
+
 def _speed_factors(site: Site, vehicles: Records) -> Floats:
-    deviation = site.vehicle.speed_deviation
-    if deviation == 0.0:
+    deviation = np.array([it.speed_deviation for it in site.types])[vehicles["type"]]
+    if not deviation.any():
         return np.ones(len(vehicles))
     draws = Draws(site.seed, "drivers")
     drawn = [draws.normal(*which) for which in vehicles[["lane", "rank"]].tolist()]
-    return np.clip(1.0 + deviation * np.array(drawn, float), LEAST_FACTOR, MOST_FACTOR)
+    factors: Floats = 1.0 + deviation * np.array(drawn, float)
+    return factors.clip(LEAST_FACTOR, MOST_FACTOR)
 
 
 def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:

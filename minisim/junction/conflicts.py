@@ -1,7 +1,8 @@
 """Where vehicles from different arms come too close to each other.
 
 A corridor is the area that a vehicle's body sweeps on its way through the junction. Two movements
-conflict when their corridors come closer than `CLEARANCE`.
+conflict when their corridors come closer than `CLEARANCE`. The corridor of a fleet is that of all
+its types together: a short body swings out less in a turn, but cuts the corner less, too.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy.typing as npt
 import shapely
 
 from minisim.errors import number
+from minisim.fleet import Vehicles
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools
 from minisim.junction.paths import Floats, Path
@@ -30,7 +32,7 @@ CLEARANCE = 0.5
 #: Spacing of the bodies that make up a corridor, and of those tested for zones [m].
 SWEEP_STEP = 0.5
 
-#: Spacing of the bodies tested for clearing distances [m]; at half the clearance, none is missed.
+#: Spacing of the bodies tested for clearing distances [m]; half the clearance misses none.
 CLEARING_STEP = CLEARANCE / 2.0
 
 #: Spacing of the bodies tested for areas [m].
@@ -48,13 +50,16 @@ class Areas(NamedTuple):
     leave: Floats
 
 
-def corridor(path: Path, vehicle: VehicleType) -> shapely.Geometry:
-    """The area that a body sweeps from when its front enters until its rear has left."""
-    first, last = path.entry, path.exit + vehicle.length
-    count = math.ceil((last - first) / SWEEP_STEP) + 1
-    corners = path.bodies(np.linspace(first, last, count), vehicle)
-    pairs = np.concatenate([corners[:-1], corners[1:]], axis=1)
-    return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
+def corridor(path: Path, vehicles: Vehicles) -> shapely.Geometry:
+    """The area that bodies sweep from when their front enters until their rear has left."""
+    pairs = []
+    for vehicle in vehicles.types:
+        first, last = path.entry, path.exit + vehicle.length
+        count = math.ceil((last - first) / SWEEP_STEP) + 1
+        corners = path.bodies(np.linspace(first, last, count), vehicle)
+        pairs.append(np.concatenate([corners[:-1], corners[1:]], axis=1))
+    hulls = shapely.convex_hull(shapely.multipoints(np.concatenate(pairs)))
+    return shapely.union_all(hulls)
 
 
 def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
@@ -63,18 +68,18 @@ def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
 
 
 @lru_cache(maxsize=256)
-def corridors(intersection: Intersection, vehicle: VehicleType) -> Shapes:
+def corridors(intersection: Intersection, vehicles: Vehicles) -> Shapes:
     """The corridors of all movements, prepared for many tests, shape (m,)."""
-    return _prepared([corridor(path, vehicle) for path in intersection.paths])
+    return _prepared([corridor(path, vehicles) for path in intersection.paths])
 
 
 @lru_cache(maxsize=256)
-def separation(intersection: Intersection, vehicle: VehicleType) -> Floats:
+def separation(intersection: Intersection, vehicles: Vehicles) -> Floats:
     """Distance [m] between the corridors of each pair of movements, shape (m, m).
 
     0 where they overlap, and between movements from the same arm, which begin together.
     """
-    swept = corridors(intersection, vehicle)
+    swept = corridors(intersection, vehicles)
     i, j = np.triu_indices(len(swept), 1)
     result = np.zeros(intersection.movements.apart.shape)
     result[i, j] = result[j, i] = shapely.distance(swept[i], swept[j])
@@ -82,42 +87,49 @@ def separation(intersection: Intersection, vehicle: VehicleType) -> Floats:
 
 
 def conflicts(
-    intersection: Intersection, vehicle: VehicleType, clearance: float = CLEARANCE
+    intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE
 ) -> Bools:
     """Whether two movements come closer than `clearance` [m]; shape (m, m), symmetric."""
     number("clearance [m]", clearance, low=0, high=10)
-    return np.asarray(separation(intersection, vehicle) <= clearance)
+    return np.asarray(separation(intersection, vehicles) <= clearance)
 
 
 @lru_cache(maxsize=256)
-def entry_room(intersection: Intersection, vehicle: VehicleType) -> float:
+def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     """Smallest distance [m] between a vehicle held at its entry and a corridor of another arm.
 
     0 means that the vehicle does not fit the lanes: when turning into an exit lane, it would touch
     a vehicle waiting beside that lane.
     """
     entry, movements = intersection.approach_length, intersection.movements
-    firsts = [intersection.paths[movements.rows[arm][1]] for arm in range(intersection.n)]
-    held = np.asarray(shapely.polygons([path.bodies(entry, vehicle) for path in firsts]))
-    distance = shapely.distance(corridors(intersection, vehicle)[:, None], held[None, :])
-    return float(distance[movements.origins[:, None] != np.arange(intersection.n)].min())
+    arms, allowed = intersection.approaches, intersection.allowed
+    firsts = [intersection.paths[movements.rows[arm][1]] for arm in arms]
+    bodies_held = [[path.bodies(entry, it) for it in vehicles.types] for path in firsts]
+    held = np.array([shapely.MultiPolygon([(c, ()) for c in four]) for four in bodies_held])
+    distance = shapely.distance(corridors(intersection, vehicles)[:, None], held[None, :])
+    others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
+    return float(distance[others].min(initial=math.inf))
 
 
 @lru_cache(maxsize=256)
-def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
+def conflict_zones(
+    intersection: Intersection, vehicle: VehicleType, others: Vehicles | None = None
+) -> Floats:
     """The conflict zones of all movements, shape (m, m, 2) [m], NaN where two do not conflict.
 
-    A vehicle on path p comes closer than `CLEARANCE` to corridor q only while its front bumper is
+    `others` are the vehicles on the other paths, by default of the same type. A vehicle on path p
+    comes closer than `CLEARANCE` to corridor q only while its front bumper is
     between `[p, q, 0]` and `[p, q, 1]` past the junction entry. Every zone ends when the rear has
     left the junction. Two vehicles can touch only when both are in their zones.
 
-    A zone begins one tested body before the first one too close and ends one after the last. If no
-    tested body is too close, but the corridors are in between, the zone is the whole crossing.
+    A zone reaches one tested body beyond the first and the last that are too close. If none is too
+    close, but the corridors are in between, the zone is the whole crossing.
     """
     ends = [path.crossing + vehicle.length for path in intersection.paths]
     past = [np.linspace(0.0, end, math.ceil(end / SWEEP_STEP) + 1) for end in ends]
     fronts = [intersection.approach_length + s for s in past]
-    pairs, swept = _rivals(intersection, vehicle), corridors(intersection, vehicle)
+    others = others or vehicle
+    pairs, swept = _rivals(intersection, others), corridors(intersection, others)
     zones = np.full((*pairs.shape, 2), np.nan)
     for p, q, near in _reaching(intersection, vehicle, fronts, swept, pairs, CLEARANCE):
         s = past[p]
@@ -127,18 +139,23 @@ def conflict_zones(intersection: Intersection, vehicle: VehicleType) -> Floats:
 
 
 @lru_cache(maxsize=256)
-def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floats:
+def clearing_distances(
+    intersection: Intersection, vehicle: VehicleType, others: Vehicles | None = None
+) -> Floats:
     """How far past the entry a vehicle's front is when it has cleared another's way, (m, m) [m].
 
+    `others` are the vehicles on the other paths, by default of the same type.
+
     `[p, q]`: from here on, the body of a vehicle on movement q keeps `CLEARANCE` from the corridor
-    of movement p. Minus infinity if the two do not conflict; infinite if this is only so once the
+    of movement p. Minus infinity if the two do not conflict; infinite if that takes until the
     rear has left the junction, as when both use the same exit lane.
     """
-    ways = _prepared(shapely.buffer(corridors(intersection, vehicle), CLEARANCE))
+    others = others or vehicle
+    ways = _prepared(shapely.buffer(corridors(intersection, others), CLEARANCE))
     ends = [path.crossing + vehicle.length for path in intersection.paths]
     past = [np.append(np.arange(0.0, end, CLEARING_STEP), end) for end in ends]
     fronts = [intersection.approach_length + s for s in past]
-    pairs = _rivals(intersection, vehicle)
+    pairs = _rivals(intersection, others)
     distances = np.full(pairs.shape, -math.inf)
     for q, p, near in _reaching(intersection, vehicle, fronts, ways, pairs):
         s = past[q]
@@ -148,13 +165,19 @@ def clearing_distances(intersection: Intersection, vehicle: VehicleType) -> Floa
 
 
 @lru_cache(maxsize=256)
-def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
-    """Where on its path a vehicle blocks another movement inside the junction."""
+def conflict_areas(
+    intersection: Intersection, vehicle: VehicleType, others: Vehicles | None = None
+) -> Areas:
+    """Where on its path a vehicle blocks another movement inside the junction.
+
+    `others` are the vehicles on the other paths, by default of the same type.
+    """
+    others = others or vehicle
     paths = intersection.paths
     fronts = [np.arange(path.entry, path.exit + vehicle.length, AREA_STEP) for path in paths]
-    swept = corridors(intersection, vehicle)
+    swept = corridors(intersection, others)
     inside = _prepared([_until_exit(path, swept[p]) for p, path in enumerate(paths)])
-    pairs = (separation(intersection, vehicle) <= 0.0) & intersection.movements.apart
+    pairs = (separation(intersection, others) <= 0.0) & intersection.movements.apart
     enter, leave = np.full((2, *pairs.shape), np.nan)
     for p, q, near in _reaching(intersection, vehicle, fronts, inside, pairs):
         if len(near):
@@ -163,9 +186,9 @@ def conflict_areas(intersection: Intersection, vehicle: VehicleType) -> Areas:
     return Areas(*(_fixed(np.where(both, table, np.nan)) for table in (enter, leave)))
 
 
-def _rivals(intersection: Intersection, vehicle: VehicleType) -> Bools:
+def _rivals(intersection: Intersection, vehicles: Vehicles) -> Bools:
     """Whether two movements conflict and come from different arms."""
-    return conflicts(intersection, vehicle) & intersection.movements.apart
+    return conflicts(intersection, vehicles) & intersection.movements.apart
 
 
 def _reaching(

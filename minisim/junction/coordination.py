@@ -23,7 +23,7 @@ from minisim.vehicle import VehicleType
 #: Grid of positions [m].
 STEP = 0.25
 
-#: Room between two bodies of which one stands or crawls [m]: one buffer (see `CLEARANCE`).
+#: Room between two bodies if one stands or crawls [m]: one buffer (see `CLEARANCE`).
 CLOSE = 0.25
 
 #: Least room if two vehicles would otherwise stand for ever, and the step of its measurement [m].
@@ -34,7 +34,7 @@ class Region(NamedTuple):
     """The forbidden region of two movements, on a grid of `STEP` from the junction entry onwards.
 
     Rows are positions of the first vehicle's front past the entry; columns, of the second's. Before
-    the entry counts as at the entry; beyond the grid is outside the region.
+    the entry counts as at the entry, and beyond the grid as outside the region.
     """
 
     close: Bools  #: whether bodies come closer than `CLOSE` within one step of the grid point
@@ -63,10 +63,18 @@ class Region(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def region(
-    intersection: Intersection, vehicle: VehicleType, first: int, second: int
+    intersection: Intersection,
+    vehicle: VehicleType,
+    first: int,
+    second: int,
+    other: VehicleType | None = None,
 ) -> Region | None:
-    """The forbidden region of two movements, by index; None if the bodies never come close."""
-    near, close = _grids(intersection, vehicle, min(first, second), max(first, second))
+    """The forbidden region of two movements, by index; None if the bodies never come close.
+
+    `other` is the type of the second vehicle, by default the same.
+    """
+    types = (vehicle, other or vehicle)[:: 1 if first < second else -1]
+    near, close = _grids(intersection, *types, min(first, second), max(first, second))
     if not near.any():
         return None
     if first > second:
@@ -75,17 +83,20 @@ def region(
 
 
 def passes(
-    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
-) -> bool:
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float,
+    other: VehicleType | None = None,
+) -> bool:  # fmt: skip
     """Whether a vehicle on a path can pass a vehicle that stands on another path.
 
-    The moving one needs `CLOSE` of room all the way on the grid or, measured, more than `TIGHT`.
-    Movements are indices; `x` and `y` are how far past the entry the fronts are [m].
+    The moving one needs `CLOSE` of room all the way by the grid, or more than `TIGHT` if measured.
+    Movements are indices; `x` and `y` are how far past the entry the fronts are [m]. `other` is the
+    type of the standing vehicle, by default the same.
     """
-    shared = region(intersection, vehicle, first, second)
+    other = other or vehicle
+    shared = region(intersection, vehicle, first, second, other)
     if shared is None or shared.way(x, y) == math.inf:
         return True
-    return _squeezes(intersection, vehicle, first, round(x, 2), second, round(y, 2))
+    return _squeezes(intersection, vehicle, first, round(x, 2), second, round(y, 2), other)
 
 
 def _free(blocked: Bools, first: float, second: float) -> float:
@@ -98,11 +109,12 @@ def _free(blocked: Bools, first: float, second: float) -> float:
 
 @lru_cache(maxsize=4096)
 def _squeezes(
-    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float
-) -> bool:
+    intersection: Intersection, vehicle: VehicleType, first: int, x: float, second: int, y: float,
+    other: VehicleType,
+) -> bool:  # fmt: skip
     """`passes`, by measurement; the grid is too coarse for the last few decimetres."""
-    one, other = intersection.paths[first], intersection.paths[second]
-    stands = bodies(other, np.array([other.entry + y]), vehicle)
+    one, its = intersection.paths[first], intersection.paths[second]
+    stands = bodies(its, np.array([its.entry + y]), other)
     past = np.arange(x, one.crossing + vehicle.length, TIGHT)
     moves = bodies(one, one.entry + past, vehicle)
     return bool((shapely.distance(moves, stands) > TIGHT).all())
@@ -110,16 +122,17 @@ def _squeezes(
 
 @lru_cache(maxsize=4096)
 def _grids(
-    intersection: Intersection, vehicle: VehicleType, first: int, second: int
+    intersection: Intersection, vehicle: VehicleType, other: VehicleType, first: int, second: int
 ) -> tuple[Bools, Bools]:
     """Whether, near each grid point, bodies come closer than `CLEARANCE`, and than `CLOSE`."""
 
-    def until_clear(path: Path) -> Shapes:
-        past = np.arange(0.0, path.crossing + vehicle.length + STEP, STEP)
-        return bodies(path, path.entry + past, vehicle)
+    def until_clear(path: Path, it: VehicleType) -> Shapes:
+        past = np.arange(0.0, path.crossing + it.length + STEP, STEP)
+        return bodies(path, path.entry + past, it)
 
-    one, other = (until_clear(intersection.paths[k]) for k in (first, second))
-    distance = shapely.distance(one[:, None], other[None, :])
+    one = until_clear(intersection.paths[first], vehicle)
+    two = until_clear(intersection.paths[second], other)
+    distance = shapely.distance(one[:, None], two[None, :])
     return _widened(distance <= CLEARANCE), _widened(distance <= CLOSE)
 
 

@@ -1,26 +1,30 @@
-"""The junction on paper: arms, and the path of every movement.
+"""The junction on paper: arms, their roads, and the path of every movement.
 
 x points east, y north, in metres. An approach lane ends at its entry, `junction_radius` from the
-centre. Between entry and exit every movement is one circular arc. No curve fitting is needed: the
-two lane centre lines mirror each other across the bisector of their arms, so entry and exit are
-equally far from where the lines meet, and one arc is tangent to both.
+centre. Where all roads are alike, every movement is one circular arc between entry and exit. No
+curve fitting is needed: the two lane centre lines mirror each other across the bisector of their
+arms, so entry and exit are equally far from where the lines meet, and one arc is tangent to both.
+Lanes of different widths, or of one-way roads, take a curve of `minisim.junction.curves`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import compress, pairwise
 from typing import Any, Literal
 
 import numpy as np
 
-from minisim.errors import InputError, number, numbers
-from minisim.junction.movements import ARM_NAMES, Movement, Movements, movements_of
-from minisim.junction.paths import ARC_SEGMENTS, Path, Way
-from minisim.parameters import checked, declared, part, real, word
+from minisim.errors import InputError, instance, items, number, numbers
+from minisim.fields import Takes
+from minisim.junction.curves import Curve, join
+from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
+from minisim.junction.paths import ARC_SEGMENTS, Floats, Path, Way
+from minisim.junction.roads import Road
+from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
@@ -69,16 +73,31 @@ def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
     return (b - a for a, b in pairwise((*bearings, bearings[0] + 360.0)))
 
 
+def _roads(name: str, value: Any) -> tuple[Road, ...] | None:
+    """One `Road` per arm; None if all are like the others."""
+    given = items(name, value, "a Road per arm")
+    roads = tuple(Road(**road) if isinstance(road, Mapping) else road for road in given)
+    for i, road in enumerate(roads):
+        instance(f"{name}[{i}]", road, Road)
+    return roads
+
+
+def _forbidden(name: str, value: Any) -> tuple[str, ...]:
+    listed = value.split(",") if isinstance(value, str) else items(name, value, "movements")
+    return tuple(it.strip() if isinstance(it, str) else str(it) for it in listed)
+
+
 @declared
 class Intersection:
-    """A junction of n ≥ 3 arms, with one lane in and one lane out on each.
+    """A junction of n ≥ 3 arms, with one lane in and one lane out on each, or one of the two.
 
     The arms are named a, b, c… in the order of their bearings. `junction_radius` defaults to the
-    smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (lane_width +
-    KERB_RADIUS) / tan(θ/2) for the smallest angle θ, 7.2 m at 90°. SUMO's lanes are 3.2 m wide too.
+    smallest that leaves a kerb of `KERB_RADIUS` between neighbouring arms: (h + KERB_RADIUS) /
+    tan(θ/2), where θ is the angle between them and h half the width of the wider road: 7.2 m at 90°
+    with two lanes of 3.2 m, SUMO's width, too.
     """
 
-    bearings: tuple[float, ...] = checked(
+    bearings: Reals[tuple[float, ...]] = checked(
         "of the arms, clockwise from true north", _bearings,
         f"3 … {len(ARM_NAMES)} numbers in [0, 360), ascending, {MIN_ANGLE:g} or more apart", "deg",
     )  # fmt: skip
@@ -87,7 +106,7 @@ class Intersection:
     )
     lane_width: float = real("width of every lane", "m", default=3.2, low=2, high=6)
     junction_radius: float = real(
-        "distance of every entry and exit from the centre; none is the smallest with a kerb of "
+        "distance of every entry and exit from the centre; none means the smallest with a kerb of "
         f"{KERB_RADIUS:g} m",
         "m", above=0, optional=True, default=None,
     )  # fmt: skip
@@ -95,18 +114,30 @@ class Intersection:
         "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
     )
     ways: tuple[Way, ...] | None = part(
-        "another simulator's curves through the junction, a Way per movement, in their order; none "
-        "is the arcs",
+        "another simulator's curves through the junction, one Way per movement, in order; none "
+        "means arcs",
         tuple, optional=True, default=None,
     )  # fmt: skip
+    roads: Takes[tuple[Road, ...] | None, Iterable[Road | Mapping[str, Any]] | None] = checked(
+        "of the arms, where they differ; none if all are alike and two-way", _roads,
+        "a Road per arm", optional=True, default=None,
+    )  # fmt: skip
+    forbidden: Takes[tuple[str, ...], Iterable[str]] = checked(
+        "movements that no vehicle may take", _forbidden, "movements such as a2", default=()
+    )
 
     def __post_init__(self) -> None:
-        sharpest = math.radians(min(_gaps(self.bearings)))
-        smallest = (self.lane_width + KERB_RADIUS) / math.tan(sharpest / 2.0)
+        self._check_roads()
+        halves = self.half_widths
+        smallest = max(
+            (max(pair) + KERB_RADIUS) / math.tan(math.radians(gap) / 2.0)
+            for pair, gap in zip(pairwise((*halves, halves[0])), _gaps(self.bearings), strict=True)
+        )
         if self.junction_radius is None:
             object.__setattr__(self, "junction_radius", smallest)
-        number("junction_radius [m]", self.junction_radius, above=0, below=self.arm_length - 10)
-        tightest = min(map(self._arc_radius, self.movements))
+        number("junction_radius [m]", self.junction_radius, above=0, below=min(self.lengths) - 10)
+        radii = map(self._radius, self.movements)
+        tightest = min(compress(radii, self.allowed))
         if tightest < MIN_PATH_RADIUS - 1e-9:
             raise InputError(
                 f"junction_radius {self.junction_radius:g} m leaves a path of radius "
@@ -130,10 +161,72 @@ class Intersection:
         """All n(n−1) movements in the order of the harmony matrix: a1, a2, …, b1, …"""
         return movements_of(self.n)
 
+    @cached_property
+    def allowed(self) -> Bools:
+        """Whether each movement may be driven, shape (m,).
+
+        It may not if it is forbidden, or if it comes from or leads into a road against its traffic.
+        """
+        movements, forbidden = self.movements, {self.index(name) for name in self.forbidden}
+        entered = np.array([road.traffic != "out" for road in self._each_road])
+        left = np.array([road.traffic != "in" for road in self._each_road])
+        free = np.array([k not in forbidden for k in range(len(movements))])
+        return _fixed(free & entered[movements.origins] & left[movements.exits])
+
+    @property
+    def allowed_by_lane(self) -> Bools:
+        """The same by lane and manoeuvre, shape (n, n−1)."""
+        return self.allowed.reshape(self.n, self.n - 1)
+
+    @property
+    def approaches(self) -> tuple[int, ...]:
+        """The arms from which some movement is allowed."""
+        return tuple(np.unique(self.movements.origins[self.allowed]).tolist())
+
+    @property
+    def departures(self) -> tuple[int, ...]:
+        """The arms into which some movement is allowed."""
+        return tuple(np.unique(self.movements.exits[self.allowed]).tolist())
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """Distance from the centre to the far end of each arm's road [m]."""
+        return tuple(road.length or self.arm_length for road in self._each_road)
+
+    @property
+    def lane_widths(self) -> tuple[float, ...]:
+        """Width of the lanes of each arm [m]."""
+        return tuple(road.lane_width or self.lane_width for road in self._each_road)
+
+    @cached_property
+    def offsets(self) -> tuple[float, ...]:
+        """Distance of each arm's lanes from its axis [m]; 0 on one-way roads."""
+        each = zip(self.lane_widths, self._each_road, strict=True)
+        return tuple(0.0 if road.one_way else width / 2.0 for width, road in each)
+
+    @property
+    def half_widths(self) -> tuple[float, ...]:
+        """Half the width of each arm's road [m]."""
+        each = zip(self.lane_widths, self.offsets, strict=True)
+        return tuple(width if offset else width / 2.0 for width, offset in each)
+
     @property
     def approach_length(self) -> float:
-        """Distance from the road entry to the junction entry [m], the same on every arm."""
-        return self.arm_length - self.junction_radius
+        """Distance from the far end of the longest approach lane to the junction entry [m].
+
+        This is the `s` of the junction entry on all paths.
+        """
+        return max(self.lengths[arm] for arm in self.approaches) - self.junction_radius
+
+    @property
+    def shortest_approach(self) -> float:
+        """The same of the shortest approach lane [m]."""
+        return min(self.lengths[arm] for arm in self.approaches) - self.junction_radius
+
+    def refuse_roads(self, what: str) -> None:
+        """Raise `InputError` if the approach lanes are not equally long, as `what` needs."""
+        if self.shortest_approach < self.approach_length:
+            raise InputError(f"{what} counts metres from insertion: give all roads one length")
 
     def index(self, movement: Movement | str) -> int:
         """Position of a movement in `movements`; `InputError` if it does not exist."""
@@ -165,47 +258,92 @@ class Intersection:
             return speed
         return math.sqrt(lateral * self.path(movement).radius)
 
+    @property
+    def _each_road(self) -> tuple[Road, ...]:
+        return self.roads or (Road(),) * self.n
+
     def _half_angle(self, movement: Movement) -> float:
         """Half the clockwise angle from the arm of origin to the arm of exit [rad]."""
         to = self.bearings[self.exit_arm(movement)]
         return math.radians((to - self.bearings[movement.origin]) % 360.0) / 2.0
 
+    def _radius(self, movement: Movement) -> float:
+        """Smallest radius of a path [m]; at most 0 if one arc should do, and none can."""
+        if self._mirrored(movement):
+            return self._arc_radius(movement)
+        return self._curve(movement).radius
+
+    def _mirrored(self, movement: Movement) -> bool:
+        """Whether the lanes mirror each other, so that one arc joins them."""
+        return self.offsets[movement.origin] == self.offsets[self.exit_arm(movement)]
+
     def _arc_radius(self, movement: Movement) -> float:
         slope = math.tan(self._half_angle(movement))
-        offset = self.lane_width / 2.0 / slope
+        offset = self.offsets[movement.origin] / slope
         # From the entry to where the two lane centre lines meet.
         tangent = self.junction_radius + (-offset if self.side == "left" else offset)
         return tangent * min(abs(slope), 1e6)
 
+    def _ends(self, movement: Movement) -> tuple[Floats, Floats, Floats, Floats]:
+        """Position and unit heading at the entry, and at the exit."""
+        exit_arm, arms = self.exit_arm(movement), self.arms
+        heading_in, heading_out = (
+            -np.array(arms[movement.origin].outward),
+            np.array(arms[exit_arm].outward),
+        )
+        left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
+        keep = 1.0 if self.side == "left" else -1.0
+        offset, offset_out = keep * self.offsets[movement.origin], keep * self.offsets[exit_arm]
+        start = -heading_in * self.junction_radius + left_in * offset
+        end = heading_out * self.junction_radius + left_out * offset_out
+        return start, heading_in, end, heading_out
+
+    def _curve(self, movement: Movement) -> Curve:
+        return join(*self._ends(movement), ARC_SEGMENTS + 1)
+
     def _build_path(self, movement: Movement) -> Path:
         exit_arm, entry = self.exit_arm(movement), self.approach_length
-        heading_in = -np.array(self.arms[movement.origin].outward)
-        heading_out = np.array(self.arms[exit_arm].outward)
-        left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
-        offset = self.lane_width / 2.0 if self.side == "left" else -self.lane_width / 2.0
-        start = -heading_in * self.junction_radius + left_in * offset
-        end = heading_out * self.junction_radius + left_out * offset
+        start, heading_in, end, heading_out = self._ends(movement)
 
         # Clockwise turn: 0 for straight on, positive to the right.
         turn = 2.0 * self._half_angle(movement) - math.pi
-        straight = abs(turn) < 1e-4
-        radius = math.inf if straight else self._arc_radius(movement)
+        mirrored = self._mirrored(movement)
+        straight = mirrored and abs(turn) < 1e-4
+        radius = math.inf if straight else self._radius(movement)
         t = np.linspace(0.0, 1.0, ARC_SEGMENTS + 1)[:, None]
         if self.ways is not None:
             way = self.ways[self.index(movement)]
             length, points = way.length, way.resampled(ARC_SEGMENTS + 1)
         elif straight:
             length, points = float(np.linalg.norm(end - start)), start + (end - start) * t
+        elif not mirrored or radius < MIN_PATH_RADIUS - 1e-9:  # too tight only if not allowed
+            points, length, radius = self._curve(movement)
         else:
             length, angle = radius * abs(turn), t * abs(turn)
             inward = math.copysign(1.0, turn) * (1.0 - np.cos(angle))
+            left_in = np.array([-heading_in[1], heading_in[0]])
             points = start + radius * (np.sin(angle) * heading_in - inward * left_in)
             points[-1] = end
         return Path(
             movement, exit_arm, entry=entry, exit=entry + length,
-            length=entry + length + entry, radius=radius, points=points,
-            heading_in=heading_in, heading_out=heading_out,
+            length=entry + length + (self.lengths[exit_arm] - self.junction_radius), radius=radius,
+            points=points, heading_in=heading_in, heading_out=heading_out,
+            start=entry - (self.lengths[movement.origin] - self.junction_radius),
         )  # fmt: skip
+
+    def _check_roads(self) -> None:
+        if self.roads is not None and len(self.roads) != self.n:
+            raise InputError(f"roads must be one Road per arm, {self.n}, got {len(self.roads)}")
+        places = sorted({self.index(name) for name in self.forbidden})
+        object.__setattr__(self, "forbidden", tuple(str(self.movements[k]) for k in places))
+        if self.roads == (Road(),) * self.n:
+            object.__setattr__(self, "roads", None)
+        if not self.allowed.any():
+            raise InputError("no movement is allowed: every one is forbidden or against its road")
+        if self.ways is not None and (self.roads is not None or self.forbidden):
+            raise InputError(
+                "ways are of a junction whose roads are alike; leave out roads and forbidden"
+            )
 
     def _check_ways(self) -> None:
         if self.ways is None:
@@ -218,3 +356,8 @@ class Intersection:
                 raise InputError(f"ways, {movement}: a Way of two or more points is needed")
             number(f"length of the way of {movement} [m]", way.length, low=1, high=200)
             number(f"waiting position of {movement} [m]", way.wait, low=0, below=way.length)
+
+
+def _fixed(table: Bools) -> Bools:
+    table.setflags(write=False)
+    return table

@@ -80,7 +80,7 @@ class RightOfWay(NamedTuple):
 
 
 def right_of_way(intersection: Intersection) -> RightOfWay:
-    """From the given ways; on arcs none must give way, and all that cross or join meet."""
+    """By the given ways; on arcs, none has to give way, and all that cross or join meet."""
     movements, ways = intersection.movements, intersection.ways
     if ways is not None:
         foes = np.array([[name in way.foes for name in movements.names] for way in ways])
@@ -157,7 +157,7 @@ class _Curve(NamedTuple):
         return {0: _Curve(before, self.wait), 1: _Curve(behind, self.length - self.wait)}
 
     def direction(self, at: float) -> float:
-        """Of the polyline after `at` of its own metres [rad]."""
+        """The polyline's, `at` of its own metres on [rad]."""
         k = min(int(np.searchsorted(self.distances, at, side="right")), len(self.points) - 1)
         dx, dy = self.points[k] - self.points[k - 1]
         return math.atan2(dy, dx)

@@ -45,7 +45,8 @@ def turning_room(intersection: Intersection, vehicle: VehicleType) -> float:
     gaps = np.arange(0.0, 3.0, 0.1) * vehicle.width
     reach = branch(intersection, vehicle)
     paths, least = intersection.paths, 0.0
-    for p, q in np.argwhere(reach > 0.0).tolist():
+    allowed = intersection.allowed
+    for p, q in np.argwhere((reach > 0.0) & allowed & allowed[:, None]).tolist():
         path = paths[p]
         rear = np.arange(path.entry, min(float(reach[p, q]), path.exit + vehicle.length), 0.3)
         first = path.pose(rear + vehicle.length, vehicle.length)

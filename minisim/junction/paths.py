@@ -1,6 +1,7 @@
 """Paths through a junction, and bodies on them.
 
-`s` is how far a vehicle's front bumper has come on its path [m], from the start of its road.
+`s` is where a vehicle's front bumper is on its path [m]. The junction's entry has the same `s` on
+all paths, and the longest approach lane begins at 0.
 """
 
 from __future__ import annotations
@@ -63,6 +64,7 @@ class Path:
     points: Floats  #: from entry to exit, equally spaced [m], shape (ARC_SEGMENTS + 1, 2)
     heading_in: Floats  #: unit vector on the approach lane, shape (2,)
     heading_out: Floats  #: and on the exit lane
+    start: float = 0.0  #: `s` where its road begins [m]
 
     @property
     def crossing(self) -> float:
@@ -109,7 +111,7 @@ class Path:
     @property
     def line(self) -> shapely.LineString:
         """The centre line as a shapely polyline, from road entry to road end."""
-        ends = self.position([0.0, self.length])
+        ends = self.position([self.start, self.length])
         return shapely.LineString(np.vstack([ends[:1], self.points, ends[1:]]))
 
 

@@ -31,13 +31,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from minisim.errors import InputError, MinisimError, choice, items, show
-from minisim.parameters import checked, declared, parameters, switch, text, word
+from minisim.parameters import Switch, checked, declared, parameters, switch, text, word
 from minisim.results.trips import Floats, Trips, queue_growth
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
 
-#: Keys of summaries and columns of sweeps, which no metric may have as its name.
+#: Names that no metric may have: keys of summaries and columns of sweeps.
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
     "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
@@ -46,12 +46,12 @@ RESERVED: Final = frozenset({
 })  # fmt: skip
 
 #: What trips can be grouped by -> the groups' key in a summary.
-GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds"}
+GROUPS: Final = {"lane": "lanes", "movement": "movements", "kind": "kinds", "type": "types"}
 
 #: Suffixes of the columns with percentiles (numpy's linear method) and the maximum.
 SPREAD: Final = ("p50", "p95", "max")
 
-#: How columns begin and end that are made of metrics.
+#: Prefixes and suffixes of columns made from metrics.
 BEGINNINGS: Final = ("complete_", *(f"{key}_" for key in GROUPS.values()))
 ENDINGS: Final = tuple(f"_{what}" for what in (*SPREAD, "ci95", "pi95"))
 
@@ -60,7 +60,7 @@ def _name(title: str, value: Any) -> Any:
     if not isinstance(value, str) or not value.isidentifier():
         raise InputError(f"{title} must be letters, digits and underscores, got {show(value)}")
     if value in RESERVED or value.startswith(BEGINNINGS) or value.endswith(ENDINGS):
-        raise InputError(f"{title} must not be that of a column of runs, got {value!r}")
+        raise InputError(f"{title} must not be a column of runs, got {value!r}")
     return value
 
 
@@ -75,8 +75,7 @@ class Metric:
     """One metric: its column, its meaning and the function that measures it.
 
     The function takes the `Trips` if `needs` is "trips", otherwise the `Run`, both without the
-    warm-up (`Run.counted`). A number that needs only trips is also measured for each lane,
-    movement and kind.
+    warm-up (`Run.counted`). A number that needs only trips also has a value per group of trips.
     """
 
     name: str = checked("the column", _name, "identifier", label="name of a metric")
@@ -87,18 +86,16 @@ class Metric:
     )  # fmt: skip
     unit: str = text("such as s", empty=True, default="")
     per: str = word("what has a value", ("trip", "run"), default="run")
-    needs: str = word(
-        "what it is measured from", ("trips", "run", "trajectories", "counts"), default="run"
-    )
+    needs: str = word("measured from", ("trips", "run", "trajectories", "counts"), default="run")
     phase: str = word(
         "of a trip, in which a value accumulates: on the road, or before insertion",
         ("drive", "queue"), default="drive",
     )  # fmt: skip
-    title: str = text("for headings and axes; empty is its name", empty=True, default="")
+    title: str = text("for headings and axes; empty means its name", empty=True, default="")
     symbol: str = text("in equations", empty=True, default="")
     meaning: str = text("in one line", empty=True, default="")
     equation: str = text("with its source", empty=True, default="")
-    usual: bool = switch("whether every summary has it", default=False)
+    usual: Switch = switch("whether every summary has it", default=False)
 
     @property
     def grouped(self) -> bool:
@@ -138,7 +135,7 @@ class Metric:
     def _measured(self, subject: Run | Trips) -> Any:
         try:
             return self.of(subject)
-        except Exception as error:  # a caller's function may raise anything
+        except (Exception, SystemExit) as error:  # a caller's function may raise anything
             frames = traceback.extract_tb(error.__traceback__)[1:2]
             place = "".join(f" ({Path(it.filename).name}, line {it.lineno})" for it in frames)
             what = f" raised {type(error).__name__}: {error}{place}"
@@ -267,7 +264,7 @@ Asked = str | Metric | Callable[[Any], Any]
 
 
 def metric_of(function: Callable[[Any], Any]) -> Metric:
-    """The metric of a function with a name, whose attributes may be fields, such as `unit`."""
+    """The metric of a named function, whose attributes may set fields such as `unit`."""
     known = {it.name for it in parameters(Metric)} & vars(function).keys()
     return Metric(function.__name__, function, **{key: vars(function)[key] for key in known})
 
@@ -291,7 +288,7 @@ def asked_metrics(metrics: str | Iterable[Asked]) -> tuple[Metric, ...]:
         elif not isinstance(metric, Metric):
             metric = METRICS[choice("metric", metric, METRICS)]
         if METRICS.get(metric.name, metric) is not metric:
-            raise InputError(f"a metric {metric.name!r} is there already; give yours another name")
+            raise InputError(f"there is already a metric {metric.name!r}; give yours another name")
         if asked.setdefault(metric.name, metric) != metric:
             raise InputError(f"two metrics are called {metric.name!r}")
     return tuple(asked.values())

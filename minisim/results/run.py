@@ -21,7 +21,7 @@ from minisim.junction.movements import ARM_NAMES
 from minisim.names import name_of
 from minisim.results.metrics import Asked
 from minisim.results.summary import summarise, trip_table
-from minisim.results.trajectories import TRAJECTORY_COLUMNS
+from minisim.results.trajectories import TRAJECTORY_COLUMNS, TYPE
 from minisim.results.trips import Trips
 from minisim.ticks import first_tick
 from minisim.version import __version__
@@ -55,7 +55,7 @@ class ScenarioLike(Protocol):
 
     @property
     def depart_speed(self) -> float | None:
-        """The most at insertion [m/s]; None means the highest safe speed."""
+        """Highest speed at insertion [m/s]; None means the highest safe one."""
 
     def site(self, seed: int) -> Site:
         """What the controller may know."""
@@ -84,7 +84,7 @@ class Run:
     columns: Trips  #: all trips as arrays, those of the warm-up too
     record: str | None  #: what was recorded of the trajectories: "junction", "all" or None
     trace: Records  #: the recording
-    rows: Records  #: vehicle id and path of each row to which the trace refers
+    rows: Records  #: vehicle id, path and type of each row to which the trace refers
     #: What the controller's session has counted since the warm-up.
     counts: Mapping[str, float] = field(default_factory=dict)
     #: First and last time of the recording [s]; the run may have ended earlier.
@@ -97,11 +97,11 @@ class Run:
     @cached_property
     def trips(self) -> pd.DataFrame:
         """One row per trip that counts, in demand order; columns `summary.TRIP_COLUMNS`."""
-        return trip_table(self.counted.columns, self.counted.kinds)
+        return trip_table(self.counted.columns, self.counted.kinds, self.site.fleet.names)
 
     @cached_property
     def counted(self) -> Run:
-        """The run that metrics get: trips and trajectories from the warm-up on, up to the end."""
+        """The part of the run that metrics measure: trips and trajectories after the warm-up."""
         start = float(self.scenario.warmup)
         rows = self.columns.counted(start)
         if self.columns.start == start and rows == slice(0, len(self.columns.lane)):
@@ -127,7 +127,8 @@ class Run:
         what = self.scenario
         return {
             "controller": name_of(self.controller), "scenario": what.name,
-            "profile": what.profile_name, "density": what.density, "seed": self.seed,
+            "profile": what.profile_name, "fleet": str(self.site.fleet), "density": what.density,
+            "seed": self.seed,
             "horizon_s": what.horizon, "warmup_s": what.warmup, "host": self.host["host"],
             **summarise(self, metrics, by),
         }  # fmt: skip
@@ -179,13 +180,13 @@ class Run:
         trace = self.trace
         trace = trace[np.lexsort((self.rows["id"][trace["row"]], trace["tick"]))]
         rows = self.rows[trace["row"]]
-        intersection, length = self.site.intersection, self.site.vehicle.length
+        intersection, types = self.site.intersection, self.site.types
         movements, path_of = intersection.movements, rows["path"]
         front, heading = np.zeros((2, len(trace), 2))
-        for p in np.unique(path_of).tolist():
-            here = path_of == p
+        for p, kind in np.unique(rows[["path", "type"]]).tolist():
+            here = (path_of == p) & (rows["type"] == kind)
             front[here] = intersection.paths[p].position(trace["s"][here])
-            heading[here] = intersection.paths[p].pose(trace["s"][here], length)[1]
+            heading[here] = intersection.paths[p].pose(trace["s"][here], types[kind].length)[1]
         lanes = pd.Index(list(ARM_NAMES[: intersection.n]))
         columns = (
             np.round(trace["tick"] * self.site.dt, 6), rows["id"],
@@ -194,4 +195,8 @@ class Run:
             np.degrees(np.arctan2(*heading.T)) % 360.0, trace["v"], trace["a"],
             trace["released"] != 0,
         )  # fmt: skip
-        return pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
+        frame = pd.DataFrame(dict(zip(TRAJECTORY_COLUMNS, columns, strict=True)))
+        if len(types) > 1:
+            names = pd.Index(self.site.fleet.names)
+            frame.insert(2, TYPE, pd.Series(pd.Categorical.from_codes(rows["type"], names)))
+        return frame

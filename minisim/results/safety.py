@@ -1,11 +1,9 @@
 """Safety monitors on a recording: TTC, DRAC, PET and braking, as SUMO's SSM device defines them.
 
-Each is a function of a trajectory frame (`run.trajectories`; record="junction" is enough) and the
-site:
+Each is a function of a trajectory frame (`run.trajectories`; record="junction" will do) and a site:
 
-* following — a vehicle and its leader. The leader is the vehicle ahead in the same lane, until
-  its rear has left their shared path, or the next one from another arm bound for the same exit
-  lane.
+* following — a vehicle and its leader: the vehicle ahead in the same lane, until its rear has left
+  their shared path, or the next one from another arm bound for the same exit lane.
   TTC = gap/Δv (Hayward 1972) and DRAC = Δv²/(2·gap), both only while closing (Δv > 0).
 * encroachment — two vehicles passing through the same conflict area of two movements.
   PET = time when the second enters − time when the first has left; at 0 or less, both were inside.
@@ -35,6 +33,7 @@ from minisim.results.trajectories import (
     RIGHT_OF_WAY,
     SPEED,
     TIME,
+    TYPE,
     VEHICLE,
     S,
     check_columns,
@@ -53,6 +52,8 @@ class Rows(NamedTuple):
     step: Ints
     vehicle: Ints
     movement: Ints
+    type: Ints
+    length: Floats
     s: Floats
     v: Floats
     goes: Bools
@@ -61,8 +62,8 @@ class Rows(NamedTuple):
 def safety_summary(frame: pd.DataFrame, site: Site) -> dict[str, float | int | None]:
     """The closest calls in a recording; None if nothing of the kind happened.
 
-    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` are the
-    encroachments, besides the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
+    `min_ttc_s` is of following and crossing, `max_drac_mps2` of following; `pets` counts all
+    encroachments, others the short ones (`minisim.results.metrics.PETS`). Raises `InputError` for
     a missing column, or a movement that the site does not have.
     """
     rows = _rows(frame, site)
@@ -115,15 +116,14 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Each pair of vehicles that pass a conflict area of two movements one after the other.
 
     A vehicle still inside when its recording ends counts as leaving then; one whose entry was not
-    recorded does not count. Columns `time_s` (when the second enters), `first, second, pet_s`,
-    sorted by time.
+    recorded does not count. Columns `time_s` (the second enters; sorted), `first, second, pet_s`.
     """
     rows = _rows(frame, site)
-    areas = conflict_areas(site.intersection, site.vehicle)
+    areas = _areas(site)
     vehicle, movement, enter, leave = _passages(rows, areas)
-    by_movement = [np.flatnonzero(movement == p) for p in range(len(areas.enter))]
+    by_movement = [np.flatnonzero(movement == p) for p in range(areas.enter.shape[1])]
     pairs = [np.empty((0, 4))]
-    for p, q in np.argwhere(np.triu(np.isfinite(areas.enter))).tolist():
+    for p, q in np.argwhere(np.triu(np.isfinite(areas.enter).any(axis=0))).tolist():
         passing = np.concatenate([by_movement[p], by_movement[q]])
         other = np.repeat([q, p], [len(by_movement[p]), len(by_movement[q])])
         start, end = enter[passing, other], leave[passing, other]
@@ -133,30 +133,29 @@ def encroachments(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
         first, second = order[:-1][changes], order[1:][changes]
         ids = vehicle[passing[first]], vehicle[passing[second]]
         pairs.append(np.stack([start[second], *ids, start[second] - end[first]], axis=-1))
-    time, firsts, seconds, pets = np.concatenate(pairs).T
-    order = np.argsort(time, kind="stable")
-    first, second = (ids[order].astype(np.int64) for ids in (firsts, seconds))
-    return pd.DataFrame(
-        {"time_s": time[order], "first": first, "second": second, "pet_s": pets[order]}
-    )
+    table = pd.DataFrame(np.concatenate(pairs), columns=["time_s", "first", "second", "pet_s"])
+    table = table.sort_values("time_s", kind="stable", ignore_index=True)
+    return table.astype({"first": np.int64, "second": np.int64})
 
 
 def crossings(frame: pd.DataFrame | Rows, site: Site) -> pd.DataFrame:
     """Each step with two vehicles on a crossing course: `time_s, first, second, ttc_s`."""
     rows = _rows(frame, site)
-    areas = conflict_areas(site.intersection, site.vehicle)
-    clear = np.array([path.exit for path in site.intersection.paths]) + site.vehicle.length
-    going = np.flatnonzero(rows.goes & (rows.s < clear[rows.movement]))
+    areas = _areas(site)
+    clear = np.array([path.exit for path in site.intersection.paths])[rows.movement] + rows.length
+    going = np.flatnonzero(rows.goes & (rows.s < clear))
     firsts, seconds, ttcs = [], [], []
     pending, ahead = np.arange(len(going)), 1
     while len(pending := pending[pending + ahead < len(going)]):
         pending = pending[rows.step[going[pending]] == rows.step[going[pending + ahead]]]
         a, b = going[pending], going[pending + ahead]
         p, q = rows.movement[a], rows.movement[b]
-        meet = np.isfinite(areas.enter[p, q])
-        a, b, p, q = a[meet], b[meet], p[meet], q[meet]
-        a_in, a_out = _times(rows, a, areas.enter[p, q]), _times(rows, a, areas.leave[p, q])
-        b_in, b_out = _times(rows, b, areas.enter[q, p]), _times(rows, b, areas.leave[q, p])
+        a_area, b_area = (rows.type[a], p, q), (rows.type[b], q, p)
+        meet = np.isfinite(areas.enter[a_area] + areas.enter[b_area])
+        a, b = a[meet], b[meet]
+        a_area, b_area = (tuple(k[meet] for k in area) for area in (a_area, b_area))
+        a_in, a_out = (_times(rows, a, place[a_area]) for place in areas)
+        b_in, b_out = (_times(rows, b, place[b_area]) for place in areas)
         a_first = a_in <= b_in
         late = np.where(a_first, b_in, a_in)
         free = np.where(a_first, a_out, b_out)
@@ -181,9 +180,13 @@ def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
     time, s, speed = (frame[name].to_numpy(dtype=float) for name in (TIME, S, SPEED))
     movement = movement_index(frame, site)
     entries = np.array([path.entry for path in site.intersection.paths])
+    type = np.zeros(len(frame), int)
+    if TYPE in frame.columns:
+        type = site.fleet.indices(frame[TYPE].to_numpy(dtype=str))
     return Rows(
         time=time, step=np.cumsum(np.diff(time, prepend=time[:1]) > 0.0),
         vehicle=frame[VEHICLE].to_numpy(dtype=np.int64), movement=movement, s=s, v=speed,
+        type=type, length=np.array([it.length for it in site.types])[type],
         goes=frame[RIGHT_OF_WAY].to_numpy(dtype=bool) | (s >= entries[movement]),
     )  # fmt: skip
 
@@ -194,7 +197,7 @@ def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     lane = site.intersection.movements.origins[rows.movement]
     order = np.lexsort((-rows.s, lane, rows.step))
     group = (rows.step * site.intersection.n + lane)[order]
-    rear = rows.s - site.vehicle.length
+    rear = rows.s - rows.length
     followers, leaders = [], []
     pending, back = np.arange(len(order)), 1
     while len(pending := pending[pending >= back]):
@@ -211,8 +214,7 @@ def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
 def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers in and past the junction and of their leaders to the exit lane; gaps [m].
 
-    Leaders come from another arm. There must be a gap: when two bodies are side by side, neither
-    follows the other yet.
+    Leaders come from another arm. There must be a gap: two bodies side by side do not follow yet.
     """
     paths, movements = site.intersection.paths, site.intersection.movements
     origin, exit_arm = movements.origins[rows.movement], movements.exits[rows.movement]
@@ -221,21 +223,27 @@ def _leaders_to_exit(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     past = rows.s - ends[:, 1]
     order = inside[np.lexsort((-past[inside], exit_arm[inside], rows.step[inside]))]
     follower, leader = order[1:], order[:-1]
-    gap = past[leader] - site.vehicle.length - past[follower]
+    gap = past[leader] - rows.length[leader] - past[follower]
     pairs = (gap > 0.0) & (origin[follower] != origin[leader])
     for same in (rows.step, exit_arm):
         pairs &= same[follower] == same[leader]
     return follower[pairs], leader[pairs], gap[pairs]
 
 
+def _areas(site: Site) -> Areas:
+    """The conflict areas of each type among all others, shape (types, m, m)."""
+    own = [conflict_areas(site.intersection, it, site.fleet) for it in site.types]
+    return Areas(*map(np.stack, zip(*own, strict=True)))
+
+
 def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
     """Vehicles and their movements (k,), and when each enters and leaves the areas (k, m) [s]."""
     if not len(rows.time):
-        empty = np.empty((0, len(areas.enter)))
+        empty = np.empty((0, areas.enter.shape[1]))
         return np.empty(0, np.int64), np.empty(0, np.int64), empty, empty
     order = np.lexsort((rows.time, rows.vehicle))
     vehicle, first, code = np.unique(rows.vehicle[order], return_index=True, return_inverse=True)
-    s, movement = rows.s[order], rows.movement[order][first]
+    s, movement, type = rows.s[order], rows.movement[order][first], rows.type[order][first]
     last = np.append(first[1:], len(order)) - 1
     here = code * _FAR + s
 
@@ -245,7 +253,7 @@ def _passages(rows: Rows, areas: Areas) -> tuple[Ints, Ints, Floats, Floats]:
         at = start + np.minimum(place, s[last, None])
         return np.asarray(np.interp(at, here, rows.time[order]))
 
-    enter, leave = areas.enter[movement], areas.leave[movement]
+    enter, leave = areas.enter[type, movement], areas.leave[type, movement]
     seen = (enter >= s[first, None]) & (enter <= s[last, None])
     return vehicle, movement, np.where(seen, when(enter), np.nan), when(leave)
 

@@ -4,8 +4,7 @@ The file holds `run.json`, `trips.parquet`, `trace.parquet` and `rows.parquet`. 
 or not at all. Zip's comment at its end is a digest of all before it, which reveals damage.
 
 Objects of our own classes (`PACKAGES`) are written as class and fields, and come back as they
-were. Other scenarios and controllers come back as stand-ins with their name and text. Reading
-imports only our own modules.
+were; other scenarios and controllers as stand-ins. Reading imports only our own modules.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ class _StandIn:
 
 @dataclass(frozen=True, repr=False)
 class SavedController(_StandIn):
-    """Stands in for a controller of another class than ours."""
+    """Stands in for a controller whose class is not ours."""
 
     what = "controller"
     start = _StandIn.refuse
@@ -72,7 +71,7 @@ class SavedController(_StandIn):
 
 @dataclass(frozen=True, repr=False)
 class SavedScenario(_StandIn):
-    """Stands in for a scenario of another class than ours."""
+    """Stands in for a scenario whose class is not ours."""
 
     what = "scenario"
     profile_name: str

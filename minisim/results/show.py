@@ -18,9 +18,8 @@ LONGEST = 60
 def as_text(run: Run) -> str:
     """What was run, its trips and its means, in three lines."""
     summary = run.summary()
-    means = ", ".join(
-        f"{METRICS[name].title} {_number(summary[name])} {METRICS[name].unit}" for name in MEANS
-    )
+    shown = [(METRICS[name], _number(summary[name])) for name in MEANS]
+    means = ", ".join(f"{metric.title} {value} {metric.unit}" for metric, value in shown)
     return f"Run of {_what(summary)}\n  {_trips(summary)}\n  means: {means}"
 
 

@@ -28,19 +28,22 @@ if TYPE_CHECKING:
     from minisim.results.run import Run
 
 #: Columns of the trip table, the same in CSV. Times are in seconds, NaN if not reached. If
-#: vehicles have kinds, `kind` follows `vehicle`.
+#: vehicles have kinds, `kind` follows `vehicle`; if they are of several types, `type` does.
 TRIP_COLUMNS: Final = (
     "vehicle", "demand_time_s", "depart_s", "arrival_s", "lane", "manoeuvre", "exit_lane", *MEANS,
 )  # fmt: skip
 
 
-def trip_table(trips: Trips, kinds: tuple[str, ...] = ()) -> pd.DataFrame:
+def trip_table(
+    trips: Trips, kinds: tuple[str, ...] = (), types: tuple[str, ...] = ()
+) -> pd.DataFrame:
     """Trips as a DataFrame with `TRIP_COLUMNS`; missing values are NaN."""
     import pandas as pd
 
     arms = np.array(list(ARM_NAMES))
     columns = {
         "vehicle": trips.vehicle, **({"kind": np.array(kinds)} if kinds else {}),
+        **({"type": np.array(types)[trips.type]} if len(types) > 1 else {}),
         "demand_time_s": trips.demand_time, "depart_s": trips.depart, "arrival_s": trips.arrival,
         "lane": arms[trips.lane], "manoeuvre": trips.manoeuvre, "exit_lane": arms[trips.exit_lane],
     }  # fmt: skip
@@ -57,8 +60,8 @@ def summarise(
     """The usual numbers of a run, and the metrics asked for.
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
-    complete form. Trips are grouped by lane (`lanes`) and, if vehicles have kinds, by kind
-    (`kinds`).
+    complete form. Trips are grouped by lane (`lanes`) and, if there are several, by kind (`kinds`)
+    and type (`types`).
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
@@ -68,8 +71,8 @@ def summarise(
         by: further groupings, such as "movement".
 
     Raises `InputError` for an unknown metric or group, a metric that needs trajectories that were
-    not recorded, a metric whose function raises or returns the wrong type or shape, or a count of
-    the controller's with the name of another number.
+    not recorded, a metric whose function raises or returns the wrong type or shape, or a
+    controller's count that has the name of another number.
     """
     run = run.counted
     asked = asked_metrics(metrics)
@@ -78,13 +81,14 @@ def summarise(
     measured = _Measured(run, table, asked)
     summary = measured.of(np.arange(len(run.columns.lane)))
     complete = summary.pop("complete")
-    for key in ("lanes", *(["kinds"] if run.kinds else []), *keys):
+    several = ["kinds"] * bool(run.kinds) + ["types"] * (len(run.site.types) > 1)
+    for key in dict.fromkeys(("lanes", *several, *keys)):
         summary[key] = {name: measured.of(rows) for name, rows in _groups(run, key).items()}
     summary["complete"] = complete
     summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":
-            raise InputError(f"{name!r} is also what the controller calls a count of its own")
+            raise InputError(f"the controller's count {name!r} has the name of another number")
     return {**summary, **run.counts}
 
 
@@ -144,6 +148,8 @@ def _groups(run: Run, key: str) -> dict[str, Ints]:
         names, group = ARM_NAMES[: movements.n], trips.lane
     elif key == "movements":
         names, group = movements.names, movements.index_of[trips.lane, trips.manoeuvre]
+    elif key == "types":
+        names, group = run.site.fleet.names, trips.type
     else:
         kinds, group = np.unique(np.array(run.kinds, dtype=str), return_inverse=True)
         names = kinds.tolist()

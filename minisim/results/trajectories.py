@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 #: Columns of `run.trajectories`: a row per vehicle and step, sorted by time, then vehicle.
 TIME: Final = "time_s"
 VEHICLE: Final = "vehicle"
+TYPE: Final = "type"  #: after the vehicle, if there is more than one type
 LANE: Final = "lane"
 MANOEUVRE: Final = "manoeuvre"
 S: Final = "s_m"
@@ -87,14 +88,12 @@ def movement_index(frame: pd.DataFrame, site: Site) -> npt.NDArray[np.int64]:
     if unknown or (codes < 0).any():
         lane = unknown[0] if unknown else "(missing)"
         raise InputError(f"lane {lane} is not in the geometry (a … {ARM_NAMES[n - 1]})")
-    manoeuvre = frame[MANOEUVRE].to_numpy(dtype=np.int64)
-    outside = (manoeuvre < 1) | (manoeuvre >= n)
+    turn = frame[MANOEUVRE].to_numpy(dtype=np.int64)
+    outside = (turn < 1) | (turn >= n)
     if outside.any():
-        raise InputError(
-            f"manoeuvre {manoeuvre[outside][0]} does not exist with {n} arms (1 … {n - 1})"
-        )
+        raise InputError(f"manoeuvre {turn[outside][0]} does not exist with {n} arms (1 … {n - 1})")
     lanes = np.array([index[str(name)] for name in names], dtype=np.int64)
-    return np.asarray(site.intersection.movements.index_of[lanes[codes], manoeuvre])
+    return np.asarray(site.intersection.movements.index_of[lanes[codes], turn])
 
 
 def check_columns(frame: pd.DataFrame, columns: Iterable[str] = TRAJECTORY_COLUMNS) -> None:
@@ -134,7 +133,7 @@ def _sumo_lanes(s: Floats, movement: npt.NDArray[np.int64], site: Site) -> tuple
     """Each row's lane, named as in SUMO, and the position on it [m]."""
     paths = site.intersection.paths
     names = np.array([lane_names(p.movement, p.exit_arm) for p in paths])
-    starts = np.array([(0.0, p.entry, p.exit) for p in paths])
+    starts = np.array([(p.start, p.entry, p.exit) for p in paths])
     section = (s[:, None] >= starts[movement, 1:]).sum(axis=1)
     return names[movement, section].tolist(), s - starts[movement, section]
 

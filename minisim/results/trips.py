@@ -37,6 +37,7 @@ class Trips(NamedTuple):
     depart_delay: Floats
     departed: npt.NDArray[np.bool_]
     arrived: npt.NDArray[np.bool_]
+    type: Ints  #: index into the types of the site
     end: float
     start: float = 0.0
 
@@ -60,7 +61,7 @@ def collect_trips(
     """The trips of a run that has reached `end` [s], from its vehicle array."""
     rows = vehicles[np.argsort(vehicles["id"], kind="stable")]
     return trips_of(
-        demand_time, rows["lane"], rows["manoeuvre"], movements, end,
+        demand_time, rows["lane"], rows["manoeuvre"], rows["type"], movements, end,
         depart=np.where(rows["status"] != WAITING, rows["depart_tick"] * dt, np.nan),
         arrival=np.where(rows["status"] == ARRIVED, rows["arrival_tick"] * dt, np.nan),
         waiting_time=rows["waiting_ticks"] * dt, time_loss=rows["lost_ticks"] * dt,
@@ -68,7 +69,8 @@ def collect_trips(
 
 
 def trips_of(
-    demand_time: Floats, lane: Ints, manoeuvre: Ints, movements: Movements, end: float, *,
+    demand_time: Floats, lane: Ints, manoeuvre: Ints, type: Ints, movements: Movements, end: float,
+    *,
     depart: Floats, arrival: Floats, waiting_time: Floats, time_loss: Floats,
 ) -> Trips:  # fmt: skip
     """Trips from what a host has measured up to `end` [s]; times not reached are NaN."""
@@ -81,7 +83,7 @@ def trips_of(
         waiting_time=waiting_time, travel_time=np.where(departed, travel, 0.0),
         time_loss=time_loss,
         depart_delay=np.maximum(np.where(departed, depart, end) - demand_time, 0.0),
-        departed=departed, arrived=arrived,
+        departed=departed, arrived=arrived, type=type.copy(),
     )  # fmt: skip
 
 
@@ -91,8 +93,7 @@ def queue_growth(demand_time: Floats, leave: Floats, end: float, start: float = 
     A vehicle is present from demand to arrival, so queues before the road count too. The numbers
     are means over a quarter, which evens out the swing of a signal's cycle.
     `scenarios.statistics.growing` tells whether growth is more than chance. Arrays have shape (k,);
-    all times are in s; `leave` is infinite if not reached. The quarters divide the time from
-    `start`, the end of the warm-up.
+    times are in s, from `start`, the end of the warm-up; `leave` is infinite if not reached.
     """
     length = (end - start) / 4.0
     if length <= 0.0:  # the run was stopped during its warm-up

@@ -30,12 +30,12 @@ ACC = 1
 
 
 def attributes(vehicle: CruiseVehicle) -> dict[str, object]:
-    """The attributes of CC's `vType` only; raises `InputError` if SUMO fixes another value."""
+    """What only CC's `vType` has; raises `InputError` if SUMO fixes another value."""
     if (vehicle.spacing, vehicle.radar) != FIXED:
         spacing, radar = FIXED
         raise InputError(
-            f"SUMO's model CC keeps a spacing of {spacing:g} m and sees {radar:g} m far, the "
-            f"vehicles {vehicle.spacing:g} m and {vehicle.radar:g} m"
+            f"SUMO's model CC has spacing {spacing:g} m and radar {radar:g} m, but the vehicles "
+            f"have {vehicle.spacing:g} m and {vehicle.radar:g} m"
         )
     if vehicle.obeys:
         raise InputError("hosted in SUMO, a CruiseVehicle cannot obey limits and lights by itself")
@@ -54,7 +54,8 @@ class Cruiser(Steering):
         super().__init__(job.law, libsumo)
         self._cruise, law = cruise, job.law
         top = max(cruise.cruise_speed, job.road.section_speed.max())
-        self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * law.b * law.dt) ** 2 / (2.0 * law.b)
+        b = cruise.type.b
+        self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * b * law.dt) ** 2 / (2.0 * b)
 
     def load(self, cars: Iterable[Car]) -> None:
         """Switch the controller on: SUMO inserts vehicles by the active controller's rule."""
@@ -83,8 +84,8 @@ class Cruiser(Steering):
             for car in lane:
                 acc = -car.brake if car.brake > 0.0 else math.inf
                 held = car.s < law.entry and not released(car)
-                if held and near(car.v, law.hold - car.s, law):
-                    acc = min(acc, max(hold(car.v, car.s, law), -law.b_max))
+                if held and near(car.v, law.hold - car.s, car.traits, law):
+                    acc = min(acc, max(hold(car.v, car.s, car.traits, law), -car.traits.b_max))
                 if acc < math.inf and acc < self._own(car, ahead):
                     self.command(car, car.v + acc * law.dt)
                 else:
@@ -97,8 +98,8 @@ class Cruiser(Steering):
         v0 = self._desired(car)
         u = cruise_control(car.v, v0, cruise.cruise_gain, cruise.a, cruise.b)
         if ahead is not None:
-            gap = ahead.s - law.length - car.s
-            u = min(u, follow(car.v, gap - law.min_gap, ahead.v, law, cruise))
+            gap = ahead.s - ahead.traits.length - car.traits.min_gap - car.s
+            u = min(u, follow(car.v, gap, ahead.v, law, cruise))
         return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
 
     def _desired(self, car: Car) -> float:

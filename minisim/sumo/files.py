@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from minisim.results.trips import Trips, trips_of
 from minisim.sumo.cruising import attributes
 from minisim.sumo.messages import Ended, Job
 from minisim.sumo.network import NETWORK, tag, write_xml
-from minisim.vehicle import CruiseVehicle
+from minisim.vehicle import CruiseVehicle, VehicleType
 
 ROUTES, CONFIGURATION = "minisim.rou.xml", "minisim.sumocfg"
 _ATTRIBUTES = ("depart", "arrival", "waitingTime")
@@ -27,7 +28,7 @@ TRIPS, FCD, LOG = "tripinfo.xml", "fcd.xml", "sumo.log"
 def write_routes(
     folder: Path, site: Site, vehicles: Records, model: str, depart_speed: float | None
 ) -> None:
-    """Write the vehicle type, one route per movement, and the vehicles in order of demand."""
+    """Write the vehicle types, one route per movement, and the vehicles in order of demand."""
     write_xml(folder / ROUTES, "routes", _routes(site, vehicles, model, depart_speed))
 
 
@@ -36,12 +37,11 @@ def write_configuration(folder: Path, job: Job, seed: int, fcd: bool) -> None:
     write_xml(folder / CONFIGURATION, "configuration", _options(job, seed, fcd))
 
 
-def _vehicle_type(site: Site, model: str) -> dict[str, object]:
-    kind = site.vehicle
+def _vehicle_type(kind: VehicleType, limit: float, model: str) -> dict[str, object]:
     common: dict[str, object] = {
-        "id": "car", "carFollowModel": model, "length": kind.length, "width": kind.width,
+        "id": kind.name, "carFollowModel": model, "length": kind.length, "width": kind.width,
         "minGap": kind.min_gap, "emergencyDecel": kind.max_deceleration,
-        "maxSpeed": kind.top_speed(site.speed_limit), "speedFactor": 1, "speedDev": 0,
+        "maxSpeed": kind.top_speed(limit), "speedFactor": 1, "speedDev": 0,
     }  # fmt: skip
     if isinstance(kind, CruiseVehicle):
         return common | attributes(kind)
@@ -52,17 +52,18 @@ def _vehicle_type(site: Site, model: str) -> dict[str, object]:
 
 
 def _routes(site: Site, vehicles: Records, model: str, depart_speed: float | None) -> Iterator[str]:
-    yield tag("vType", _vehicle_type(site, model))
-    for path in site.intersection.paths:
+    for kind in site.types:
+        yield tag("vType", _vehicle_type(kind, site.speed_limit, model))
+    for path in compress(site.intersection.paths, site.intersection.allowed):
         edges = f"{ARM_NAMES[path.movement.origin]}_in {ARM_NAMES[path.exit_arm]}_out"
         yield tag("route", {"id": path.movement, "edges": edges})
     movements = site.intersection.movements
     for i in np.lexsort((vehicles["id"], vehicles["demand_tick"])).tolist():
-        row = vehicles[i]
+        row, kind = vehicles[i], site.types[vehicles[i]["type"]]
         yield tag("vehicle", {
-            "id": row["id"], "type": "car", "route": movements[row["path"]],
+            "id": row["id"], "type": kind.name, "route": movements[row["path"]],
             "depart": f"{row['demand_tick'] * site.dt:.3f}",
-            "departPos": site.vehicle.length + site.vehicle.margin,
+            "departPos": kind.length + kind.margin,
             "departSpeed": "max" if depart_speed != 0.0 else 0,
             "speedFactor": f"{row['factor']:.9f}",
         })  # fmt: skip
@@ -92,9 +93,8 @@ def _options(job: Job, seed: int, fcd: bool) -> Iterator[str]:
 def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trips:
     """SUMO's trips in demand order; raises `SumoError` if they are not those of the arrivals.
 
-    Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own time loss
-    leaves out what a vehicle loses while it accelerates to a higher limit, and SUMO does not know
-    about markings.
+    Only the time loss is ours (`Ended.time_loss`). From version 1.28 on, SUMO's own leaves out what
+    a vehicle loses while it accelerates to a higher limit, and SUMO knows no markings.
     """
     end = (job.horizon if ended.done else ended.tick) * job.law.dt
     values = np.full((len(arrivals), len(_ATTRIBUTES)), np.nan)
@@ -113,9 +113,10 @@ def read_trips(folder: Path, arrivals: Arrivals, job: Job, ended: Ended) -> Trip
     # SUMO still inserts vehicles at the very end. One that has not made a step is not on the road.
     departed = (depart >= 0.0) & (depart < end - job.law.dt / 2.0)
     arrived = departed & (arrival >= 0.0)
+    types = job.vehicles["type"][np.argsort(job.vehicles["id"])]
     loss = np.array([ended.time_loss[i] for i in range(len(arrivals))], dtype=float)
     return trips_of(
-        arrivals.time, arrivals.lane, arrivals.manoeuvre, job.movements, end,
+        arrivals.time, arrivals.lane, arrivals.manoeuvre, types, job.movements, end,
         depart=np.where(departed, depart, np.nan), arrival=np.where(arrived, arrival, np.nan),
         waiting_time=np.where(departed, waiting, 0.0), time_loss=loss,
     )  # fmt: skip

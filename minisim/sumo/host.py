@@ -13,10 +13,9 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 from minisim.control import Command, Controller, View
 from minisim.engine.cruise.law import build_cruise
@@ -83,11 +82,9 @@ def simulate(
         keep_files: new or empty folder for SUMO's files, which are temporary by default: network,
             routes, configuration, log and trips. If the run fails, they stay, and the exception
             has a note that names the folder.
-        fcd: file for SUMO's own floating-car data of every step; created once the run has
-            succeeded.
+        fcd: file for SUMO's own floating-car data of every step, written if the run succeeds.
         gui: show the run in sumo-gui.
-        progress: called at every wake-up with the number of steps done and the total up to the
-            horizon.
+        progress: called at every wake-up with the steps done and the total up to the horizon.
 
     Raises:
         MissingExtraError: SUMO is not installed.
@@ -96,66 +93,57 @@ def simulate(
         CollisionError: two bodies touched, unless collisions are only recorded.
         ControllerError: the controller broke its contract.
     """
-    return _run(_Request(
-        scenario=scenario, controller=controller, seed=seed, model=model, record=record,
-        record_window=record_window, on_collision=on_collision, keep_files=keep_files,
-        fcd=fcd, gui=gui, progress=progress,
-    ))  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Request:
-    """The arguments of `simulate`; a replay of a collision ends at `until` [s]."""
-
-    scenario: ScenarioLike
-    controller: Controller
-    seed: int
-    model: str | None
-    record: str | None
-    record_window: tuple[float, float]
-    on_collision: str
-    keep_files: str | os.PathLike[str] | None
-    fcd: str | os.PathLike[str] | None
-    gui: bool
-    progress: Progress | None
-    until: float = math.inf
-
-    def replay(self, time: float, seconds: float = 10.0) -> Run:
-        """Run again until shortly after `time`; record the last `seconds` before it."""
-        return _run(replace(
-            self, record="all", record_window=(max(0.0, time - seconds), math.inf),
-            on_collision="record", keep_files=None, fcd=None, gui=False, progress=None,
-            until=time + AFTERMATH,
-        ))  # fmt: skip
-
-
-def _run(request: _Request) -> Run:
     home = sumo_home()
-    if request.model is not None:
-        choice("SUMO model", request.model, MODELS)
-    if request.gui:
+    if model is not None:
+        choice("SUMO model", model, MODELS)
+    if gui:
         _check_display()
     hosted = begin(
-        request.scenario, request.controller, request.seed, record=request.record,
-        record_window=request.record_window, on_collision=request.on_collision, reactions=REACTIONS,
+        scenario, controller, seed, record=record, record_window=record_window,
+        on_collision=on_collision, reactions=REACTIONS,
     )  # fmt: skip
-    with _folder(request.keep_files) as folder:
-        job = _prepare(request, hosted, folder, home)
-        version, ended = _host(job, home, _session(request, hosted, job))
+    return _run(hosted, _Options(home, model, keep_files, fcd, gui, progress))
+
+
+class _Options(NamedTuple):
+    """SUMO's folder and the arguments of `simulate` that only this host has."""
+
+    home: Path
+    model: str | None
+    keep_files: str | os.PathLike[str] | None = None
+    fcd: str | os.PathLike[str] | None = None
+    gui: bool = False
+    progress: Progress | None = None
+    until: float = math.inf  # when a replay of a collision ends [s]
+
+
+def _run(hosted: Hosted, options: _Options) -> Run:
+    with _folder(options.keep_files) as folder:
+        job = _prepare(hosted, options, folder)
+        version, ended = _host(job, options.home, _session(hosted, options, job))
         if ended.collisions and job.stop_on_collision:
-            replay = partial(request.replay, ended.collisions[0].time)
+            replay = partial(_replay, hosted, options, ended.collisions[0].time)
             raise hosted.collided(ended.collisions, replay)
         columns = read_trips(folder, hosted.arrivals, job, ended)
-        if request.fcd is not None:
-            with replacing(request.fcd) as target:
+        if options.fcd is not None:
+            with replacing(options.fcd) as target:
                 shutil.copyfile(folder / FCD, target)
     return hosted.result(
         collisions=ended.collisions,
         columns=columns,
         trace=ended.trace,
-        rows=job.vehicles[["id", "path"]].copy(),
+        rows=job.vehicles[["id", "path", "type"]].copy(),
         host={"host": "sumo", "sumo": version, "sumo_model": job.model},
     )
+
+
+def _replay(hosted: Hosted, options: _Options, time: float, seconds: float = 10.0) -> Run:
+    """Run again until shortly after `time`; record the last `seconds` before it."""
+    again = begin(
+        hosted.scenario, hosted.controller, hosted.seed, record="all",
+        record_window=(max(0.0, time - seconds), math.inf), on_collision="record",
+    )  # fmt: skip
+    return _run(again, _Options(options.home, options.model, until=time + AFTERMATH))
 
 
 def sumo_home() -> Path:
@@ -199,30 +187,30 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         raise
 
 
-def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job:
+def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
     """Write all of SUMO's files, and put together what its process needs."""
     site, plan = hosted.site, hosted.plan
     if abs(site.dt * 1000.0 - round(site.dt * 1000.0)) > 1e-9:
         raise InputError(f"SUMO counts in milliseconds; it cannot step {site.dt:g} s")
     if site.vehicle.sumo is not None and not isinstance(site.vehicle, CruiseVehicle):
         raise InputError(
-            f"vehicles with sumo={site.vehicle.sumo!r} look out for those that cross inside the "
-            "junction; hosted in SUMO they leave that to the controller, so give none"
+            f"vehicles with sumo={site.vehicle.sumo!r} give way to those crossing inside the "
+            "junction; hosted in SUMO, the controller does that, so leave out sumo"
         )
-    model = _model(request.model, site.vehicle)
-    depart_speed = request.scenario.depart_speed
+    model = _model(options.model, site.vehicle)
+    depart_speed = hosted.scenario.depart_speed
     vehicles = build_vehicles(site, hosted.arrivals)
     write_routes(folder, site, vehicles, model, depart_speed)
-    network = build_network(site.intersection, site.speed_limit, folder, home)
+    network = build_network(site, folder, options.home)
     job = Job(
-        command=_command(request.gui),
+        command=_command(options.gui),
         folder=str(folder),
-        temporary=request.keep_files is None,
+        temporary=options.keep_files is None,
         model=model,
         plan=plan,
         road=build_road(site, plan),
         law=build_law(
-            site, plan, depart_speed=depart_speed, record=request.record,
+            site, plan, depart_speed=depart_speed, record=hosted.record,
             record_window=hosted.record_window,
         ),
         cruise=build_cruise(site, len(vehicles)),
@@ -230,11 +218,11 @@ def _prepare(request: _Request, hosted: Hosted, folder: Path, home: Path) -> Job
         network=network,
         vehicles=vehicles,
         movements=site.intersection.movements,
-        horizon=first_tick(min(request.scenario.horizon, request.until), site.dt),
-        stop_on_collision=request.on_collision == "stop",
-        teleport=request.on_collision == "teleport",
+        horizon=first_tick(min(hosted.scenario.horizon, options.until), site.dt),
+        stop_on_collision=hosted.on_collision == "stop",
+        teleport=hosted.on_collision == "teleport",
     )  # fmt: skip
-    write_configuration(folder, job, hosted.seed, request.fcd is not None)
+    write_configuration(folder, job, hosted.seed, options.fcd is not None)
     return job
 
 
@@ -263,12 +251,12 @@ def _command(gui: bool) -> tuple[str, ...]:
     return ("sumo-gui" if gui else "sumo", "-c", CONFIGURATION, *options)
 
 
-def _session(request: _Request, hosted: Hosted, job: Job) -> Callable[[Asked], list[Command]]:
+def _session(hosted: Hosted, options: _Options, job: Job) -> Callable[[Asked], list[Command]]:
     """The function that answers the worker with the session's commands."""
 
     def answer(asked: Asked) -> list[Command]:
-        if request.progress is not None:
-            request.progress(asked.tick, job.horizon)
+        if options.progress is not None:
+            options.progress(asked.tick, job.horizon)
         return hosted.ask(View(time_of(asked.tick, job.law.dt), asked.vehicles), asked.tick)
 
     return answer

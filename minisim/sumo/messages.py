@@ -25,7 +25,7 @@ class Job(NamedTuple):
     road: Road
     law: Law
     cruise: Cruise | None  #: see `minisim.engine.cruise.law.build_cruise`
-    top_speed: float  #: which no vehicle exceeds [m/s]
+    top_speed: float  #: no vehicle exceeds it [m/s]
     network: Network
     vehicles: Records  #: see `minisim.engine.state.build_vehicles`
     movements: Movements

@@ -17,10 +17,12 @@ import subprocess
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
 
+from minisim.control import Site
 from minisim.errors import FileError, SumoError
 from minisim.junction.geometry import Intersection
 from minisim.results.trajectories import lane_names
@@ -43,20 +45,18 @@ class Network:
     inside: tuple[float, ...]  #: of the way through the junction
 
 
-def build_network(
-    intersection: Intersection, speed_limit: float, folder: Path, home: Path
-) -> Network:
-    """Write the network into `folder`.
+def build_network(site: Site, folder: Path, home: Path) -> Network:
+    """Write the network of the site's intersection into `folder`.
 
     With our arcs no vehicle has to give way: the hosted controller alone decides (`pass`, and no
-    place to wait inside the junction). Turns have the road's speed limit, since the host slows
-    vehicles down for them.
+    place to wait inside the junction). Turns have the road's limit: the host slows vehicles down.
 
     Raises:
         SumoError: netconvert refuses (the message is its own) or draws ways other than those given.
     """
+    intersection = site.intersection
     write_xml(folder / NODES, "nodes", _nodes(intersection))
-    write_xml(folder / EDGES, "edges", _edges(intersection, speed_limit))
+    write_xml(folder / EDGES, "edges", _edges(site))
     command = [
         str(home / "bin" / "netconvert"), "--node-files", NODES, "--edge-files", EDGES,
         "--output-file", NETWORK, "--no-turnarounds", "true",
@@ -65,7 +65,7 @@ def build_network(
     if intersection.ways is not None:
         run_tool(command, folder, home)
         return _as_given(intersection, read_network(intersection, folder / NETWORK))
-    write_xml(folder / CONNECTIONS, "connections", _connections(intersection))
+    write_xml(folder / CONNECTIONS, "connections", _connections(site))
     command += ["--connection-files", CONNECTIONS, "--precision", str(DIGITS)]
     command += ["--offset.disable-normalization", "true", "--junctions.limit-turn-speed", "-1"]
     run_tool(command, folder, home)
@@ -120,7 +120,11 @@ def read_network(intersection: Intersection, file: Path) -> Network:
     length = {lane.get("id"): float(lane.get("length", "nan")) for lane in root.iter("lane")}
     onward = {(c.get("from"), c.get("to")): c.get("via") for c in root.iter("connection")}
     approach, inside = [], []
-    for path in intersection.paths:
+    for path, allowed in zip(intersection.paths, intersection.allowed, strict=True):
+        if not allowed:
+            approach.append(path.entry - path.start)
+            inside.append(path.crossing)
+            continue
         first, _, last = lane_names(path.movement, path.exit_arm)
         via = onward.get((first[:-2], last[:-2]))
         if first not in length or via is None:
@@ -151,27 +155,33 @@ def tag(name: str, attributes: Mapping[str, object]) -> str:
 def _nodes(intersection: Intersection) -> Iterable[str]:
     shape = {"shape": _outline(intersection)} if intersection.ways is None else {}
     yield tag("node", {"id": "C", "x": 0, "y": 0, "type": "priority", **shape})
-    for arm in intersection.arms:
-        x, y = (intersection.arm_length * u for u in arm.outward)
+    for arm, length in zip(intersection.arms, intersection.lengths, strict=True):
+        x, y = (length * u for u in arm.outward)
         yield tag("node", {"id": arm.name, "x": f"{x:.9f}", "y": f"{y:.9f}", "type": "dead_end"})
 
 
-def _edges(intersection: Intersection, speed_limit: float) -> Iterable[str]:
-    for arm in intersection.arms:
+def _edges(site: Site) -> Iterable[str]:
+    intersection = site.intersection
+    used = {"in": intersection.approaches, "out": intersection.departures}
+    for k, (arm, width) in enumerate(zip(intersection.arms, intersection.lane_widths, strict=True)):
+        # SUMO puts lanes beside the axis, unless it is told that they are on it.
+        beside = {} if intersection.offsets[k] else {"spreadType": "center"}
         for name, origin, target in (("in", arm.name, "C"), ("out", "C", arm.name)):
-            yield tag("edge", {
-                "id": f"{arm.name}_{name}", "from": origin, "to": target, "numLanes": 1,
-                "speed": repr(speed_limit), "width": repr(intersection.lane_width),
-            })  # fmt: skip
+            if k in used[name]:
+                yield tag("edge", {
+                    "id": f"{arm.name}_{name}", "from": origin, "to": target, "numLanes": 1,
+                    "speed": repr(site.limit(k)), "width": repr(width), **beside,
+                })  # fmt: skip
 
 
-def _connections(intersection: Intersection) -> Iterable[str]:
-    for path in intersection.paths:
+def _connections(site: Site) -> Iterable[str]:
+    for path in compress(site.intersection.paths, site.intersection.allowed):
         first, _, last = lane_names(path.movement, path.exit_arm)
         yield tag("connection", {
             "from": first[:-2], "to": last[:-2],
             "fromLane": 0, "toLane": 0, "pass": "true", "keepClear": "false",
             "contPos": 0,  # no internal junction
+            "speed": repr(site.limit(path.movement.origin)),
             "shape": _points(path.points),
         })  # fmt: skip
 
@@ -179,9 +189,9 @@ def _connections(intersection: Intersection) -> Iterable[str]:
 def _outline(intersection: Intersection) -> str:
     """The junction's border: a straight edge across each arm where its lanes begin and end."""
     corners = []
-    for arm in intersection.arms:
+    for arm, half in zip(intersection.arms, intersection.half_widths, strict=True):
         outward = np.array(arm.outward)
-        right = np.array([outward[1], -outward[0]]) * intersection.lane_width
+        right = np.array([outward[1], -outward[0]]) * half
         middle = outward * intersection.junction_radius
         corners += [middle - right, middle + right]
     return _points(corners)

@@ -1,4 +1,4 @@
-"""Steering: it tells vehicles in SUMO what the road ahead and the controller ask of them.
+"""Tells vehicles in SUMO what the road ahead and the controller ask of them.
 
 `Follower` steers SUMO's IDM and Krauss. minisim's laws (`minisim.laws`) compute what a hold line, a
 marking or a turn asks for. SUMO gets it as a speed: a desired speed (`setMaxSpeed`) where a lower
@@ -18,16 +18,15 @@ import numpy as np
 
 from minisim import laws
 from minisim.engine.state import Records
-from minisim.laws import STOP_MARGIN, Law
+from minisim.laws import STOP_MARGIN, Law, Traits
 from minisim.sumo.messages import Job
 
-#: SUMO keeps the maximum acceleration (2) and heeds no right of way (no 8). A commanded speed may
-#: brake harder than is comfortable (no 4), and keeps the gaps by itself: if SUMO kept them (1),
+#: SUMO keeps the maximum acceleration (2) but not the right of way (8 off). A commanded speed may
+#: brake harder than is comfortable (4 off) and keeps the gaps itself: if SUMO kept them (1),
 #: vehicles would stop faster than their brakes allow. (SUMO, TraCI/Change Vehicle State, speed
 #: mode.) Inside the junction, SUMO's vehicles also yield to crossing ones, although the controller
 #: alone decides which vehicle goes. So a vehicle ignores all others in the junction (32) while one
-#: of them shares neither lane nor exit with it. Meanwhile it follows the vehicle ahead into its
-#: exit by minisim's law.
+#: of them shares neither lane nor exit with it, and follows the one ahead by minisim's law.
 FOLLOWING, IGNORING = 2, 2 + 32
 
 #: SUMO accepts no desired speed of zero [m/s]; a vehicle that has to stop gets a command.
@@ -40,22 +39,24 @@ class Car:
     __slots__ = (
         "a", "advice", "brake", "cleared", "commanded", "demand_time", "desired", "factor", "go",
         "id", "ignoring", "lane", "lost_ticks", "mark", "name", "path", "present", "rank", "row",
-        "s", "section", "seen", "v",
+        "s", "section", "seen", "traits", "type", "v",
     )  # fmt: skip
 
-    def __init__(self, row: int, record: Records, law: Law) -> None:
+    def __init__(self, row: int, record: Records, types: Sequence[Traits], law: Law) -> None:
         self.row = row
         self.id = int(record["id"])
         self.name = str(self.id)
         self.lane = int(record["lane"])
         self.rank = int(record["rank"])
         self.path = int(record["path"])
+        self.type = int(record["type"])
+        self.traits = types[self.type]
         self.factor = float(record["factor"])
         self.demand_time = int(record["demand_tick"]) * law.dt
         self.s = self.v = self.a = 0.0
-        # Between looks more than a step apart, it grows by the time beyond that at the limit.
+        # Between rare looks it grows by the time that exceeds a drive at the limit.
         self.lost_ticks = 0.0
-        self.brake = 0.0  # the least that it must brake [m/s²]; 0 without such a command
+        self.brake = 0.0  # how hard it must brake [m/s²]; 0 without such a command
         self.section = self.mark = 0
         self.seen = 0  # tick of the last look at it
         self.present = False  # on the road
@@ -106,7 +107,7 @@ class Follower(Steering):
     """Steers SUMO's IDM or Krauss: limits, markings, turns and hold lines are minisim's."""
 
     def __init__(self, job: Job, libsumo: Any) -> None:
-        # SUMO's Krauss may drive vehicles whose own law is another.
+        # SUMO's Krauss may drive vehicles with another law.
         law = job.law if job.model == "IDM" else job.law._replace(model=laws.KRAUSS)
         super().__init__(law, libsumo)
         self._limits = limits(job)
@@ -118,17 +119,16 @@ class Follower(Steering):
         self._inside: list[Car] = []  # in the order in which they entered the junction
 
     def depart(self, car: Car) -> None:
-        """Leave all giving way to the controller."""
+        """Let the controller alone decide."""
         self._vehicle.setSpeedMode(car.name, FOLLOWING)
 
     def steer(self, lanes: Sequence[Sequence[Car]], released: Released) -> None:
         """Tell SUMO what the road ahead asks of each vehicle up to the exit in the next step."""
         entry = self._law.entry
         self._inside = [car for car in self._inside if not car.cleared]
-        known = {car.id for car in self._inside}
-        self._inside += [
-            car for lane in lanes for car in lane if car.s >= entry and car.id not in known
-        ]
+        ids = {car.id for car in self._inside}
+        entered = (car for lane in lanes for car in lane if car.s >= entry)
+        self._inside += [car for car in entered if car.id not in ids]
         inside = {car.path for car in self._inside}
         for lane in lanes:
             foremost = True  # on the approach; it also follows vehicles from other lanes
@@ -151,51 +151,52 @@ class Follower(Steering):
 
     def _merging(self, car: Car) -> float:
         """Closeness to the vehicle from another lane that takes the same exit before this car."""
-        mine, exit_arm = self._exit[car.path]
+        mine, arm = self._exit[car.path]
         before = takewhile(lambda other: other is not car, self._inside)
-        merging = [
-            it for it in before if it.lane != car.lane and self._exit[it.path][1] == exit_arm
-        ]
+        merging = [it for it in before if it.lane != car.lane and self._exit[it.path][1] == arm]
         if not merging:
             return 0.0
         ahead = merging[-1]
-        gap = (ahead.s - self._exit[ahead.path][0]) - self._law.length - (car.s - mine)
-        return float(laws.closeness(car.v, gap, ahead.v, self._law))
+        gap = (ahead.s - self._exit[ahead.path][0]) - ahead.traits.length - (car.s - mine)
+        return float(laws.closeness(car.v, gap, ahead.v, car.traits, self._law))
 
     def _leading(self, car: Car, lane: Sequence[Car]) -> float:
         """Closeness to the vehicle of its own lane that this car follows; `lane` is ahead of it."""
         for ahead in reversed(lane):
-            rear = ahead.s - self._law.length
+            rear = ahead.s - ahead.traits.length
             if rear < self._branch[ahead.path, car.path]:
-                return float(laws.closeness(car.v, rear - car.s, ahead.v, self._law))
+                return float(laws.closeness(car.v, rear - car.s, ahead.v, car.traits, self._law))
         return 0.0
 
     def _steer(self, car: Car, lane: Sequence[Car], held: bool, z: float) -> None:
-        law = self._law
+        law, me = self._law, car.traits
         v, s, section = car.v, car.s, car.section
         starts, speeds = self._limits[car.path]
-        v0 = min(speeds[section] * car.factor, car.advice)
+        limit = speeds[section] * car.factor
+        v0 = min(limit, car.advice)
         k = section + 1
-        slower = laws.braking_begins(v, starts[k] - s, law)
-        held = held and near(v, law.hold - s, law)
+        slower = laws.braking_begins(v, starts[k] - s, me, law)
+        held = held and near(v, law.hold - s, me, law)
         # SUMO would drop to a lower desired speed at once, so the law does the braking.
         self._desire(car, max(v0, v))
         must_slow = v > v0 or v0 < LEAST_SPEED
         if not (slower or held or car.brake > 0.0 or must_slow or z > 0.0):
             super().release(car)
             return
-        free = laws.follow(v, v0, 0.0, law)
-        acc = laws.follow(v, v0, z, law)
-        while laws.braking_begins(v, starts[k] - s, law):
-            acc = min(acc, laws.slow_down(v, acc, speeds[k] * car.factor, starts[k] - s, law))
+        free = laws.drive(v, limit, car.advice, 0.0, me, law)
+        acc = laws.drive(v, limit, car.advice, z, me, law)
+        while laws.braking_begins(v, starts[k] - s, me, law):
+            lower = speeds[k] * car.factor
+            acc = min(acc, laws.slow_down(v, acc, lower, starts[k] - s, me, law))
             k += 1
         if held:
-            acc = min(acc, laws.hold(v, s, law))
+            acc = min(acc, laws.hold(v, s, me, law))
         if car.brake > 0.0:
             acc = min(acc, -car.brake)
         if acc < free or must_slow:
-            acc = min(acc, laws.follow(v, v0, max(z, self._leading(car, lane)), law))
-            self.command(car, v + max(acc, -law.b_max) * law.dt)
+            z = max(z, self._leading(car, lane))
+            acc = min(acc, laws.drive(v, limit, car.advice, z, me, law))
+            self.command(car, v + max(acc, -me.b_max) * law.dt)
         else:
             super().release(car)
 
@@ -212,6 +213,6 @@ def limits(job: Job) -> list[tuple[list[float], list[float]]]:
     return list(zip(starts, speeds, strict=True))
 
 
-def near(v: float, distance: float, law: Law) -> bool:
+def near(v: float, distance: float, me: Traits, law: Law) -> bool:
     """Whether a hold line `distance` ahead may matter in this step, with a metre to spare."""
-    return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, law)
+    return laws.braking_begins(v, distance - STOP_MARGIN - 1.0, me, law)

@@ -1,10 +1,9 @@
 """The process that runs libsumo. It moves the vehicles; the caller's process decides.
 
 libsumo holds one simulation per process, and a crash would take its caller down. So it has a
-process of its own, which knows no controllers. That process advances until a wake-up, sends a view
+process of its own, without controllers. That process advances until a wake-up, sends a view
 and carries out the commands that come back, as `minisim.simulation` does with the compiled kernel.
-SUMO does car following, integrates and finds collisions; `minisim.sumo.steering` tells it what else
-vehicles have to obey.
+SUMO follows, integrates and finds collisions; `minisim.sumo.steering` tells it what else to obey.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from minisim.control import Advise, Brake, Close, Command, Go, Hold, Observed, O
 from minisim.engine.collision import Collision
 from minisim.engine.state import TRACE, Records
 from minisim.hosting import Alarm
+from minisim.laws import Traits
 from minisim.sumo.cruising import Cruiser
 from minisim.sumo.messages import Asked, Channel, Ended, Failed, Job, Started
 from minisim.sumo.steering import Car, Follower, Steering, limits
@@ -51,12 +51,13 @@ class Worker:
         )
         self._limits = limits(job)
         self._marks = road.marks.tolist()
-        self._exit, self._end = road.ends[:, 0].tolist(), road.ends[:, 1].tolist()
+        self._exit, self._end, _, self._start = road.ends.T.tolist()
         self._stretch = [
             (leave - law.entry) / inside
             for leave, inside in zip(self._exit, job.network.inside, strict=True)
         ]
-        cars = (Car(row, record, law) for row, record in enumerate(job.vehicles))
+        types = [Traits(*map(float, it)) for it in road.types]
+        cars = (Car(row, record, types, law) for row, record in enumerate(job.vehicles))
         self._cars = {car.name: car for car in cars}
         recorded_from = law.record_start if law.record_from != NEVER else math.inf
         needed_from = self._steering.near, law.entry - law.sight, self._marks[0], recorded_from
@@ -118,8 +119,8 @@ class Worker:
                     break
                 manoeuvre = movements[car.path].manoeuvre
                 yield Observed(
-                    car.id, car.lane, manoeuvre, distance, car.v, law.length, car.demand_time,
-                    car.rank, car.factor,
+                    car.id, car.lane, manoeuvre, distance, car.v, car.traits.length,
+                    car.demand_time, car.rank, car.factor, car.type,
                 )  # fmt: skip
 
     def _apply(self, command: Command) -> None:
@@ -134,7 +135,8 @@ class Worker:
                 if car.present:
                     self._steering.advise(car)
             case Brake(vehicle, deceleration):
-                self._cars[str(vehicle)].brake = min(deceleration, self._job.law.b_max)
+                car = self._cars[str(vehicle)]
+                car.brake = min(deceleration, car.traits.b_max)
             case Wake():
                 self._alarm.set(command)
 
@@ -163,7 +165,7 @@ class Worker:
     def _depart(self, car: Car) -> None:
         law = self._job.law
         car.present, car.seen = True, self._tick
-        car.s = law.length + law.margin
+        car.s = self._start[car.path] + car.traits.length + law.margin
         car.v = self._libsumo.vehicle.getSpeed(car.name)
         if car.v > law.depart_speed:  # SUMO was told "max", since it never lowers a given speed
             car.v = law.depart_speed
@@ -173,7 +175,7 @@ class Worker:
         self._turn_to(car)
 
     def _arrive(self, car: Car) -> bool:
-        """Note it; returns whether SUMO took it off the road before it had left the junction."""
+        """Note an arrival; returns whether SUMO removed the car before it had left the junction."""
         self._arrived += 1
         self._travel(car, self._end[car.path])
         car.present = False
@@ -211,7 +213,7 @@ class Worker:
 
     def _move(self, car: Car, travelled: float, v: float) -> bool:
         law, p = self._job.law, car.path
-        s = self._position(p, travelled)
+        s = self._position(car, travelled)
         car.a, car.s, car.v = (v - car.v) / law.dt, s, v
         self._record(car)
         passed = False
@@ -224,15 +226,15 @@ class Worker:
         if self._tick > car.seen:
             car.lost_ticks += max(1.0 - v / (speeds[car.section] * car.factor), 0.0)
             car.seen = self._tick
-        if not car.cleared and s >= max(self._exit[p] + law.length, law.leave):
+        if not car.cleared and s >= max(self._exit[p] + car.traits.length, law.leave):
             self._clear(car)
             passed |= law.wake_on_clear
         return passed
 
-    def _position(self, p: int, travelled: float) -> float:
-        """`s` on path p of a vehicle that has driven `travelled` since its insertion [m]."""
-        law, network = self._job.law, self._job.network
-        inside = travelled + law.length + law.margin - network.approach[p]
+    def _position(self, car: Car, travelled: float) -> float:
+        """`s` of a vehicle that has driven `travelled` since its insertion [m]."""
+        law, network, p = self._job.law, self._job.network, car.path
+        inside = travelled + car.traits.length + law.margin - network.approach[p]
         if inside <= 0.0:
             return float(law.entry + inside)
         if inside <= network.inside[p]:
@@ -242,10 +244,10 @@ class Worker:
     def _locate(self, car: Car) -> float | None:
         """`s` of any vehicle on the road [m], watched or not; None while SUMO teleports it."""
         travelled = self._libsumo.vehicle.getDistance(car.name)
-        return self._position(car.path, travelled) if travelled >= 0.0 else None
+        return self._position(car, travelled) if travelled >= 0.0 else None
 
     def _clear(self, car: Car) -> None:
-        """Leave a car whose rear has left the junction to SUMO alone."""
+        """Leave a car to SUMO alone: its rear has left the junction."""
         car.cleared = True
         self._lanes[car.lane].remove(car)
         self._steering.release(car)
@@ -255,7 +257,7 @@ class Worker:
 
     def _record(self, car: Car) -> None:
         law = self._job.law
-        past = car.s - law.length - self._exit[car.path]
+        past = car.s - car.traits.length - self._exit[car.path]
         here = car.s >= law.record_start and past <= law.record_past
         if here and law.record_from <= self._tick < law.record_to:
             released = self._released(car)

@@ -44,8 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code.
 
     Bad input gives one line on stderr and code 2; a collision that stops a run, or a stdout that
-    cannot be written, 1; Ctrl-C 130; SIGTERM 143. The environment variable MINISIM_TRACEBACK adds
-    the traceback of an expected failure.
+    cannot be written, 1; Ctrl-C 130; SIGTERM 143. MINISIM_TRACEBACK=1 adds a failure's traceback.
     """
     prepare_streams()
     if signal.getsignal(signal.SIGINT) == signal.SIG_DFL:
@@ -69,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Terminated as end:
-        return _fail("terminated", int(end.code or 0))
+        return _fail("terminated", end.code)
     except BrokenPipeError:  # the reader of our output has stopped early, as `head` does
         drop_output()
         return 1

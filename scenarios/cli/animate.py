@@ -27,19 +27,18 @@ def animate(
     ],
     controller: options.ControllerName = "dim",
     humans: options.Humans = 0.0,
-    begin: Annotated[
-        float, typer.Option("--from", metavar="S", help="Simulated time to begin at.")
-    ] = 300.0,
+    begin: Annotated[float, typer.Option("--from", metavar="S", help="When to begin.")] = 300.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="Simulated time to show.")] = 60.0,
-    fps: Annotated[
-        float, typer.Option(help="Frames per second; at most one per step, and 50 in a .gif.")
-    ] = 10.0,
+    fps: Annotated[float, typer.Option(help="At most one per step, and 50 in a .gif.")] = 10.0,
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
+    unit: options.Unit = None,
+    fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
     side: options.Side = "left",
     bearings: options.Bearings = None,
+    lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
     arrivals: options.Arrivals = None,
@@ -61,6 +60,7 @@ def animate(
     frame_times(begin, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        unit=unit, fleet=fleet, lane_width=lane_width,
         profile=profile, side=side, horizon=horizon,
     )  # fmt: skip
     who = controller_named(controller, profile)

@@ -20,9 +20,7 @@ from scenarios.cli.shared.terminal import show_json, wrapped
     "[bold]Examples[/bold]\n\nminisim controllers dim\n\nminisim controllers mymodule:MyController"
 )
 def controllers(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="List the parameters of this one.")
-    ] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="List its parameters.")] = None,
     as_json: options.AsJson = False,
 ) -> None:
     """List the controllers, or the parameters of one."""
@@ -103,7 +101,7 @@ def _parameters(make: Callable[..., Any], made: object) -> Iterator[dict[str, An
 
 
 def _spelled(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str | None:
-    """A value as one types it, or its repr if that is impossible; None if there is none."""
+    """A value as typed, or its repr if that is impossible; None if there is none."""
     from minisim.names import spelled_value
 
     if value is inspect.Parameter.empty:

@@ -28,8 +28,8 @@ TOLD = 10
 @app.command(
     epilog="Writes crossval.md (the report), crossval.csv (one row per cell, lane and metric) and "
     "the figures. A cell whose controller cannot serve its scenario is refused before anything "
-    "runs; a run that fails is a row with its error. SUMO's runs are kept in the folder sumo "
-    "beside them, and the same version uses them again; remove it to repeat them.\n\n"
+    "runs; a failed run is a row with its error. SUMO's runs are kept in the folder sumo beside "
+    "them and reused by the same version; remove the folder to repeat them.\n\n"
     "[bold]Defaults[/bold]\n\n"
     "four-way; dim and fixed-time; 150, 250 and 350 veh/h/lane; balanced; fair. With --replay all "
     "published runs of dim with their own vehicles; there are also fixed-time, adaptive and v2ic."
@@ -63,12 +63,8 @@ def crossval(
         option("Vehicle and speeds: fair, paper, as_run or as_run_signals.", "NAME",
                "--profile", "-p"),
     ] = None,
-    seeds: Annotated[
-        int | None, option("Runs per cell, 1 … 1000; 3 by default, 2 with --quick.")
-    ] = None,
-    horizon: Annotated[
-        float | None, option("Simulated time; 3600 by default, 300 with --quick.", "S")
-    ] = None,
+    seeds: Annotated[int | None, option("Runs per cell, 1 … 1000; 3, or 2 with --quick.")] = None,
+    horizon: Annotated[float | None, option("Of each run; 3600, or 300 with --quick.", "S")] = None,
     replay: Annotated[
         bool,
         option("Replay published runs: their arrivals, vehicles and controllers; compare with the "

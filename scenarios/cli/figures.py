@@ -26,19 +26,15 @@ from scenarios.cli.shared.terminal import bar, show
 def figures(
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[NAME...]", help="Which ones; by default all that there are runs for."
-        ),
+        typer.Argument(metavar="[NAME...]", help="Which ones; by default all that have runs."),
     ] = None,
     out: options.Folder = Path("out/figures"),
-    store: Annotated[
-        Path | None, option("The runs, as made by minisim reproduce or sweep.", "STORE")
-    ] = None,
+    store: Annotated[Path | None, option("Of minisim reproduce or sweep.", "STORE")] = None,
     seeds: Annotated[
         int | None,
         option("Runs per case to look for: seeds 1 to this one; 10 by default, 2 with --quick."),
     ] = None,
-    quick: Annotated[bool, option("Of minisim reproduce --quick.", None, "--quick")] = False,
+    quick: Annotated[bool, option("Use runs of reproduce --quick.", None, "--quick")] = False,
     as_list: Annotated[bool, option("List the names and stop.", None, "--list")] = False,
 ) -> None:
     """Draw the paper's figures and tables, and further ones (PDF, SVG, PNG; MD, CSV, TeX)."""

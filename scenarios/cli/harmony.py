@@ -31,7 +31,7 @@ def harmony(
 ) -> None:  # fmt: skip
     """Print which movements can be driven together: the harmony matrix."""
     if csv and as_json:
-        raise InputError("--csv and --json exclude each other; give one")
+        raise InputError("--csv and --json cannot be combined; give one")
     what, matrix = junction(scenario, bearings, side, profile, clearance)
     if csv:
         typer.echo(matrix.to_text(), nl=False)

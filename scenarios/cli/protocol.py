@@ -24,8 +24,8 @@ MAX_ARMS = 4
 
 
 @app.command(
-    epilog="Exit code 1 if the protocol is unsafe or gets stuck. 4 arms take 20 s, with "
-    "--priorities rotating or waiting two minutes and a gigabyte.\n\n[bold]Examples[/bold]\n\n"
+    epilog="Exit code 1 if the protocol is unsafe or gets stuck. 4 arms take 20 s; with "
+    "--priorities rotating or waiting, two minutes and a gigabyte.\n\n[bold]Examples[/bold]\n\n"
     "minisim protocol four-way --gate harmonious\n\n"
     "minisim protocol three-way --order lanes --priorities rotating\n\n"
     "minisim protocol four-way --commit paper --counterexample two.csv\n\n"
@@ -53,13 +53,13 @@ def protocol(
         str,
         typer.Option(
             metavar="fixed|rotating|waiting",
-            help="Which lane comes first where cliques tie: lane a, the one that has its turn, "
+            help="Which lane comes first where cliques tie: lane a, the one whose turn it is, "
             "or the one whose vehicle came first.",
         ),
     ] = "fixed",
     counterexample: Annotated[
         Path | None,
-        options.option("If it is unsafe: write arrivals with which simulated vehicles collide.",
+        options.option("If it is unsafe: write arrivals that make simulated vehicles collide.",
                        "FILE.csv"),
     ] = None,
     bearings: options.Bearings = None,

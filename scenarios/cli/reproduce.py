@@ -15,32 +15,25 @@ from scenarios.studies import NAMES, study_named
 
 
 @app.command(
-    epilog="Simulates the paper's grid twice: as its text prescribes it, and as the published runs "
+    epilog="Simulates the paper's grid twice: as its text prescribes, and as the published runs "
     "were made. Then comes what the paper leaves open: every controller on equal terms, gates, "
     "rules of priority and capacities. Writes DIR/report.md, DIR/figures and the store. A run in "
     "the store is not repeated, so an interrupted command continues where it stopped.\n\n"
     "[bold]How long[/bold]\n\n"
-    "Minutes of processor time with 10 seeds, on a machine that simulates an hour under DIM in "
-    "0.1 s: text, the paper's grid of 700 hours, which comes first, 2.5; fair 6; gate and fairness "
-    "1; perception 26 and confidence 3, with 5 seeds at most; capacity 10; as-run, with its step "
-    "of 0.01 s, some 25. Two processes halve it. The paper's grid alone: "
-    "[bold]minisim reproduce --only text[/bold].\n\n"
+    "In minutes of processor time, with 10 seeds and 0.1 s for an hour under DIM: text (the "
+    "paper's grid, 700 hours, comes first) 2.5; fair 6; gate and fairness 1; perception 26 and "
+    "confidence 3 (at most 5 seeds); capacity 10; as-run (step 0.01 s) 25. Two processes halve "
+    "the time. For the paper's grid alone: [bold]minisim reproduce --only text[/bold].\n\n"
     "The report says what each study took, and CPU seconds per simulated hour by controller."
 )
 def reproduce(
     out: options.Folder = Path("out"),
-    store: Annotated[
-        Path | None, option("Where the runs are kept; DIR/runs.sqlite by default.", "STORE")
-    ] = None,
-    seeds: Annotated[
-        int | None, option("Runs per case, at least 2; 10 by default, 2 with --quick.")
-    ] = None,
+    store: Annotated[Path | None, option("Keeps the runs; else DIR/runs.sqlite.", "STORE")] = None,
+    seeds: Annotated[int | None, option("Runs per case, 2 or more; 10, or 2 with --quick.")] = None,
     jobs: options.Jobs = None,
     only: Annotated[
         list[str] | None,
-        option(
-            f"Only this study and its figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"
-        ),
+        option(f"Only this study, with figures; repeat it for more. {', '.join(NAMES)}.", "STUDY"),
     ] = None,
     quick: Annotated[bool, option("A smoke test: two demands, 150 s.", None, "--quick")] = False,
 ) -> None:
@@ -71,9 +64,8 @@ def reproduce(
         if rows.outdated:
             typer.echo(f"minisim: {rows.outdated}", err=True)
         with bar("drawing") as progress:
-            files = write_report(
-                Archive(find_in(rows), effort), made, workers, folder, progress, parts=names
-            )
+            archive = Archive(find_in(rows), effort)
+            files = write_report(archive, made, workers, folder, progress, parts=names)
     typer.echo(f"wrote {files} figures and tables to {folder / 'figures'}")
     typer.echo(f"wrote {folder / 'report.md'}")
     if broken := sum(len(part.failed) for part in made):

@@ -33,15 +33,18 @@ def run(
     density: options.Density = None,
     split: options.Split = None,
     turns: options.Turns = None,
+    unit: options.Unit = None,
+    fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
     side: options.Side = "left",
     bearings: options.Bearings = None,
+    lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
     horizon: options.Horizon = 3600.0,
-    warmup: Annotated[float, option("Measure nothing before it.", "S")] = 0.0,
+    warmup: Annotated[float, option("Measure only after this.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
-    metrics: Annotated[str | None, option("Of minisim metrics, or mymodule:name.", "A,B")] = None,
+    metrics: Annotated[str | None, option("See minisim metrics; or mymodule:name.", "A,B")] = None,
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
@@ -50,7 +53,7 @@ def run(
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
     fcd: Annotated[Path | None, _file("Write trajectories as SUMO's XML.")] = None,
     host: Annotated[str, _sumo("What moves vehicles: minisim or sumo.", "NAME")] = "minisim",
-    sumo_model: Annotated[str | None, _sumo("IDM, Krauss or CC, if not its own.", "NAME")] = None,
+    sumo_model: Annotated[str | None, _sumo("IDM, Krauss or CC, not its own.", "NAME")] = None,
     gui: Annotated[bool, _sumo("Show the run in sumo-gui.", None, "--gui")] = False,
     keep_files: Annotated[Path | None, _sumo("Keep SUMO's files in a new folder.", "DIR")] = None,
     sumo_fcd: Annotated[Path | None, _sumo("SUMO's own floating-car data (XML).", "FILE")] = None,
@@ -86,6 +89,7 @@ def run(
         raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
         scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        unit=unit, fleet=fleet, lane_width=lane_width,
         profile=profile, side=side, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(

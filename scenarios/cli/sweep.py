@@ -72,19 +72,15 @@ def sweep(
     ],
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", metavar="STORE", help="Keeps the results; made if new."),
+        typer.Option("--out", "-o", metavar="STORE", help="Keeps the results; made if missing."),
     ] = Path("sweep.db"),
-    seeds: Annotated[
-        int | None, option("Runs per cell, seeds 1 … N; as the file says, or 10.", "N")
-    ] = None,
+    seeds: Annotated[int | None, option("Seeds 1 … N per cell; the file's, or 10.", "N")] = None,
     jobs: options.Jobs = None,
     scheduler: Annotated[
         str | None, option("Run on this Dask cluster (pip install 'minisim\\[dask]').", "ADDRESS")
     ] = None,
     export: Annotated[Path | None, option("One row per run (.csv or .parquet).", "FILE")] = None,
-    horizon: Annotated[
-        float | None, option("Simulated time; as the file says, or 3600.", "S")
-    ] = None,
+    horizon: Annotated[float | None, option("Simulated time; the file's, or 3600.", "S")] = None,
 ) -> None:
     """Run many experiments over seeds, and keep the results; stored runs are not repeated."""
     from minisim.arrivals import MAX_TIME
@@ -127,9 +123,7 @@ def _experiments(what: str, seeds: int | None, horizon: float | None) -> list[Re
 
     studies = ("paper", *STUDIES)
     if what in SEARCHES:
-        raise InputError(
-            f"{what} chooses runs by the results of earlier ones: minisim reproduce --only {what}"
-        )
+        raise InputError(f"{what} picks runs by earlier ones: use minisim reproduce --only {what}")
     if what in studies or not (Path(what).suffix or os.path.exists(what)):
         study = study_named("text" if what == "paper" else choice("study", what, studies))
         recipes = [recipe for _, recipe in study.runs(seeds or 10, horizon or 3600.0)]
@@ -160,7 +154,7 @@ def _run(
                 progress(len(rows), total)
     except (KeyboardInterrupt, Terminated):
         kept = len(store.valid(map(key_of, experiments)))
-        note = f"{kept} of {total} runs are in {out}; the same command goes on from there"
+        note = f"{kept} of {total} runs are in {out}; repeat the command to continue"
         typer.echo(f"minisim: {note}", err=True)
         raise
     return pd.DataFrame([rows[k] for k in range(total)])

@@ -32,7 +32,7 @@ TRAVEL: Final = {"dim": 0.5, "fts": 2.0, "ats": 2.0, "v2ic": 1.0}
 #: the order of vehicles that arrived in the same second matters more.
 TRAVEL_350: Final = 3.0
 
-#: The version of SUMO that is the other host, among those that minisim can drive like.
+#: The version of SUMO that is the other host; minisim can drive like it.
 HOST_VERSION: Final = "1.28"
 
 
@@ -117,8 +117,8 @@ def replayed_cases(
     """The published runs with these junctions, controllers, densities and splits; empty means all.
 
     Densities [veh/h] and splits are as in the runs' labels. With profile None, each run keeps its
-    own vehicle and controller; with any other vehicle, it has that profile's controller. Raises
-    `InputError` for an unknown name, or if no published run matches.
+    own vehicle and controller; otherwise it has the profile's. Raises `InputError` for an unknown
+    name, or if no published run matches.
     """
     splits = [shares_text(read_shares("split", split, BALANCED), BALANCED) for split in splits]
     for split in splits:
@@ -138,6 +138,6 @@ def replayed_cases(
         wanted = [*names, *splits, *(f"{density:g} veh/h" for density in densities)]
         raise InputError(
             f"the paper has no {' or '.join(controllers)} run of {', '.join(wanted)}; it has "
-            f"{', '.join(map(str, DENSITIES))} veh/h, and 3 and 5 arms balanced only, with dim"
+            f"{', '.join(map(str, DENSITIES))} veh/h; on 3 and 5 arms, only dim and balanced"
         )
     return cases

@@ -1,7 +1,6 @@
 """Two hosts on the same arrivals: how closely their trips agree, and where they part ways.
 
-Differences are SUMO's value minus minisim's. A vehicle has the same index in both hosts, because
-they get the same arrival table.
+Differences are SUMO's value minus minisim's. A vehicle has one index: both get the same arrivals.
 """
 
 from __future__ import annotations
@@ -91,7 +90,7 @@ class Parting(NamedTuple):
     time: float  # [s]
     vehicle: int  # index into the trips
     movement: str  # such as "a2"
-    positions: tuple[float, float]  # from the road entry, in minisim and in SUMO [m]
+    positions: tuple[float, float]  # on its path, in minisim and in SUMO [m]
     speeds: tuple[float, float]  # in minisim and in SUMO [m/s]
     minisim: pd.DataFrame  # trajectories around it (`Run.trajectories`)
     sumo: pd.DataFrame

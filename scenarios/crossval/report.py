@@ -38,10 +38,9 @@ def table(results: Sequence[Result]) -> pd.DataFrame:
     """One row per cell, lane and metric; a failed run has a row with its error.
 
     Columns: controller, scenario, arms, split, density [veh/h], profile, horizon_s, lane, metric;
-    host and seed of a failed run; seeds; trips, mean, half width of its 95 % interval and
+    host and seed of a failed run; seeds; trips, mean [s], half width of its 95 % interval and
     collisions for each host; `difference` (SUMO − minisim, paired by seed) with its `…_ci95`;
-    `ks`; `within`, the share of the trips that differ by less than 0.1 s; `published`; `error`.
-    Times in seconds.
+    `ks`; `within`, the share of trips that differ by less than 0.1 s; `published`; `error`.
     """
     import pandas as pd
 
@@ -125,13 +124,13 @@ def _tolerances() -> tuple[str, ...]:
         "± is half a 95 % interval over seeds; a difference is SUMO − minisim, paired by seed (the "
         "arrivals are the same); KS is the largest distance between the two distributions of a "
         "trip's time (0 the same, 1 apart).",
-        "The hosts agree when, each with its own car following, they differ by at most: "
+        "The hosts agree if, with their own car following, they differ by at most: "
         f"{', '.join(most)}; "
-        f"with the same car following (`as_run`), when at least {100 * HOST_SHARE:g} % of the "
+        f"with the same car following (`as_run`), if at least {100 * HOST_SHARE:g} % of the "
         f"trips have waiting and travel times within {CLOSE:g} s of each other. A replay meets "
         "the paper when mean waiting is within 10 % of the published number, and mean travel "
         "within 0.5 s (DIM; at 350 veh/h within 3 s), 1 s (V2I-C) or 2 s (signals).",
-        f"{NOTHING} means no verdict: no run of the cell ended well in both hosts, or no trip did. "
+        f"{NOTHING} means no verdict: no run of a cell succeeded in both hosts, or no trip ended. "
         f"Verdicts over fewer than {FEW} trips are marked: one trip may decide them.",
     )
 
@@ -208,7 +207,7 @@ def _partings(results: Sequence[Result]) -> str:
     if apart:
         parts += [
             "The first trip, in order of demand, whose waiting or travel time differs by more than "
-            f"{CLOSE:g} s; and, from half a minute before that vehicle came on the road, the first "
+            f"{CLOSE:g} s; and, from half a minute before that vehicle entered the road, the first "
             f"vehicle that is more than {APART:g} m from where the other host has it.",
             markdown_table(
                 ("cell", "seed", "first trip that differs", "waiting minisim / SUMO",

@@ -21,7 +21,7 @@ FEW: Final = 30
 
 
 class Failure(NamedTuple):
-    """A run that did not end well: where, with which seed, and why."""
+    """A run that failed: where, with which seed, and why."""
 
     host: str
     seed: int
@@ -34,7 +34,7 @@ class Result:
 
     case: Case
     pairs: tuple[Pair, ...] = ()  # the seeds that both hosts finished
-    collisions: tuple[int, int] = (0, 0)  # in minisim and in SUMO, over the runs that ended well
+    collisions: tuple[int, int] = (0, 0)  # in minisim and in SUMO, over the runs that succeeded
     failures: tuple[Failure, ...] = ()
     sumo: str = ""  # its version; empty if it did not run
     parting: Parting | None = None  # None if a second run showed none or was not made
@@ -72,8 +72,7 @@ class Result:
     def hosts_agree(self) -> bool | None:
         """Whether the hosts agree within the stated tolerances.
 
-        None if there is nothing to judge by: no seed was finished by both hosts, or no trip
-        ended in either.
+        None if there is nothing to judge by: no seed ended in both hosts, or no trip in either.
         """
         if not any(self.trips):
             return None

@@ -71,17 +71,12 @@ def crossvalidate(
     ]
 
 
-def film(
-    results: Sequence[Result], jobs: int = 1, progress: Progress | None = None
-) -> list[Result]:
+def film(done: Sequence[Result], jobs: int = 1, progress: Progress | None = None) -> list[Result]:
     """Add where the hosts part ways, from a shorter second run around the first differing trip."""
-    apart = [(result.case, result.divergence) for result in results if result.divergence]
+    apart = [(result.case, result.divergence) for result in done if result.divergence]
     tasks = [(case, host, divergence) for case, divergence in apart for host in HOSTS]
     frames = iter(_gather(_record, tasks, jobs, progress))
-    return [
-        _parted(result, next(frames), next(frames)) if result.divergence else result
-        for result in results
-    ]
+    return [_parted(it, next(frames), next(frames)) if it.divergence else it for it in done]
 
 
 class _Excerpt:
@@ -159,9 +154,7 @@ def _gather(
 
 def _result(case: Case, outcomes: Mapping[tuple[str, int], _Outcome | BaseException]) -> Result:
     good = {run: made for run, made in outcomes.items() if not isinstance(made, BaseException)}
-    ours, theirs = (
-        {seed: made for (host, seed), made in good.items() if host == which} for which in HOSTS
-    )
+    ours, theirs = ({seed: it for (host, seed), it in good.items() if host == one} for one in HOSTS)
     both = [seed for seed in ours if seed in theirs]
     collisions = [sum(made.collisions for made in host.values()) for host in (ours, theirs)]
     return Result(

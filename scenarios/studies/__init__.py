@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 #: Every study, in the order of runs and of the report.
 NAMES = (
-    "text", "as-run", "fair", "gate", "capacity", "fairness", "humans", "perception", "confidence",
+    "text", "as-run", "fair", "gate", "mixed", "capacity", "fairness", "humans", "perception",
+    "confidence",
 )  # fmt: skip
 
-#: Studies that choose runs by the results of earlier ones, so their runs cannot be listed before.
+#: Studies that choose runs by the results of earlier ones, so they cannot be listed in advance.
 SEARCHES = ("capacity",)
 
 

@@ -8,10 +8,11 @@ from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from minisim.errors import InputError, numbers
-from scenarios.controllers import RIVALS
+from scenarios.controllers import RIVALS, label_of
 from scenarios.statistics import mean_interval
+from scenarios.studies.shared.archive import MissingRunsError
 from scenarios.studies.shared.points import fair_grid
-from scenarios.studies.shared.study import TOTAL_DELAY, Study, with_total_delay
+from scenarios.studies.shared.study import TOTAL_DELAY, Results, Study, with_total_delay
 from scenarios.sweep.cells import pairs
 
 if TYPE_CHECKING:
@@ -31,12 +32,6 @@ MEASURES = {
     "time loss": "complete_time_loss_s",
     "time loss and departure delay": TOTAL_DELAY,
 }
-
-STUDY = Study(
-    "fair",
-    "Which controller is best when all have the same vehicles and speed limit?",
-    fair_grid(RIVALS, (4,), DENSITIES),
-)
 
 
 class Crossing(NamedTuple):
@@ -124,6 +119,40 @@ def losses(rows: pd.DataFrame) -> dict[tuple[str, str, str], Crossing]:
     return known
 
 
+def needed_losses(results: Results) -> dict[tuple[str, str, str], Crossing]:
+    """The `losses`; raises `MissingRunsError` if no pair has two demands in common."""
+    known = {} if results.good.empty else losses(results.good)
+    if not known:
+        raise MissingRunsError(
+            "the store has no two demands at which DIM and another controller ran with two common "
+            f"seeds; make them with: {results.effort.command('fair')}"
+        )
+    return known
+
+
+def verdict(results: Results) -> str:
+    """The demands at which DIM does worse, which the paper leaves open."""
+    try:
+        known = needed_losses(results)
+    except MissingRunsError as error:
+        return f"The demand from which DIM loses is not known: {error}."
+    low, high = tried(known.values())
+    lines = []
+    for rival in OTHERS:
+        losing = []
+        for measure in MEASURES:
+            found = (str(known.get((measure, gate, rival), "not run")) for gate in GATES)
+            losing.append(f"{measure} {' → '.join(found)}")
+        lines.append(f"- {label_of(rival)}: {'; '.join(losing)}")
+    return "\n".join([
+        "Demands at which DIM does worse than each rival on four arms, paper's gate → harmonious "
+        "gate [veh/h/lane]: where that begins, with its 95 % interval; it lasts to the highest "
+        f"tried ({high:g}) unless an end is given. \"all\": from the lowest tried ({low:g}) on, on "
+        "average:\n",
+        *lines,
+    ])  # fmt: skip
+
+
 def _first_rise(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     """Where the polygon (x, y) first leaves y ≤ 0, and where it then comes back."""
     above = [value > 0.0 for value in y]
@@ -139,3 +168,11 @@ def _zero(x: Sequence[float], y: Sequence[float], k: int) -> float:
     """Where the side of the polygon that ends at point k crosses 0."""
     share = y[k - 1] / (y[k - 1] - y[k])
     return x[k - 1] + share * (x[k] - x[k - 1])
+
+
+STUDY = Study(
+    "fair",
+    "Which controller is best when all have the same vehicles and speed limit?",
+    fair_grid(RIVALS, (4,), DENSITIES),
+    verdict=verdict,
+)

@@ -20,13 +20,10 @@ if TYPE_CHECKING:
 PRIORITIES = ("dim", "dim:priorities=rotating", "dim:priorities=waiting")
 
 STUDY = Study(
-    "fairness",
-    "Which lanes wait under which priority rule?",
-    fair_grid(PRIORITIES, (4,), DENSITIES),
+    "fairness", "Which lanes wait under which priority?", fair_grid(PRIORITIES, (4,), DENSITIES)
 )
 
-#: Column of a lane's mean waiting time. Vehicles still on the road count (the complete form), or a
-#: starved lane would look served.
+#: Column of a lane's mean waiting, in the complete form, or a starved lane would look served.
 LANE_WAIT = "lanes_{}_complete_waiting_time_s"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from scenarios.paper import BASELINE_GRID, GRID, SERIES, Cell
+from scenarios.studies.shared.paper_comparison import agreement
 from scenarios.studies.shared.points import ControllerPoint
 from scenarios.studies.shared.study import Study
 
@@ -22,4 +23,5 @@ STUDY = Study(
     "text",
     "What do the paper's rules and parameters give, as its text prescribes them?",
     tuple(map(point_of, (*GRID, *BASELINE_GRID))),
+    verdict=agreement,
 )

@@ -1,7 +1,7 @@
 """Rows of a sweep averaged over seeds, and controllers compared on common arrivals.
 
-A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed are
-draws like others: their cell has their mean density.
+A cell holds the runs that differ only in their seed. Recorded arrivals that differ by seed count
+as draws: their cell has their mean density.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: Columns that name a cell.
 CELL: Final = (
-    "scenario", "arms", "side", "profile", "split", "turns", "density", "horizon_s", "warmup_s",
-    "controller",
+    "scenario", "arms", "side", "profile", "fleet", "split", "turns", "density", "horizon_s",
+    "warmup_s", "controller",
 )  # fmt: skip
 
 #: Summed over the runs of a cell.
@@ -76,13 +76,10 @@ def _checked(rows: pd.DataFrame) -> pd.DataFrame:
 def averaged(rows: pd.DataFrame) -> list[str]:
     """Columns that are averaged: both forms of the usual means, and metrics that were asked for."""
     known = {*CELL, *SUMS, *OTHERS}
-    left = [
-        c for c in rows.columns if c not in known and not c.startswith(BEGINNINGS[1:])
-    ]  # of groups
+    groups = BEGINNINGS[1:]
+    left = [c for c in rows.columns if c not in known and not c.startswith(groups)]
     present = {column: rows[column].dropna() for column in left}
-    return [
-        c for c, them in present.items() if len(them) and all(isinstance(v, Real) for v in them)
-    ]
+    return [c for c, of in present.items() if len(of) and all(isinstance(v, Real) for v in of)]
 
 
 def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: str) -> pd.DataFrame:
@@ -93,8 +90,7 @@ def differences(rows: pd.DataFrame, metric: str | Metric, first: str, second: st
         `difference` (the first controller's value less the second's) and `difference_ci95`.
 
     Raises:
-        InputError: an unknown metric or controller, two runs of one seed whose arrivals differ, or
-            rows that `cells` refuses.
+        InputError: an unknown metric or controller, arrivals that differ, or as by `cells`.
     """
     import pandas as pd
 
@@ -125,10 +121,10 @@ def pairs(
     one, other = (good[good[column] == name] for name in names)
     for name, runs in zip(names, (one, other), strict=True):
         if runs.duplicated([*by, "seed"]).any():
-            raise InputError(f"{name} has several runs of one seed; {', '.join(by)} are the same")
+            raise InputError(f"{name} has several runs of one seed with equal {', '.join(by)}")
     both = one.merge(other, on=[*by, "seed"], suffixes=("", "_other"))
     if (both["arrivals"] != both["arrivals_other"]).any():
-        raise InputError(f"{' and '.join(names)} did not meet the same arrivals")
+        raise InputError(f"{' and '.join(names)} had different arrivals")
     gap = both[metric].astype(float) - both[f"{metric}_other"].astype(float)
     grouped = gap.groupby([both[key] for key in by], sort=False)
     return {key: values.tolist() for key, values in grouped}
@@ -156,8 +152,7 @@ def saturated(good: pd.DataFrame) -> bool:
 def too_short(good: pd.DataFrame) -> bool:
     """Whether a cell's runs end before growing queues can be told from roads still filling up.
 
-    The travel time on a free road is travel time less time loss, of the trips that ended or, if
-    none did, of what was driven.
+    The time on a free road is travel less loss, of the trips that ended or else of all.
     """
     horizon = float(good["horizon_s"].iloc[0]) - float(good["warmup_s"].iloc[0])
     ended, driven = (

@@ -5,6 +5,7 @@
     density = [150, 250, 350]
     split = ["balanced", "4:3:2:1"]
     controller = ["dim", "fixed-time"]
+    # fleet = { car = 0.9, bus = 0.1 }  # shares of vehicle types, perhaps with unit = "pcu"
     # humans = [0, 0.2]                 # with controllers of DIM only
     # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
     # start = "07:00"                   # from this time of day on
@@ -16,8 +17,7 @@
     scenario = { name = "custom", label = "skewed", bearings = [0, 80, 190, 260] }
     controller = { name = "dim", label = "west first", priorities = [1, 2, 3, 0] }
 
-Without `[[experiment]]` the file is one block. In a controller's table, all keys except `name` and
-`label` are its parameters.
+Without one, the file is a block. A controller's table has a name, a label and parameters.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from scenarios.scenario import Scenario
 from scenarios.sweep.keys import key_of
 from scenarios.sweep.rows import identity_of
 
-#: More runs are surely a typing error.
+#: More runs must be a mistake.
 MAX_RUNS = 1_000_000
 
 #: Keys of shares, written "4:3:2:1" or [4, 3, 2, 1]; a list may hold several of both forms.
@@ -110,7 +110,7 @@ def read_experiments(
 
 
 def check_can_run(recipes: Iterable[Recipe]) -> None:
-    """Start every controller at every site once; raises `InputError` if it cannot serve it."""
+    """Start every controller at every site once; `InputError` for a site that one cannot serve."""
     first = {tuple({**identity_of(it), "seed": 0}.values()): it for it in recipes}
     for recipe in first.values():
         scenario = recipe.scenario
@@ -129,7 +129,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
         raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
     if "min_headway" in block and "shifted" not in axes["model"]:
-        raise InputError("min_headway goes with the model 'shifted'")
+        raise InputError("min_headway needs the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
     if (count := prod(map(len, axes.values()))) > MAX_RUNS:
         raise InputError(f"{count} runs are more than {MAX_RUNS}")
@@ -151,7 +151,7 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     recorded, start = chosen.pop("arrivals"), chosen.pop("start")
     if recorded is None and start is not None:
-        raise InputError("start goes with arrivals: it is a time in the table")
+        raise InputError("start needs arrivals: it is a time in the table")
     if chosen["model"] != "shifted":
         del chosen["min_headway"]
     with _at("scenario"):
@@ -168,11 +168,11 @@ def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
 
 
 def _table(given: object) -> dict[str, Any]:
-    """A name, or a table with one, as a table."""
+    """A name or named table, as a table."""
     if isinstance(given, str):
         return {"name": given}
     if not isinstance(given, dict):
-        raise InputError(f"must be a name or a table with one, got {show(given)}")
+        raise InputError(f"must be a name or a table with a name, got {show(given)}")
     if "name" not in given:
         raise InputError(f"the table {show(given)} has no name")
     instance("label", given.get("label", ""), str)

@@ -20,16 +20,16 @@ from minisim.errors import InputError, show
 from minisim.version import __version__
 from scenarios.recipe import Recipe
 
-#: Raise it by one when recipes give other rows than before while the version of the package stays
-#: the same. Stored rows are then computed again.
-RESULTS = 5
+#: Raise it by one when recipes give different rows while the version of the package stays the same.
+#: Stored rows are then computed again.
+RESULTS = 6
 
 #: Packages whose changes `RESULTS` counts.
 OURS = ("minisim", "dim", "baselines", "scenarios")
 
 
 def results_version() -> str:
-    """The version of rows, which depend on it and on their recipe."""
+    """The version of rows; they depend on it and on their recipe."""
     return f"{__version__}/{RESULTS}"
 
 
@@ -61,7 +61,8 @@ def canonical(value: object) -> Any:
     """The parameters of a recipe as JSON values, equal for equal recipes.
 
     Dataclasses become their class and fields; those that are not ours also the version of their
-    code (`_code`). Numbers become floats, since 350 and 350.0 are the same density. Arrays become
+    code (`_code`). Other objects do too, with their attributes for fields, if their class has a
+    `version`. Numbers become floats, since 350 and 350.0 are the same density. Arrays become
     their type, shape and SHA-256. Raises `InputError` for a value of another kind.
     """
     if value is None or isinstance(value, bool | str):
@@ -69,13 +70,15 @@ def canonical(value: object) -> Any:
     if isinstance(value, Integral | Real):
         number = float(value)
         return number + 0.0 if number == value or math.isnan(number) else str(value)  # no -0.0
-    if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufU":
         plain = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("<"))
         digest = hashlib.sha256(plain.tobytes()).hexdigest()
         return {"array": plain.dtype.str, "shape": list(plain.shape), "sha256": digest}
-    if is_dataclass(value) and not isinstance(value, type):
-        kind = type(value)
-        told = {field.name: canonical(getattr(value, field.name)) for field in fields(value)}
+    kind: Any = type(value)
+    versioned = isinstance(getattr(kind, "version", None), str | int)
+    if is_dataclass(kind) or (versioned and hasattr(value, "__dict__")):
+        named = [field.name for field in fields(kind)] if is_dataclass(kind) else vars(value)
+        told = {name: canonical(getattr(value, name)) for name in named}
         return {"class": f"{kind.__module__}.{kind.__qualname__}", **_code(kind), **told}
     if inspect.isfunction(value):
         code = _code(value)
@@ -95,7 +98,7 @@ def canonical(value: object) -> Any:
     raise InputError(
         f"{show(value)} cannot be stored: {type(value).__qualname__} is not a dataclass, so its "
         "parameters are unknown; make it a frozen dataclass, whose fields are numbers, texts, "
-        "functions, arrays, other dataclasses, and collections of them"
+        "functions, arrays, other dataclasses, and collections of them, or give it a `version`"
     )
 
 

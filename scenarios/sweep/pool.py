@@ -28,7 +28,7 @@ from queue import SimpleQueue
 from typing import TypeVar
 
 from minisim.errors import integer
-from scenarios.termination import Terminated, raise_terminated
+from scenarios.termination import Terminated, terminable
 
 #: Runs that a pool of ours holds per worker: the current one and the next one.
 IN_HAND = 2
@@ -122,7 +122,7 @@ def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -
     whole = partial(_ending, function)
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         return executor.submit(whole, task)
-    ensure_running()  # or the first process would start it, and that ends the delay
+    ensure_running()  # or the first process would, which ends the delay
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         return executor.submit(whole, task)
@@ -149,7 +149,6 @@ def _begin_worker(leash: Connection) -> None:
     # Ctrl-C reaches every process of the terminal; only the parent should answer it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(leash,), daemon=True).start()
-    signal.signal(signal.SIGTERM, raise_terminated)
 
 
 def _end_with(leash: Connection) -> None:
@@ -168,9 +167,10 @@ def _end_with(leash: Connection) -> None:
 def _ending(function: Callable[[Task], Answer], task: Task) -> Answer:
     """Run a task; `Terminated` ends the worker, since a pool would take it for a result."""
     try:
-        return function(task)
+        with terminable():
+            return function(task)
     except Terminated as end:
-        os._exit(int(end.code or 0))
+        os._exit(end.code)
 
 
 def _results(

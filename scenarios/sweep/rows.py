@@ -43,6 +43,7 @@ def identity_of(recipe: Recipe) -> Row:
         "arms": intersection.n,
         "side": intersection.side,
         "profile": scenario.profile.name,
+        "fleet": str(scenario.vehicles),
         "density": scenario.density,
         "split": "recorded" if recorded else shares_text(demand.split, BALANCED),
         "turns": "recorded" if recorded else shares_text(demand.turns, UNIFORM),
@@ -91,7 +92,8 @@ def grows(row: Mapping[str, Any] | pd.Series[Any], arms: int) -> bool:
 def _fingerprint(trips: Trips) -> str:
     """A digest of the arrivals, equal for common arrivals."""
     digest = hashlib.sha256()
-    for column in (trips.demand_time, trips.lane, trips.manoeuvre):
+    types = (trips.type,) if trips.type.any() else ()
+    for column in (trips.demand_time, trips.lane, trips.manoeuvre, *types):
         digest.update(np.ascontiguousarray(column).tobytes())
     return digest.hexdigest()[:16]
 

@@ -43,15 +43,14 @@ def sweep(
     Args:
         recipes: what to run.
         executor: any `concurrent.futures.Executor`, such as
-            `dask.distributed.Client.get_executor()`; it stays open. None is a pool of processes
-            for this call. They are spawned, so a script needs `if __name__ == "__main__":`. Only
+            `dask.distributed.Client.get_executor()`; it stays open. None means a pool of
+            processes for this call, spawned, so a script needs `if __name__ == "__main__":`. Only
             the column `cpu_s` depends on the executor.
         progress: called in this process with the numbers of finished runs and of all runs.
         jobs: processes of the pool, one per core by default; 1 runs in this process.
         store: keeps each row as it comes; rows that it has are not computed again.
         metrics: columns besides the usual ones: names of `minisim.results.metrics.METRICS`,
-            `Metric`s or functions of your own, or `module:name` of these. With several processes
-            the function must be in a module.
+            `Metric`s or functions of your own (for several processes in a module), `module:name`.
 
     Returns:
         What was run (`scenarios.sweep.rows.identity_of`); the keys of `Run.summary()`, nested
@@ -131,7 +130,7 @@ def _check_portable(recipes: Iterable[Recipe]) -> None:
     for part in parts.values():
         try:
             pickle.dumps(part)
-        except Exception as error:  # a class of the caller's own may raise anything
+        except (Exception, SystemExit) as error:  # a class of the caller's own may raise anything
             raise InputError(
                 f"{show(part)} cannot go to other processes ({error}); put its class or function "
                 "at the top of a module, or use one job"
@@ -141,8 +140,7 @@ def _check_portable(recipes: Iterable[Recipe]) -> None:
 def _warm(recipes: Iterable[Recipe], pool: Executor) -> None:
     """Let one process compile to disk, or all would compile when minisim is freshly installed.
 
-    The compiled code depends on the class of the vehicle. A run that fails here fails again in its
-    turn, and its row says why.
+    Compiled code depends on the class of the vehicle. A run that fails here fails again later.
     """
     for recipe in {type(it.scenario.profile.vehicle): it for it in recipes}.values():
         dt = recipe.scenario.profile.dt

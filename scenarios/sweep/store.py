@@ -2,8 +2,7 @@
 
 Every run is a transaction of its own, written ahead (WAL) and forced to the disk, so that a killed
 sweep loses no row. Several processes may write at once: each waits for the other's transaction, and
-a run that two of them computed is one row. SQLite needs a local disk, since network file systems do
-not lock files reliably.
+a run that two of them computed is one row. SQLite needs a local disk, which locks files reliably.
 
 A key connects a row with its recipe. The row is valid while the version of the results is the same.
 """
@@ -30,8 +29,7 @@ if TYPE_CHECKING:
 APPLICATION = 0x44494D73
 SCHEMA = 1
 
-#: How long to wait for another process [s]: for its transaction, and when opening. A sweep holds a
-#: store for a few milliseconds only.
+#: How long to wait for another's transaction, and when opening [s]. A sweep's takes milliseconds.
 PATIENCE = 30.0
 OPENING = 3.0
 
@@ -51,8 +49,7 @@ PRAGMA user_version = {SCHEMA};
 COMMIT;
 """
 
-#: The file begins with it. The layout is at byte 60, the mark at byte 68, 4 bytes each, big endian
-#: (SQLite, "Database File Format", 1.3).
+#: How a file begins; layout and mark are at bytes 60 and 68 (SQLite, "Database File Format", 1.3).
 _MAGIC = b"SQLite format 3\0"
 
 

@@ -126,9 +126,8 @@ def _write_signal(folder: Path) -> None:
             state = "".join(colour if links[i] == arm else "r" for i in sorted(links))
             phases.append(f'<phase duration="{seconds:.3f}" state="{state}"/>')
     program = '<tlLogic id="C" type="static" programID="webster" offset="0">'
-    (folder / "x.add.xml").write_text(
-        f"<additional>{program}{''.join(phases)}</tlLogic></additional>"
-    )
+    head = f"<additional>{program}{''.join(phases)}"
+    (folder / "x.add.xml").write_text(f"{head}</tlLogic></additional>")
 
 
 def _hosted_hour() -> float:

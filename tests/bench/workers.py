@@ -1,6 +1,6 @@
 """Two worker processes against one, over a sweep: `make bench`.
 
-Only an otherwise idle machine of two cores or more tells anything.
+Meaningful only on an otherwise idle machine with two cores or more.
 """
 
 from __future__ import annotations

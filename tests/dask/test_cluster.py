@@ -18,13 +18,13 @@ import pytest
 from dim import Dim
 from minisim.errors import ExecutorError, InputError
 from scenarios import four_way
-from scenarios.cli import main
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
 from scenarios.sweep.cluster import cluster
 from scenarios.sweep.store import Store
 from tests import ROOT
 from tests.builders import repeatable
+from tests.unit.scenarios.cli.test_cli import Captured, fails, ok
 
 pytest.importorskip("distributed", reason="needs the extra `dask`")
 
@@ -106,15 +106,12 @@ def test_a_killed_worker_costs_nothing(scheduler: str, tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(repeatable(here), repeatable(there))
 
 
-def test_the_command_runs_there(
-    scheduler: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_runs_there(scheduler: str, tmp_path: Path, capsys: Captured) -> None:
     file = tmp_path / "two.toml"
     file.write_text("horizon = 60\nseeds = 2\n")
     arguments = ["sweep", str(file), "--scheduler", scheduler, "--out", str(tmp_path / "s.db")]
     with workers(scheduler), cluster(scheduler, patience=60):  # there is a worker now
-        assert main(arguments) == 0
-    assert "2 runs in" in capsys.readouterr().out
+        assert "2 runs in" in ok(capsys, *arguments)
 
 
 def test_a_scheduler_without_workers_is_told(scheduler: str) -> None:
@@ -133,19 +130,14 @@ def test_a_scheduler_without_workers_is_told(scheduler: str) -> None:
         ),
     ],
 )
-def test_no_scheduler_is_told_within_seconds(
-    address: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_scheduler_is_told(address: str, why: str, tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "two.toml", tmp_path / "s.db"
     file.write_text("horizon = 60\nseeds = 2\n")
     began = time.monotonic()
-    code = main(["sweep", str(file), "--scheduler", address, "--out", str(store)])
+    said = fails(capsys, "sweep", str(file), "--scheduler", address, "--out", str(store))
     assert time.monotonic() - began < 20
-    error = capsys.readouterr().err
-    assert code == 2
-    assert error.startswith("minisim: no Dask scheduler at ")
-    assert why in error
-    assert error.count("\n") == 1
+    assert said.startswith("minisim: no Dask scheduler at ")
+    assert why in said
     assert not store.exists()
 
 

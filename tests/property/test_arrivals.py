@@ -50,9 +50,7 @@ def test_any_bytes_after_the_header_are_a_table_or_a_file_error(junk: bytes) -> 
 
 
 @given(demands(N), floats(1.0, 600.0), st.integers(0, 2**64))
-def test_drawn_tables_are_sorted_within_the_duration_and_fit_the_geometry(
-    demand: Demand, duration: float, seed: int
-) -> None:
+def test_drawn_tables_are_sorted_and_fit(demand: Demand, duration: float, seed: int) -> None:
     table = demand.draw(N, duration, seed)
     table.check(N)
     assert (np.diff(table.time) >= 0).all()
@@ -68,18 +66,14 @@ def rows(table: Arrivals) -> list[tuple[float, int, int]]:
 
 
 @given(demands(N), st.integers(0, 2**32), floats(1.0, 5000.0), floats(0.0, 5000.0))
-def test_a_longer_duration_only_adds_arrivals(
-    demand: Demand, seed: int, duration: float, more: float
-) -> None:
+def test_longer_only_adds_arrivals(demand: Demand, seed: int, duration: float, more: float) -> None:
     short, long = (rows(demand.draw(N, t, seed)) for t in (duration, duration + more))
     assert long[: len(short)] == short
     assert all(time >= duration for time, *_ in long[len(short) :])
 
 
 @given(demands(N, 300.0), st.integers(0, 2**32), st.integers(0, N - 1), floats(0.1, 2.0))
-def test_the_rate_of_a_lane_changes_no_other(
-    demand: Demand, seed: int, lane: int, factor: float
-) -> None:
+def test_the_rate_of_a_lane_is_its_own(demand: Demand, seed: int, lane: int, factor: float) -> None:
     """With the other rates as they are: as numbers, not as shares of another total."""
     split = [factor if k == lane else 1.0 for k in range(N)]
     density = 200.0 * sum(split) / N

@@ -8,14 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from minisim.carfollowing import (
-    ballistic,
-    gap_ratio,
-    idm,
-    iidm,
-    insertion_speed,
-    speed_towards,
-)
+from minisim.carfollowing import ballistic, gap_ratio, idm, iidm, insertion_speed, speed_towards
 from minisim.vehicle import VehicleType
 from scenarios.strategies import floats, vehicles
 
@@ -50,9 +43,7 @@ def check_no_collision(
 
 
 @given(vehicles(), SPEEDS, floats(0.05, 0.98), STEPS)
-def test_no_collision_behind_a_leader_that_brakes_to_a_stop(
-    driver: VehicleType, v0: float, share: float, dt: float
-) -> None:
+def test_safe_behind_a_leader(driver: VehicleType, v0: float, share: float, dt: float) -> None:
     v = share * v0
     check_no_collision(driver, v0, v, v, equilibrium_gap(driver, v, v0), dt)
 

@@ -6,6 +6,7 @@ check that disagrees with them fails here. Tests of single classes need not repe
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 import pkgutil
@@ -17,6 +18,7 @@ from typing import Any
 import pytest
 
 from minisim.errors import InputError
+from minisim.fields import SWITCH
 from minisim.parameters import Declared, Parameter, parameters
 
 ROOMS = ("minisim", "dim", "baselines", "scenarios")
@@ -89,6 +91,16 @@ def test_what_is_ruled_out_is_refused_by_name(name: str) -> None:
         assert title in message
         assert "\n" not in message
         assert len(message) < 400
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_its_type_shows_what_it_takes(name: str) -> None:
+    """Not only what it keeps, so that type checkers accept what the constructor accepts."""
+    kind, (field, it, _) = ALL[name]
+    (annotated,) = (each.type for each in dataclasses.fields(kind) if each.name == field)
+    spelled = ("Spelled[",) if it.kinds else ("Switch",) if it.words == SWITCH else ()
+    sequence = ("Reals[", "MaybeReals[", "Takes[") if re.search(r"\bnumbers", it.allowed) else ()
+    assert annotated.startswith(spelled or sequence or "")
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -39,9 +39,8 @@ def views(draw: st.DrawFn, n: int) -> list[View]:
             distance = draw(st.floats(-15.0, 9.0))
             for k in range(first[lane], min(first[lane] + draw(st.integers(0, 3)), 5)):
                 speed = draw(st.sampled_from([0.0, 1.0, 2.5, 5.0]))
-                seen.append(
-                    Observed(100 * lane + k, lane, wishes[5 * lane + k], distance, speed, LENGTH)
-                )
+                wish = wishes[5 * lane + k]
+                seen.append(Observed(100 * lane + k, lane, wish, distance, speed, LENGTH))
                 distance += LENGTH + draw(st.floats(0.5, 5.0))
         result.append(View(float(time), tuple(v for v in seen if v.distance <= 8.5)))
     return result
@@ -128,7 +127,7 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
             if v.id not in minds:
                 own = DecisionTable(HarmonyMatrix.paper(n), dim.order, ranks)
                 agent = Agent(v.id, v.lane, Rules(own, dim.gate, dim.commit))
-                minds[v.id] = agent, Reader(n, dim.zones, b, dim.commit)
+                minds[v.id] = agent, Reader(n, dim.zones, (b,), dim.commit)
         percepts = {v.id: minds[v.id][1].read(view) for v in near}
         assert len(set(percepts.values())) <= 1
         going = {v.id for v in near if minds[v.id][0].decide(percepts[v.id])}
@@ -140,9 +139,7 @@ def test_decisions_are_unanimous(run: tuple[Site, Dim, list[View]]) -> None:
 @pytest.mark.parametrize("maker", [three_way, four_way, five_way])
 @pytest.mark.parametrize("commit", COMMITS)
 @pytest.mark.parametrize("gate", GATES)
-def test_wake_ups_lose_nothing_in_dense_traffic(
-    gate: str, commit: str, maker: Callable[..., Scenario]
-) -> None:
+def test_wake_ups_lose_nothing(gate: str, commit: str, maker: Callable[..., Scenario]) -> None:
     """The same trips, and collisions of the paper's commit rule, as when looking all the time."""
     scenario = maker(density=350, horizon=600.0)
     dim = Dim(gate=gate, commit=commit)

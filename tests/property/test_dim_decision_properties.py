@@ -59,9 +59,7 @@ def test_the_right_of_way_is_a_best_maximal_clique(case: Case) -> None:
 
 
 @given(cases(), st.randoms(use_true_random=False))
-def test_the_vehicle_that_goes_first_does_not_change_which_go_with_it(
-    case: Case, random: Random
-) -> None:
+def test_that_some_go_first_does_not_change_which_go_with_them(case: Case, random: Random) -> None:
     """Why the gate "harmonious" needs no wake-up when a vehicle commits (dim.controller).
 
     Some movements cross, also of the participants' own lanes. When some of the chosen then cross

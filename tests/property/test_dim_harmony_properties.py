@@ -30,9 +30,7 @@ def mirrored(intersection: Intersection) -> tuple[Intersection, list[Movement]]:
 
 @settings(max_examples=30)
 @given(intersections(max_arms=5), vehicles())
-def test_mirrored_geometry_gives_the_mirrored_matrix(
-    intersection: Intersection, vehicle: VehicleType
-) -> None:
+def test_a_mirror_mirrors_the_matrix(intersection: Intersection, vehicle: VehicleType) -> None:
     image, becomes = mirrored(intersection)
     matrix = HarmonyMatrix.from_geometry(intersection, vehicle)
     reflected = HarmonyMatrix.from_geometry(image, vehicle)

@@ -57,9 +57,7 @@ def test_corridor_contains_every_body(
 
 @share(0.5)
 @given(intersections(), vehicles())
-def test_no_vehicle_touches_one_held_at_another_entry(
-    intersection: Intersection, vehicle: VehicleType
-) -> None:
+def test_no_vehicle_touches_one_held(intersection: Intersection, vehicle: VehicleType) -> None:
     """Right of way is given to movements, so a held vehicle must be out of the way of all others.
 
     Cars are at most 6 × 2 m, lanes at least 2.8 m wide. A car takes its width of the lane, and its

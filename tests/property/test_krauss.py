@@ -104,9 +104,7 @@ def test_a_platoon_behind_a_leader_that_brakes_to_a_stop_keeps_its_gaps(
 
 
 @given(drivers(), floats(0.0, 20.0), floats(0.01, 60.0), STEPS)
-def test_more_gap_or_a_faster_leader_is_never_less_safe(
-    driver: VehicleType, v_leader: float, gap: float, dt: float
-) -> None:
+def test_more_room_is_as_safe(driver: VehicleType, v_leader: float, gap: float, dt: float) -> None:
     b, headway = driver.deceleration, driver.headway
     here = safe_speed(gap, v_leader, b, headway, dt)
     assert safe_speed(gap * 1.01, v_leader, b, headway, dt) >= here - 1e-9

@@ -1,8 +1,7 @@
 """Traffic that is made up on the way: vehicles come at bad moments, with the model as oracle.
 
 A run's arrivals are fixed when it starts, so each rule adds to the list and runs again from the
-beginning up to now. That costs little, and also shows that later arrivals do not change earlier
-events.
+beginning up to now. That costs little, and shows that later arrivals change no earlier event.
 """
 
 from __future__ import annotations

@@ -26,6 +26,5 @@ def test_without_hypothesis_the_error_says_what_to_install() -> None:
         "except MissingExtraError as error:\n"
         "    print(error)\n"
     )
-    assert (
-        python("-c", code).stdout == "strategies need hypothesis: pip install 'minisim[testing]'\n"
-    )
+    told = python("-c", code).stdout
+    assert told == "strategies need hypothesis: pip install 'minisim[testing]'\n"

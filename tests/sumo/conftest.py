@@ -13,9 +13,8 @@ from minisim.control import Controller
 from minisim.results.run import Run
 from minisim.sumo import simulate
 
-MISSING = [
-    name for name in ("libsumo", "sumo", "sumolib") if importlib.util.find_spec(name) is None
-]
+NEEDED = ("libsumo", "sumo", "sumolib")
+MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]
 REASON = f"{', '.join(MISSING)} not installed: pip install 'minisim[sumo]'"
 
 

@@ -1,7 +1,6 @@
 """minisim's IDM against SUMO's: the same arrivals, vehicles and controllers, profile `fair`.
 
-The tolerances are the issue's: mean travel time within 3 %, mean waiting time within 10 % or
-0.3 s.
+Tolerances: mean travel time within 3 %, mean waiting time within 10 % or 0.3 s.
 """
 
 from __future__ import annotations

@@ -169,7 +169,7 @@ def test_teleport_takes_a_vehicle_that_runs_into_another_off_the_road() -> None:
         (AS_RUN, "IDM", "model IDM does not drive vehicles of the model 'cc'; choose CC"),
         (replace(FAIR, vehicle=VehicleType(model="krauss")), "IDM", "'krauss'; choose Krauss, or"),
         (replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, radar=100.0)), None,
-         "CC keeps a spacing of 2 m and sees 250 m far, the vehicles 2 m and 100 m"),
+         "CC has spacing 2 m and radar 250 m, but the vehicles have 2 m and 100 m"),
     ],
 )  # fmt: skip
 def test_models_that_do_not_fit_are_told(profile: Any, model: str | None, message: str) -> None:

@@ -6,11 +6,11 @@ import re
 from pathlib import Path
 
 import pandas as pd
-import pytest
 from PIL import Image
 
 from minisim.results.metrics import MEANS
 from scenarios.cli import main
+from tests.unit.scenarios.cli.test_cli import Captured
 
 
 def crossval(folder: Path, *arguments: str) -> tuple[int, pd.DataFrame, str]:
@@ -20,12 +20,9 @@ def crossval(folder: Path, *arguments: str) -> tuple[int, pd.DataFrame, str]:
     return code, pd.read_csv(folder / "crossval.csv"), report
 
 
-def test_both_hosts_agree_in_a_short_run(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    code, table, report = crossval(
-        tmp_path / "new" / "out", "-d", "250", "--seeds", "2", "--horizon", "200"
-    )
+def test_both_hosts_agree_in_a_short_run(capsys: Captured, tmp_path: Path) -> None:
+    arguments = ("-d", "250", "--seeds", "2", "--horizon", "200")
+    code, table, report = crossval(tmp_path / "new" / "out", *arguments)
     printed = capsys.readouterr().out
     assert code == 0
     assert printed.startswith("2 of 2 cells: both hosts agree within the tolerances\n")
@@ -57,9 +54,7 @@ def test_the_same_law_gives_the_same_trips(tmp_path: Path) -> None:
     assert "| four-way balanced 150 dim | 1 |" in report
 
 
-def test_a_collision_is_a_row_and_exit_1(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_collision_is_a_row_and_exit_1(capsys: Captured, tmp_path: Path) -> None:
     arguments = ("-c", "unregulated", "-d", "350", "--seeds", "1", "--horizon", "240")
     code, table, report = crossval(tmp_path, *arguments)
     assert code == 1

@@ -24,6 +24,7 @@ import shapely
 from hypothesis import given, settings
 
 from dim import HarmonyMatrix
+from minisim.control import Site
 from minisim.junction.conflicts import CLEARANCE, separation
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES, Movement
@@ -41,7 +42,7 @@ BENT = "SUMO is stricter: it draws the ways closer than a lane is wide"
 
 @dataclass(frozen=True)
 class Oracle:
-    """A junction as SUMO has it: its foes, and the lines of the ways through it."""
+    """A junction in SUMO: its foes, and the lines of the ways through it."""
 
     links: dict[Movement, int]
     foes: dict[int, str]
@@ -78,16 +79,20 @@ def read_oracle(intersection: Intersection, file: Path) -> Oracle:
     return Oracle(links, foes, lines)
 
 
+def site_of(intersection: Intersection) -> Site:
+    return Site(intersection, VehicleType(), 14.0, (0.0,) * intersection.n)
+
+
 def as_hosted(intersection: Intersection, folder: Path) -> None:
     """The network that SUMO as a host drives on."""
-    network.build_network(intersection, 14.0, folder, host.sumo_home())
+    network.build_network(site_of(intersection), folder, host.sumo_home())
 
 
 def as_netconvert_draws_it(intersection: Intersection, folder: Path) -> None:
     """The same roads, but entries and ways through the junction are netconvert's."""
     nodes = (line.split(" shape=")[0].rstrip("/>") + "/>" for line in network._nodes(intersection))
     network.write_xml(folder / network.NODES, "nodes", nodes)
-    network.write_xml(folder / network.EDGES, "edges", network._edges(intersection, 14.0))
+    network.write_xml(folder / network.EDGES, "edges", network._edges(site_of(intersection)))
     command = [str(host.sumo_home() / "bin" / "netconvert"), "--no-turnarounds", "true"]
     command += ["--node-files", network.NODES, "--edge-files", network.EDGES]
     command += ["--output-file", network.NETWORK]

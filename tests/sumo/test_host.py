@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import signal
@@ -33,6 +32,7 @@ from minisim.control import (
     Hold,
     Open,
     Plan,
+    Site,
     Unregulated,
     View,
     Wake,
@@ -44,13 +44,13 @@ from minisim.sumo import host, network, simulate
 from minisim.testing import check_controller, small_scenario
 from minisim.vehicle import VehicleType
 from scenarios import four_way
-from scenarios.cli import main
 from scenarios.profiles import FAIR
 from scenarios.scenario import Scenario
 from scenarios.strategies import intersections
 from tests import ROOT
 from tests.builders import Fixed, Greens, Scripted, hardest_braking, queues, replayed, share
 from tests.sumo.conftest import both
+from tests.unit.scenarios.cli.test_cli import Captured, answer, fails, ok
 
 FAIR_FOUR = four_way(100, profile="fair")
 
@@ -85,9 +85,7 @@ CONTROLLERS: tuple[Controller, ...] = (
 @pytest.mark.parametrize(
     ("arms", "horizon"), [((4,), 60.0), pytest.param((3, 5), 120.0, marks=pytest.mark.slow)]
 )
-def test_controllers_keep_their_contract_in_sumo(
-    controller: Controller, arms: tuple[int, ...], horizon: float
-) -> None:
+def test_contracts_in_sumo(controller: Controller, arms: tuple[int, ...], horizon: float) -> None:
     check_controller(controller, arms=arms, horizon=horizon, host="sumo")
 
 
@@ -100,9 +98,8 @@ def test_the_horizon_is_exclusive() -> None:
 def test_what_happens_does_not_depend_on_the_horizon() -> None:
     profile = replace(FAIR, vehicle=replace(FAIR.vehicle, speed_deviation=0.1))
     road = four_way(300, profile=profile, arm_length=200.0)
-    short, long = (
-        simulate(replace(road, horizon=t), Mixed(share=0.5), 3).trips for t in (80.0, 110.0)
-    )
+    roads = (replace(road, horizon=t) for t in (80.0, 110.0))
+    short, long = (simulate(road, Mixed(share=0.5), 3).trips for road in roads)
     over = short["arrival_s"] < 80.0
     assert over.sum() > 5
     assert short[over].equals(long[: len(short)][over])
@@ -186,7 +183,7 @@ def test_no_vehicle_brakes_beyond_its_brakes(controller: Controller, model: str)
 def test_sessions_see_the_same() -> None:
     """Marks, clearing, order, ids and numbers of the views; SUMO rounds nothing."""
     plan = Plan(
-        marks=(100.0, 30.0, 0.0), wake_on_clear=True, sight=120.0, lanes_open=True, period=7.3
+        marks=(100.0, 30.0, 0.0), wake_on_clear=True, sight=120, lanes_open=True, period=7.3
     )
     scenario = replayed(
         FAIR_FOUR, (0.0, 0, 2), (2.0, 1, 2), (4.0, 2, 2), (6.0, 3, 2), (18.0, 3, 1), horizon=120.0
@@ -324,7 +321,11 @@ def test_a_collision_stops_the_run_with_a_replay() -> None:
 @given(intersections())
 def test_any_geometry_becomes_the_same_network(intersection: Intersection) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        made = network.build_network(intersection, 14.0, Path(folder), host.sumo_home())
+        made = network.build_network(
+            Site(intersection, VehicleType(), 14.0, (0.0,) * intersection.n),
+            Path(folder),
+            host.sumo_home(),
+        )
         root = ET.parse(Path(folder) / network.NETWORK).getroot()
     arcs = [path.crossing for path in intersection.paths]
     assert made.approach == pytest.approx([intersection.approach_length] * len(arcs), abs=1e-4)
@@ -345,9 +346,7 @@ def test_other_junctions_run(arms: int, side: str) -> None:
     assert its == pytest.approx(mine, rel=0.03)
 
 
-def test_what_netconvert_says_is_passed_on_and_its_files_kept(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_what_netconvert_says_is_passed_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(network, "_outline", lambda intersection: "here and there")
     with pytest.raises(SumoError, match=r"netconvert failed \(exit code 1\): .*shape.*node 'C'"):
         simulate(single(), Unregulated(), keep_files=tmp_path / "new" / "folder")
@@ -537,40 +536,31 @@ def test_no_environment_variable_is_needed_or_left(monkeypatch: pytest.MonkeyPat
 RUN = ("run", "four-way", "-p", "fair", "-d", "300", "--horizon", "120")
 
 
-def test_the_command_line_hosts_in_sumo(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert main([*RUN, "--json", "--host", "sumo", "--keep-files", str(tmp_path / "kept")]) == 0
-    printed = json.loads(capsys.readouterr().out)
+def test_the_command_line_hosts_in_sumo(capsys: Captured, tmp_path: Path) -> None:
+    printed = answer(capsys, *RUN, "--host", "sumo", "--keep-files", str(tmp_path / "kept"))
     assert (tmp_path / "kept" / "minisim.net.xml").is_file()
-    assert main([*RUN, "--json"]) == 0
-    ours = json.loads(capsys.readouterr().out)
+    ours = answer(capsys, *RUN)
     assert (ours["host"], printed["host"]) == ("minisim", "sumo")
     assert printed.keys() == ours.keys()
     assert printed["trips"] == ours["trips"]
     assert printed["travel_time_s"] == pytest.approx(ours["travel_time_s"], rel=0.03)
 
 
-def test_the_command_line_prints_a_table_of_sumos_run(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_the_command_line_prints_a_table_of_sumos_run(capsys: Captured, tmp_path: Path) -> None:
     kept = str(tmp_path / "kept")
     fcd = tmp_path / "sumo.xml"
     options = ("-c", "fixed-time", "--host", "sumo", "--sumo-model", "Krauss", "--keep-files", kept)
-    assert main([*RUN, *options, "--sumo-fcd", str(fcd)]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert f"wrote {fcd}" in captured.out.replace("\n", "")
+    said = ok(capsys, *RUN, *options, "--sumo-fcd", str(fcd))
+    assert f"wrote {fcd}" in said.replace("\n", "")
     assert fcd.read_text().count("<timestep") == 1201  # 0 … 120 s
-    assert "host sumo" in captured.out
-    assert f"  SUMO's files are in {kept}\n" in captured.out
+    assert "host sumo" in said
+    assert f"  SUMO's files are in {kept}\n" in said
 
 
-def test_a_collision_names_what_is_there_and_what_is_not(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_collision_names_what_is_there_and_what_is_not(capsys: Captured, tmp_path: Path) -> None:
     fcd, kept = tmp_path / "fcd.xml", tmp_path / "kept"
     options = ("-c", "unregulated", "--host", "sumo", "--sumo-fcd", str(fcd))
-    assert main([*RUN, *options, "--keep-files", str(kept)]) == 1
-    said = capsys.readouterr().err
+    said = fails(capsys, *RUN, *options, "--keep-files", str(kept), code=1)
     assert f"SUMO's files up to there are in {kept}; {fcd} not written; --on-collision" in said
     assert not fcd.exists()
 
@@ -585,13 +575,8 @@ def test_a_collision_names_what_is_there_and_what_is_not(
         (("--host", "sumo", "--sumo-model", "CACC"), "unknown SUMO model 'CACC'"),
     ],
 )
-def test_wrong_options_are_one_line(
-    capsys: pytest.CaptureFixture[str], options: tuple[str, ...], message: str
-) -> None:
-    assert main([*RUN, *options]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert (captured.out, captured.err.count("\n")) == ("", 1)
+def test_wrong_options_are_told(capsys: Captured, options: tuple[str, ...], message: str) -> None:
+    assert message in fails(capsys, *RUN, *options)
 
 
 def test_a_crossed_vehicle_still_follows_into_its_exit() -> None:

@@ -211,9 +211,7 @@ def test_entering_behind_each_other_makes_sumos_short_waits(
 
 
 @LENGTHS
-def test_controllers_compare(
-    densities: tuple[float, ...], seeds: tuple[int, ...], horizon: float
-) -> None:
+def test_all_compare(densities: tuple[float, ...], seeds: tuple[int, ...], horizon: float) -> None:
     outside = []
     for density in densities:
         scenario = four_way(density, profile="fair", horizon=horizon)

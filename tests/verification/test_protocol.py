@@ -76,18 +76,16 @@ def test_the_papers_commit_rule_is_not_safe(n: int, gate: str) -> None:
         assert sum(event.what == "arrive" for event in path) == 2
 
 
-@pytest.mark.parametrize(
-    "scenario", [three_way(), three_way(profile="fair")], ids=["paper", "fair"]
-)
-def test_its_counterexample_collides_in_the_simulator(scenario: Scenario) -> None:
-    site = scenario.site()
+@pytest.mark.parametrize("road", [three_way(), three_way(profile="fair")], ids=["paper", "fair"])
+def test_its_counterexample_collides_in_the_simulator(road: Scenario) -> None:
+    site = road.site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     paths = explore(Protocol(matrix, commit="paper")).unsafe
     dim = Dim(commit="paper")
-    arrivals = colliding_arrivals(scenario, dim, paths)
+    arrivals = colliding_arrivals(road, dim, paths)
     assert arrivals is not None
     assert len(arrivals) == 2
-    scenario = replace(scenario, recorded=arrivals, horizon=200.0)
+    scenario = replace(road, recorded=arrivals, horizon=200.0)
     assert minisim.simulate(scenario, dim, on_collision="record").collisions
     assert minisim.simulate(scenario, Dim()).columns.arrived.all()
 

@@ -24,7 +24,7 @@ OUTCOMES = {
 }
 #: Small print.
 NOTE = (
-    "Intervals 95 %: of counts Poisson's (Garwood), of delays Student's over seeds. Delay: time "
+    "95 % intervals: Poisson's (Garwood) for counts, Student's over seeds for delays. Delay: time "
     "loss and departure delay."
 )
 

@@ -6,38 +6,14 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from figures import style
-from scenarios.studies.shared.paper_comparison import compare, score
-from scenarios.studies.shared.study import Results
-
 #: Study of the paper's grid -> words.
-HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes it"}
+HEADINGS = {"as-run": "as the published runs were made", "text": "as the text prescribes"}
 
 EXPLAINED = (
-    "† not the run that its label says (see causes). ↑ queues still grew at the end: the mean "
+    "† not the run named in its label (see causes). ↑ queues still grew at the end: the mean "
     "depends on the horizon. Inside: the paper's single run lies within our 95 % prediction "
     "interval; where that is wide, it says little."
 )
-
-
-def agreement(results: Results) -> str:
-    """How many of the paper's values lie inside our intervals, in total and by controller."""
-    name, effort = results.study.name, results.effort
-    if results.good.empty:
-        return f"- `{name}`: not run (`{effort.command(name)}`)."
-    table = compare(results.good)
-    by_series = [
-        f"{style.look(str(series)).label} {score(rows)}"
-        for series, rows in table.groupby("series", sort=False)
-        if score(rows).judged
-    ]
-    return (
-        f"- `{name}`: {effort.warning}{score(table)} comparable values of the paper lie inside our "
-        f"95 % prediction interval; of those that are not comparable, "
-        f"{score(table, comparable=False)}. Inside means that one more run of ours could well give "
-        "the paper's value. Near saturation, our runs spread so widely that nearly every value is "
-        f"inside.\n  By controller: {', '.join(by_series)}."
-    )
 
 
 def marked(row: Mapping[Any, Any]) -> str:

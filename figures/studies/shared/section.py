@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from figures.tables import Table
 from scenarios.studies.shared.archive import Archive
-from scenarios.studies.shared.study import Results
 
 Drawing = Figure | Table
 
@@ -36,7 +35,5 @@ class Section:
 
     heading: str  # above it
     items: tuple[Item, ...]  # its figures and tables, in order
-    #: The study's answer in a few sentences, for the head of the report.
-    answer: Callable[[Results], str] | None = None
     ending: Callable[[Archive], str] | None = None  # a text below the items
     appendix: bool = False  # whether it comes after all others

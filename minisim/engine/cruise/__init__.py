@@ -14,9 +14,9 @@ A vehicle obeys the hardest braking that any of its leaders asks for
 - the radar's leader: the first vehicle on its own lane, way or exit; but a vehicle inside the
   junction that meets its way comes before those on stretches behind (`radar`).
 
-What the radar sees is SUMO's one quirk that its versions differ in, and the published runs depend
+What the radar sees is the one quirk in which SUMO's versions differ, and the published runs depend
 on it (`CruiseVehicle.sumo`). In 1.18 it also sees vehicles that only cross, those from its own lane
 that turn off elsewhere, and those that wait inside the junction with priority; one with no room
-left counts as if bumper to bumper. Since then it sees only those bound for the same exit, and where
-there is no room left they are at the beginning of the part of the way that others can meet.
+left counts as if bumper to bumper. Since then it sees only those bound for the same exit; one with
+no room left counts as at the beginning of the part of the way that others can meet.
 """

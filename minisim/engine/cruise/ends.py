@@ -20,9 +20,9 @@ TOLERANCE = 0.001
 
 @njit
 def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -> bool:
-    """Whether no vehicle can be inserted on an arm for one that arrives there.
+    """Whether a vehicle arriving on an arm keeps others from being inserted there.
 
-    Where the road leads back, SUMO takes it that the vehicle at its end might do so, and keeps room
+    Where the road leads back, SUMO assumes that the vehicle at its end might turn, and keeps room
     for it to stop. Source: `MSLane::isInsertionSuccess`, `MSCFModel::getSecureGap`.
     """
     i = cruise.last[arm]
@@ -32,15 +32,15 @@ def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -
         i = vehicles[i]["ahead"]
     first = vehicles[i]
     rest = road.ends[first["path"], 1] - first["s"]
-    needed = braking_distance(first["v"], law.b_max, law.dt) + REACTION * first["v"]
-    return bool(rest + TURNAROUND + law.margin - law.min_gap < needed)
+    needed = braking_distance(first["v"], cruise.type.b_max, law.dt) + REACTION * first["v"]
+    return bool(rest + TURNAROUND + law.margin - cruise.type.min_gap < needed)
 
 
 @njit
 def look(
     vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise, tick: int
 ) -> bool:
-    """Note after a step which vehicles have entered the junction, and which an exit lane.
+    """Note after a step which vehicles have entered the junction or an exit lane.
 
     The vehicle ahead on an exit lane is the one that entered that lane before.
 
@@ -65,13 +65,13 @@ def look(
                 vehicles[i]["ahead"] = cruise.last[exit_arm]
                 cruise.last[exit_arm] = i
             if cruise.teleports and mine["left"] != 0 and vehicles[i]["status"] == DRIVING:
-                lost |= teleport(vehicles, road, law, cruise, i, tick)
+                lost |= teleport(vehicles, road, cruise, i, tick)
     return lost
 
 
 @njit
-def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, tick: int) -> bool:
-    """Take a vehicle off the road that has run into the one ahead on its exit; whether it has.
+def teleport(vehicles: Records, road: Road, cruise: Cruise, i: int, tick: int) -> bool:
+    """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.
     Source: `MSLane::detectCollisionBetween`; `MSVehicleTransfer`, which finds no road behind.
@@ -80,13 +80,13 @@ def teleport(vehicles: Records, road: Road, law: Law, cruise: Cruise, i: int, ti
     if j < 0 or vehicles[j]["status"] != DRIVING:
         return False
     ends = road.ends
-    rear = vehicles[j]["s"] - law.length - ends[vehicles[j]["path"], 0]
-    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= law.min_gap - TOLERANCE:
+    rear = vehicles[j]["s"] - cruise.type.length - ends[vehicles[j]["path"], 0]
+    if rear - (vehicles[i]["s"] - ends[vehicles[i]["path"], 0]) >= cruise.type.min_gap - TOLERANCE:
         return False
     vehicles[i]["status"] = ARRIVED
     vehicles[i]["arrival_tick"] = tick
     vehicles[i]["cleared"] = 1
-    for k in range(len(vehicles)):  # those behind it follow the one before it
+    for k in range(len(vehicles)):  # those behind it follow the one ahead of it
         if vehicles[k]["ahead"] == i:
             vehicles[k]["ahead"] = j
     arm = int(ends[vehicles[i]["path"], 2])

@@ -13,7 +13,7 @@ from minisim.engine.state import Floats, Ints, Records, Road
 from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
-from minisim.laws import KRAUSS, Law
+from minisim.laws import KRAUSS, Law, Traits, traits_of
 from minisim.vehicle import CruiseVehicle
 
 #: What the law remembers of a vehicle, row by row as in `minisim.engine.state.VEHICLE`.
@@ -40,6 +40,7 @@ class Cruise(NamedTuple):
         yields: (p, p): whether the first way must give way to the second.
         turns_back: (n,): whether the road of an arm leads back at its far end.
         memory: (k,) of `MEMORY`.
+        type: the only type of the vehicles.
         last: (n,): last row that entered the exit lane of each arm, or -1.
     """
 
@@ -62,6 +63,7 @@ class Cruise(NamedTuple):
     yields: Bools
     turns_back: Bools
     memory: Records
+    type: Traits
     last: Ints
 
 
@@ -94,6 +96,7 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
         memory=np.zeros(count, MEMORY),
+        type=traits_of(site.vehicle),
         last=np.full(intersection.n, -1),
     )
 
@@ -118,7 +121,7 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
     The gap is measured beyond `min_gap`.
     """
     if law.model == KRAUSS:
-        return (safe_speed(gap, v_leader, law.b, law.headway, law.dt) - v) / law.dt
+        return (safe_speed(gap, v_leader, cruise.type.b, cruise.type.headway, law.dt) - v) / law.dt
     if gap > cruise.radar:
         return math.inf
     return distance_control(v, gap, v_leader, cruise.headway, cruise.spacing_gain, cruise.spacing)
@@ -129,7 +132,7 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit
-    counts for the first step beyond it only.
+    counts only for the first step beyond it.
     Source: `MSCFModel_CC::finalizeSpeed`, `MSLane::getVehicleMaxSpeed`.
     """
     before = s - v * law.dt
@@ -145,8 +148,8 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
 def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
     """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
 
-    Starting one step after a desired speed of 0, SUMO asks for standstill within one step.
+    From one step after a desired speed of 0, SUMO asks for standstill within one step.
     """
     u = -v / law.dt if stopping else max(u, -v / law.dt)
-    a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -law.b_max)
+    a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -cruise.type.b_max)
     return -v / law.dt if v + a * law.dt < STANDSTILL * law.dt else a

@@ -1,4 +1,4 @@
-"""Which vehicles inside the junction one follows, on other ways than its own."""
+"""Which vehicles on other ways inside the junction a vehicle follows."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Ahead(NamedTuple):
 
 
 @njit
-def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law) -> Ints:
+def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cruise) -> Ints:
     """The rows of the vehicles at least partly in the junction."""
     inside = np.empty(INSIDE, np.int64)
     count = 0
@@ -47,7 +47,7 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law) -> Ints:
                 break
             if (
                 vehicles[i]["status"] == DRIVING
-                and s - law.length < ends[p, 0]
+                and s - cruise.type.length < ends[p, 0]
                 and count < len(inside)
             ):
                 inside[count] = i
@@ -62,8 +62,8 @@ def meet(
     """Acceleration that vehicles inside the junction on other ways ask of vehicle i [m/s²].
 
     A vehicle that has yet to enter may drive up to the junction (`MSVehicle::checkLinkLeader`), so
-    only its radar counts. Inside it follows those that meet the part of the way that it is on; for
-    a vehicle that only crosses it may also speed up so far that it comes after that one
+    only its radar counts. Inside it follows those that meet the part of the way that it is on; it
+    may also speed up if it still arrives after a vehicle that only crosses
     (`MSVehicle::adaptToJunctionLeader`).
     """
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
@@ -72,7 +72,7 @@ def meet(
     if law.model == KRAUSS:
         # It stops before the part of the way that others can meet, or before they do.
         begin = law.entry + part * wait - POSITION_EPS - s
-        u, halt = math.inf, krauss_stop(v, begin, law)
+        u, halt = math.inf, krauss_stop(v, begin, cruise.type, law)
     else:
         u = halt = radar(vehicles, ends, law, cruise, inside, i, part, ahead)
         if s < law.entry:
@@ -90,13 +90,13 @@ def meet(
             if gap == math.inf or not (in_the_way or first):
                 continue
             if law.model == KRAUSS:
-                crossing = krauss_stop(v, to_crossing - law.min_gap, law)
+                crossing = krauss_stop(v, to_crossing - cruise.type.min_gap, cruise.type, law)
             a = follow(v, gap, other["v"], law, cruise) if gap >= 0.0 else halt
             if kind == WAIT:
                 a = max(halt, crossing)
             elif kind == CROSS and to_crossing >= 0.0:
                 time = (to_crossing - gap) / max(other["v"], HALTING)  # until that one is past
-                faster = max(v, 2.0 * (to_crossing - law.min_gap) / time - v)
+                faster = max(v, 2.0 * (to_crossing - cruise.type.min_gap) / time - v)
                 a = max(a, min((faster - v) / time, crossing))
             u = min(u, a)
     return u
@@ -115,10 +115,10 @@ def radar(
 ) -> float:
     """Acceleration that the radar's leader asks of vehicle i on this `part` of its way [m/s²].
 
-    Part by part of the way: the leader on it, then, of the vehicles that meet it, the one with the
-    least room behind it, counting what it needs to brake.
+    Part by part of the way: the leader on it, or else the vehicle meeting it that leaves the least
+    room, counting what it needs to brake.
     Source: `MSCFModel_CC::getRadarMeasurements`, `MSLane::getLeaderOnConsecutive`,
-    `libsumo::Vehicle::getLeader` (where what is less than no room becomes none).
+    `libsumo::Vehicle::getLeader` (where negative room becomes 0).
     """
     s, v, p = vehicles[i]["s"], vehicles[i]["v"], vehicles[i]["path"]
     for here in range(part, 2):
@@ -134,7 +134,7 @@ def radar(
                 if kind == NOWHERE or not (cruise.crossing_foes or kind == JOIN):
                     continue
                 gap, _, _ = room(vehicles, ends, law, cruise, i, here, j, k)
-                stops = gap + braking_distance(other["v"], law.b_max, law.dt)
+                stops = gap + braking_distance(other["v"], cruise.type.b_max, law.dt)
                 if stops >= shortest:
                     continue
                 if s >= law.entry and not before(vehicles, cruise, i, j, kind):
@@ -166,7 +166,7 @@ def room(
     begin = wait if k == 1 else 0.0
     end = wait if k == 0 else ends[q, 0] - law.entry
     driven = vehicles[j]["s"] - law.entry
-    rear = driven - law.length
+    rear = driven - cruise.type.length
     if driven < begin or rear >= end:
         return math.inf, 0.0, False
     kind = int(cruise.meetings[p, part, q, k, 0])
@@ -180,16 +180,17 @@ def room(
     past = behind + rival_width + cruise.waits[p, 1] < 0.0
     waiting = k == 0 and wait > 0.0
     in_the_way = (
-        behind < law.length
+        behind < cruise.type.length
         and not waiting
         and (cruise.crossing_foes or driven < end)
         and (
-            (not past and to_crossing > 0.0) or (kind == JOIN and to_crossing > behind - law.length)
+            (not past and to_crossing > 0.0)
+            or (kind == JOIN and to_crossing > behind - cruise.type.length)
         )
     )
     if to_crossing < -law.margin and not in_the_way:
         return math.inf, 0.0, False
-    if kind == PART and s >= law.entry and driven < s - law.entry - law.length:
+    if kind == PART and s >= law.entry and driven < s - law.entry - cruise.type.length:
         return math.inf, 0.0, False
     if kind == WAIT:
         return -FAR, to_crossing, in_the_way
@@ -197,14 +198,14 @@ def room(
         return math.inf, 0.0, False
     if kind == JOIN and behind < 0.0:
         behind += max(rival_behind - cruise.meetings[p, part, q, k, 1], 0.0)
-    return to_crossing - law.min_gap - behind - rival_width, to_crossing, in_the_way
+    return to_crossing - cruise.type.min_gap - behind - rival_width, to_crossing, in_the_way
 
 
 @njit_inline
 def before(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool:
     """Whether j was in the junction before i, which is inside; if both at once, the faster one.
 
-    What counts as being in it, is for the way that must yield to have passed its waiting position.
+    A vehicle on a way that must yield counts as in it once past its waiting position.
     Source: `MSVehicle::isLeader`.
     """
     mine, other = cruise.memory[i], cruise.memory[j]

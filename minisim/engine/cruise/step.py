@@ -34,8 +34,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
     All in one function for the reason given in `minisim.engine.kernel.accelerate`.
     """
     overlap = False
-    ends = road.ends
-    inside = gather(vehicles, lanes, ends, law)
+    ends, mine = road.ends, cruise.type
+    inside = gather(vehicles, lanes, ends, law, cruise)
     for lane in range(len(lanes)):
         is_open = lanes[lane]["open"] != 0
         first = lanes[lane]["first"]
@@ -46,13 +46,13 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             s, v, p = me["s"], me["v"], me["path"]
             v0 = cruise.cruise_speed if me["advice"] == math.inf else me["advice"]
             if law.model == KRAUSS:
-                u = free(me, road, law)
+                u = free(me, road, law, cruise)
             else:
                 u = cruise_control(v, v0, cruise.cruise_gain, cruise.a, cruise.b)
             if cruise.obeys:
                 u = min(u, (allowed(s, v, p, v0, road, law, cruise) - v) / law.dt)
             nearest = own = tail = math.inf
-            part = 2  # of its way on which the leader is, see `Ahead`
+            part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
             if s < leave:
                 if law.model != KRAUSS:
@@ -62,11 +62,11 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     ahead = vehicles[j]
                     if ahead["status"] != DRIVING:
                         continue
-                    rear = ahead["s"] - law.length
+                    rear = ahead["s"] - mine.length
                     on_way = ahead["path"] == p and ahead["s"] >= law.entry and rear < leave
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
-                        asked = follow(v, rear - s - law.min_gap, ahead["v"], law, cruise)
+                        asked = follow(v, rear - s - mine.min_gap, ahead["v"], law, cruise)
                         u = min(u, asked)
                         nearest = min(nearest, rear - s)
                         if part == 2:
@@ -81,30 +81,30 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             blind = held and law.model == KRAUSS  # to what is beyond a red light
             if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
                 ahead = vehicles[j]
-                rear = ahead["s"] - law.length - ends[ahead["path"], 0]
+                rear = ahead["s"] - mine.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
                 # A vehicle beside it on another way is left to the radar, or waited for before the
                 # junction (`adaptToLeader`).
-                beside = s < leave and gap < law.min_gap and rear < 0.0 and ahead["path"] != p
+                beside = s < leave and gap < mine.min_gap and rear < 0.0 and ahead["path"] != p
                 if beside and law.model == KRAUSS:
-                    u = min(u, krauss_stop(v, law.entry - s - POSITION_EPS, law))
+                    u = min(u, krauss_stop(v, law.entry - s - POSITION_EPS, mine, law))
                 elif not beside:
-                    tail = follow(v, gap - law.min_gap, ahead["v"], law, cruise)
+                    tail = follow(v, gap - mine.min_gap, ahead["v"], law, cruise)
                     u = min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
             near = law.entry - s <= cruise.radar and s < leave and not blind
             if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
-                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, law)
+                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
                 asked = meet(vehicles, ends, law, cruise, inside, i, foes)
                 if law.model == KRAUSS and s < law.entry:
-                    asked = max(asked, stop_at_line(v, law.entry - s, law))
+                    asked = max(asked, stop_at_line(v, law.entry - s, mine, law))
                 u = min(u, asked)
             overlap |= nearest <= 0.0
             if law.model == KRAUSS:
-                a = max(u, -law.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
+                a = max(u, -mine.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
             else:
                 stopping = cruise.memory[i]["stopping"] != 0
                 a = realise(v, me["a"], u, stopping, law, cruise)
@@ -121,19 +121,20 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     a = -v / law.dt
                     cruise.memory[i]["at_red"] = 1
             elif held:
-                a = max(min(a, hold(v, s, law)), -law.b_max)
+                a = max(min(a, hold(v, s, mine, law)), -mine.b_max)
             me["a"] = a
     return overlap
 
 
 @njit
-def free(me: np.void, road: Road, law: Law) -> float:
-    """The acceleration of a vehicle that no other one hinders, within the limits here and ahead."""
+def free(me: np.void, road: Road, law: Law, cruise: Cruise) -> float:
+    """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
     start, speed = road.section_start, road.section_speed
-    acc = follow_law(v, min(speed[p, section] * factor, me["advice"]), 0.0, law)
+    acc = follow_law(v, min(speed[p, section] * factor, me["advice"]), 0.0, cruise.type, law)
     k = section + 1
-    while braking_begins(v, start[p, k] - s, law):
-        acc = min(acc, slow_down(v, acc, speed[p, k] * factor, start[p, k] - s, law))
+    while braking_begins(v, start[p, k] - s, cruise.type, law):
+        lower = speed[p, k] * factor
+        acc = min(acc, slow_down(v, acc, lower, start[p, k] - s, cruise.type, law))
         k += 1
     return acc

@@ -12,17 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from minisim.errors import InputError, integer, number
-from minisim.junction.movements import ARM_NAMES
 
 if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 #: A group of options in the help.
 FILES = "Files"
-
-#: So many arrivals use the last lane or the last manoeuvre: with equal shares on 4 arms, the chance
-#: that none does is (1/2)^30, one in 10^9.
-ENOUGH = 30
 
 
 def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> Any:
@@ -42,12 +37,15 @@ Density = Annotated[
 ]
 Split = Annotated[str | None, option("Shares of the lanes a, b, c, …", "4:3:2:1")]
 Turns = Annotated[str | None, option("Shares of the exits, clockwise.", "1:2:1")]
+Unit = Annotated[str | None, option("Of the inflow: veh, pcu, pcu-irc64, pcu-hcm.", "NAME")]
+Fleet = Annotated[str | None, option("Vehicle types: india, car:0.9,bus:0.1, …", "MIX")]
+LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.", "M")]
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Of the traffic: left or right.", "SIDE")]
-Bearings = Annotated[str | None, option("Of custom's arms, from north.", "0,90,…")]
-Seed = Annotated[int, option("Of the random arrivals; 0 by default.", "N", "--seed", "-s")]
+Side = Annotated[str, option("Traffic keeps left or right.", "SIDE")]
+Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
+Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
 Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
@@ -75,9 +73,7 @@ Arrivals = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
-Start = Annotated[
-    str | None, option("Begin at this time in the table.", "07:00", rich_help_panel=FILES)
-]
+Start = Annotated[str | None, option("Begin here in the table.", "07:00", rich_help_panel=FILES)]
 
 
 def processes(jobs: int | None) -> int:
@@ -86,7 +82,7 @@ def processes(jobs: int | None) -> int:
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
-    """Raise `InputError` if an option has a value twice; None is an option not given."""
+    """Raise `InputError` if an option has a value twice; None means not given."""
     for name, values in given.items():
         for value, count in Counter(values or ()).items():
             if count > 1:
@@ -94,33 +90,22 @@ def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
 
 
 def build_scenario(
-    name: str,
-    bearings: str | None,
-    arrivals: Path | None = None,
-    start: str | None = None,
-    **options: Any,
+    name: str, bearings: str | None, file: Path | None = None, start: str | None = None, **more: Any
 ) -> Scenario:
-    """The scenario that the options describe; None is an option not given."""
+    """The scenario that the options describe; None means not given."""
     from minisim.recorded import read_arrivals
     from scenarios.library import scenario_named
 
-    given = {key: value for key, value in options.items() if value is not None}
-    clash = [f"--{key}" for key in ("density", "split", "turns") if key in given]
-    if arrivals is not None and clash:
+    given = {key: value for key, value in more.items() if value is not None}
+    clash = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
+    if file is not None and clash:
         raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
-    if arrivals is None and start is not None:
-        raise InputError("--start goes with --arrivals: it is a time in the table")
+    if file is None and start is not None:
+        raise InputError("--start needs --arrivals: it is a time in the table")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
-    if arrivals is None:
+    if file is None:
         return made
-    n = made.intersection.n
-    recorded = read_arrivals(arrivals, n, start or 0.0)
-    arms = 1 + max(recorded.lane.max(initial=0), recorded.manoeuvre.max(initial=0))
-    if len(recorded) >= ENOUGH and arms < n:  # manoeuvres mean other exits at a smaller junction
-        raise InputError(
-            f"{arrivals} looks like arrivals of a junction with {arms} arms: none comes from lane "
-            f"{ARM_NAMES[n - 1]} or takes manoeuvre {n - 1}; the scenario has {n} arms"
-        )
+    recorded = read_arrivals(file, made.intersection.n, start or 0.0)
     return replace(made, recorded=recorded)
 
 
@@ -130,8 +115,6 @@ def _bearings(text: str) -> list[float]:
         try:
             values.append(number(part, float(part)))
         except ValueError:
-            raise InputError(
-                f"--bearings is written like 0,80,190,260, got {text!r}: {part!r} is not a finite "
-                "number"
-            ) from None
+            got = f"got {text!r}: {part!r} is not a finite number"
+            raise InputError(f"--bearings must be like 0,80,190,260, {got}") from None
     return values

@@ -33,10 +33,7 @@ def _check_figure(path: Path | None) -> Path | None:
     return path
 
 
-Plot = Annotated[
-    Path | None,
-    option("Draw the result (.png, .pdf or .svg).", "FILE", callback=_check_figure),
-]
+Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", callback=_check_figure)]
 
 
 def junction(

@@ -30,7 +30,7 @@ CELL_COLUMNS = (
 )  # fmt: skip
 
 #: Further columns that may tell cells of a sweep apart.
-APART = ("side", "turns", "horizon_s", "warmup_s")
+APART = ("side", "fleet", "turns", "horizon_s", "warmup_s")
 
 
 def run_parts(

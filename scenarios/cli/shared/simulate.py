@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from scenarios.cli.shared.terminal import bar
+from scenarios.termination import Terminated
 
 if TYPE_CHECKING:
     from minisim.results.run import Run
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 def simulate(
     scenario: Scenario, controller: Any, seed: int, until: float = math.inf, **options: Any
 ) -> Run:
-    """Run with a progress bar, in parts, with the same result; `until` ends it early [s]."""
+    """Run in parts, with a progress bar and the usual result, up to `until` [s] at most."""
     from minisim.simulation import Simulation
 
     simulation = Simulation(scenario, controller, seed=seed, **options)
@@ -36,7 +37,7 @@ def simulate_in_sumo(scenario: Scenario, controller: Any, seed: int, **options: 
     try:
         with bar("simulating in SUMO") as progress:
             return sumo_simulate(scenario, controller, seed, progress=progress, **options)
-    except (KeyboardInterrupt, SystemExit) as end:
+    except (KeyboardInterrupt, Terminated) as end:
         for note in getattr(end, "__notes__", ()):
             typer.echo(f"minisim: {note}", err=True)
         raise

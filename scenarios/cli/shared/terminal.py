@@ -20,8 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-#: Substitutes for characters that the terminal's encoding lacks: one for one, so that tables stay
-#: aligned.
+#: Substitutes for what the terminal's encoding lacks: one for one, so that tables stay aligned.
 _PLAIN = str.maketrans("●·–…←±", "x.-~<~")
 
 #: Shortest time between two lines of progress if stderr is not a terminal [s].
@@ -82,7 +81,7 @@ def wrapped(text: str, indent: int) -> str:
 
 
 def prepare_streams() -> None:
-    """Let stdout and stderr take any text, in plainer characters if need be, even if closed."""
+    """Let stdout and stderr, even if closed, take any text, in plainer characters if need be."""
     codecs.register_error("minisim-plain", _plain)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:

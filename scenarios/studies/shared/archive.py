@@ -39,9 +39,7 @@ class Archive:
 
     def __init__(self, find: Find, effort: Effort) -> None:
         self.effort = effort
-        self.study: Callable[[str], Results] = cache(
-            lambda name: study_named(name).collect(effort, find)
-        )
+        self.study = cache(lambda name: study_named(name).collect(effort, find))
 
     def need(self, *names: str) -> tuple[Results, ...]:
         """The results of these studies; `MissingRunsError` if none has a run."""

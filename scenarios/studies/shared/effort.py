@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from minisim.errors import InputError, integer, show
-from minisim.parameters import checked, declared, part, real, reals, whole
+from minisim.parameters import MaybeReals, checked, declared, part, real, reals, whole
 
 
 def _power_of_two(title: str, value: Any) -> int:
@@ -20,15 +20,13 @@ class Search:
     """How to search for a limit: by bisection, with `seeds` · log₂(`steps`) runs per point."""
 
     step: float = real("demands are multiples of it", "veh/h", above=0, default=10.0)
-    steps: int = checked(
-        "the highest demand is `steps` · `step`", _power_of_two, "power of two", default=128
-    )
+    steps: int = checked("highest demand, in `step`s", _power_of_two, "power of two", default=128)
     seeds: int = whole("each has a bisection of its own; the seeds 1 … `seeds`", low=1, default=4)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
 
     @property
     def rounds(self) -> int:
-        """How often a bisection halves its bracket."""
+        """How many times a bisection halves its bracket."""
         return self.steps.bit_length() - 1
 
 
@@ -38,8 +36,8 @@ class Effort:
 
     seeds: int = whole("runs per point; the seeds 1 … `seeds`", low=2, high=10_000, default=10)
     horizon: float = real("of each run", "s", above=0, default=3600.0)
-    densities: tuple[float, ...] | None = reals(
-        "only points with these demands, in studies that have any; none means all",
+    densities: MaybeReals[tuple[float, ...]] = reals(
+        "only points with these demands, in studies that have them; none means all",
         "veh/h/lane", optional=True, label="densities", default=None,
     )  # fmt: skip
     search: Search = part("for studies that search", Search, default_factory=Search)

@@ -16,16 +16,16 @@ from scenarios.statistics import poisson_interval
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Rates are events in this many crossings.
+#: Rates count events per this many crossings.
 CROSSINGS = 10_000
 #: Demand of these studies [veh/h/lane]: so low that any loss is due to perception.
 DENSITY = 250.0
 #: (whether all vehicles err alike, whether errors last) -> words.
 MANNERS = {
     (True, True): "all alike, lasting",
-    (True, False): "all alike, each frame anew",
-    (False, True): "each for itself, lasting",
-    (False, False): "each for itself, each frame anew",
+    (True, False): "all alike, new each frame",
+    (False, True): "each its own, lasting",
+    (False, False): "each its own, new each frame",
 }
 #: The rules alone, with a safety monitor, and with the highest-priority lane first.
 MISREADERS = ("dim", "dim:monitor=on", "dim:order=lanes")
@@ -42,7 +42,7 @@ class IntentErrorPoint(NamedTuple):
     shared: bool = True
     persistent: bool = True
     unsignalled: bool = False  # whether vehicles turn without a signal, at the published rates
-    confidence: float = 0.0  # the least at which a reading is believed; 0 believes all
+    confidence: float = 0.0  # lowest that is believed; 0 believes every reading
     arms: int = 4  # of the junction
     density: float = DENSITY  # mean inflow per lane [veh/h]
 

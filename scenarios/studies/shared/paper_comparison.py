@@ -12,8 +12,10 @@ from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minisim.errors import choice
+from scenarios.controllers import label_of
 from scenarios.paper import SERIES, SPLITS, reference
 from scenarios.statistics import prediction_interval
+from scenarios.studies.shared.study import Results
 from scenarios.sweep.cells import saturated
 
 if TYPE_CHECKING:
@@ -52,7 +54,7 @@ def compare(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _order(row: Mapping[Any, Any]) -> tuple[object, ...]:
-    """In the order in which readers look: arms, inflow, controller, all lanes, lane, metric."""
+    """Sort key, in reading order: arms, inflow, controller, all lanes, lane, metric."""
     lane = "" if row["lane"] == "all" else row["lane"]
     places = SPLITS.index(row["split"]), list(SERIES.values()).index(row["series"])
     return row["arms"], *places, lane, row["metric"], row["density"]
@@ -88,6 +90,26 @@ def score(compared: pd.DataFrame, *, comparable: bool = True) -> Score:
     chosen = (compared["comparable"] == "yes") == comparable
     judged = compared[chosen & compared["inside"].notna()]
     return Score(int(judged["inside"].astype(bool).sum()), len(judged))
+
+
+def agreement(results: Results) -> str:
+    """How many of the paper's values lie inside our intervals, in total and by controller."""
+    name, effort = results.study.name, results.effort
+    if results.good.empty:
+        return f"- `{name}`: not run (`{effort.command(name)}`)."
+    table = compare(results.good)
+    by_series = [
+        f"{label_of(str(series))} {score(rows)}"
+        for series, rows in table.groupby("series", sort=False)
+        if score(rows).judged
+    ]
+    return (
+        f"- `{name}`: {effort.warning}{score(table)} comparable values of the paper lie inside our "
+        f"95 % prediction interval; of those that are not comparable, "
+        f"{score(table, comparable=False)}. Inside means that one more run of ours could well give "
+        "the paper's value. Near saturation, our runs spread so widely that nearly every value is "
+        f"inside.\n  By controller: {', '.join(by_series)}."
+    )
 
 
 class Discrepancy(NamedTuple):

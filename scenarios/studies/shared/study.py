@@ -30,6 +30,8 @@ class Study:
     points: tuple[Point, ...]  # each once
     #: Series -> most seeds, if more would cost too much
     few: Mapping[str, int] = field(default_factory=dict)
+    #: Answers the question from the results, in a few sentences for the head of the report.
+    verdict: Callable[[Results], str] | None = None
     about_collisions: bool = False  # its figures show them, so the report does not list them
 
     def runs(
@@ -62,7 +64,7 @@ class Study:
 
 
 class Runs(NamedTuple):
-    """How many runs of a point were made without failing, and how many the effort wants."""
+    """How many runs of a point succeeded, and how many the effort wants."""
 
     made: int
     wanted: int
@@ -81,7 +83,7 @@ class Results:
     def of(
         cls, study: Study, effort: Effort, asked: Sequence[tuple[Point, Mapping[str, Any] | None]]
     ) -> Results:
-        """The results, given each point asked for and the row of its run, in order."""
+        """The results, from pairs of a point and the row of its run, in order."""
         import pandas as pd
 
         rows = [{**row, **point._asdict()} for point, row in asked if row is not None]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import minisim
 from baselines import AllWayStop
-from baselines.all_way_stop import AllWayStopSession
-from minisim.control import Observed, Session, Site
+from minisim.control import Observed, Session
 from minisim.junction.movements import Movement
 from scenarios.library import four_way
-from tests.builders import drained, replayed, seen, show
+from tests.builders import EveryStep, drained, replayed, seen, show
 
 FAIR = four_way(profile="fair")
 SITE = FAIR.site()
@@ -32,9 +29,6 @@ def session_with(*vehicles: Observed, reaction: float = 1.0) -> Session:
         time = 10.0 - 0.1 * (len(vehicles) - k)
         assert show(session, time, *sorted(there, key=lambda v: v.lane)) == []
     return session
-
-
-# Stopping.
 
 
 def test_one_vehicle_goes_once_after_its_reaction_time() -> None:
@@ -69,9 +63,6 @@ def test_only_the_first_of_a_lane_queues() -> None:
     # The first is let go. Now the second is the head, and its standing time starts.
     assert show(session, 11.5, seen(1, 0, 2, -1.0, 1.0), second) == []
     assert show(session, 12.5, seen(1, 0, 2, -5.0, 3.0), second) == ["Go 2"]
-
-
-# First come, first served.
 
 
 def test_the_first_to_stand_goes_first_and_of_two_that_of_the_first_arm() -> None:
@@ -116,9 +107,6 @@ def test_a_later_vehicle_is_held_back_by_one_that_still_hesitates() -> None:
     assert show(session, 10.5, seen(1, 0, 2, -0.5, 1.0), b) == []
 
 
-# On the road.
-
-
 def test_a_lone_vehicle_stops_for_the_reaction_time() -> None:
     run = minisim.simulate(replayed(FAIR, (0.0, 0, 2), horizon=120.0), AllWayStop(), record="all")
     frame = run.trajectories
@@ -129,21 +117,11 @@ def test_a_lone_vehicle_stops_for_the_reaction_time() -> None:
     assert run.summary()["waiting_time_s"] == pytest.approx(1.1, abs=0.11)
 
 
-class EveryStep(AllWayStop):
-    """The same rule, looked at in every step."""
-
-    def start(self, site: Site) -> AllWayStopSession:
-        session = super().start(site)
-        session.plan = replace(session.plan, period=site.dt)
-        return session
-
-
 def test_to_look_in_every_step_would_change_nothing() -> None:
     scenario = four_way(350, profile="fair", horizon=600.0)
-    some, all_ = (
-        minisim.simulate(scenario, it, seed=3).trips for it in (AllWayStop(), EveryStep())
-    )
-    assert some.equals(all_)
+    controllers = AllWayStop(), EveryStep(AllWayStop())
+    some, every = (minisim.simulate(scenario, it, seed=3).trips for it in controllers)
+    assert some.equals(every)
 
 
 def test_it_carries_what_was_measured_in_the_field() -> None:

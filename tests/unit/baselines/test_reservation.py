@@ -17,6 +17,7 @@ from baselines.reservation import ReservationSession, Slot
 from minisim.control import Command, Go, Hold, Observed, Session, Site, Unregulated, View, Wake
 from minisim.errors import InputError
 from minisim.junction.partings import branch
+from minisim.laws import traits_of
 from minisim.testing import SmallScenario
 from minisim.vehicle import VehicleType
 from scenarios import AS_RUN, FAIR, PAPER, four_way
@@ -37,9 +38,6 @@ def decide(run: ReservationSession, time: float, *cars: Observed) -> list[object
     return [c for c in run.decide(View(time, cars)) if not isinstance(c, Wake)]
 
 
-# --- predictions are what the host does -------------------------------------------------------
-
-
 @pytest.mark.parametrize("profile", [FAIR, PAPER], ids=lambda p: p.name)
 @pytest.mark.parametrize("model", ["idm", "iidm", "krauss"])
 @pytest.mark.parametrize("manoeuvre", [1, 2, 3])
@@ -54,13 +52,13 @@ def test_predictions_are_what_minisim_does(profile: Profile, model: str, manoeuv
     tracks = [run.trace[run.trace["row"] == row] for row in (0, 1)]
     now = int(tracks[1]["tick"][0]) + 300
     first, second = (track[track["tick"] >= now] for track in tracks)
-    law, ways = law_of(site), courses(site)
-    leader = predict(law, ways[1], first["s"][0] - ENTRY, first["v"][0])
+    law, me, ways = law_of(site), traits_of(site.vehicle), courses(site)
+    leader = predict(law, me, ways[1], first["s"][0] - ENTRY, first["v"][0])
     assert leader is not None
     assert np.allclose(leader.s, first["s"] - ENTRY, atol=1e-6)
     until = float(branch(site.intersection, site.vehicle)[1, manoeuvre - 1]) - ENTRY
-    lane, start = [Leader(leader.s, leader.v, until)], second["s"][0] - ENTRY
-    follower = predict(law, ways[manoeuvre - 1], start, second["v"][0], lane=lane)
+    lane, start = [Leader(leader.s, leader.v, me.length, me.b_max, until)], second["s"][0] - ENTRY
+    follower = predict(law, me, ways[manoeuvre - 1], start, second["v"][0], lane=lane)
     assert follower is not None
     assert np.allclose(follower.s, second["s"] - ENTRY, atol=1e-6)
     assert np.allclose(follower.v, second["v"], atol=1e-6)
@@ -96,17 +94,15 @@ def test_a_whole_queue_and_what_merges_with_it_are_predicted_to_the_last_step() 
 def test_a_vehicle_is_predicted_until_it_arrives_however_long_that_takes(limit: float) -> None:
     site = replace(SITE, speed_limit=limit)
     way = courses(site)[1]
-    motion = predict(law_of(site), way, -5.0, 0.0)
+    motion = predict(law_of(site), traits_of(site.vehicle), way, -5.0, 0.0)
     assert motion is not None
     assert motion.s[-1] == pytest.approx(way.end, abs=limit * site.dt)
 
 
 def test_a_vehicle_that_hits_a_leader_is_not_predicted() -> None:
-    standing = Leader(np.full(100, 3.0), np.zeros(100))
-    assert predict(law_of(SITE), courses(SITE)[0], -3.0, 14.0, lane=[standing]) is None
-
-
-# --- the protocol -----------------------------------------------------------------------------
+    me = traits_of(SITE.vehicle)
+    standing = Leader(np.full(100, 3.0), np.zeros(100), me.length, me.b_max)
+    assert predict(law_of(SITE), me, courses(SITE)[0], -3.0, 14.0, lane=[standing]) is None
 
 
 def test_the_first_to_ask_gets_it_and_one_that_would_meet_it_does_not() -> None:
@@ -130,7 +126,7 @@ def test_a_passage_well_before_or_after_is_granted() -> None:
 
 
 def test_the_buffer_is_kept() -> None:
-    """b2 in ever longer distance behind a2: refused until it comes half a second later."""
+    """b2 ever further behind a2: refused until it comes half a second later."""
     gaps = []
     for distance in np.arange(20.0, 80.0, 1.0):
         run = session(reach=100.0)
@@ -165,9 +161,6 @@ def test_requests_are_considered_in_the_order_of_the_first() -> None:
     # c2 is gone; b2 asked first, a2 (nearer, earlier in the view) conflicts with it.
     run.manager.slots.clear()
     assert decide(run, 1.0, car(3, 0, 2, 15.0, speed=5.0), car(2, 1, 2, 18.0, speed=5.0)) == [Go(2)]
-
-
-# --- what safety rests on ---------------------------------------------------------------------
 
 
 def test_a_holder_that_differs_is_predicted_anew_and_keeps_what_still_fits() -> None:

@@ -11,7 +11,9 @@ import minisim
 from baselines import V2IC
 from baselines.v2ic import V2ICSession, advised_speed, time_to_cover
 from minisim.control import Advise, Command, Go, Observed, View, Wake
+from minisim.vehicle import VehicleType
 from scenarios import four_way
+from scenarios.profiles import Profile
 from tests.builders import replayed, seen
 
 FAIR_FOUR = four_way(100, profile="fair")
@@ -25,9 +27,6 @@ def session() -> V2ICSession:
 
 def decided(run: V2ICSession, time: float, *cars: Observed) -> list[Command]:
     return list(run.decide(View(time, cars)))
-
-
-# --- closed forms -----------------------------------------------------------------------------
 
 
 def test_time_to_cover_is_that_of_uniform_acceleration_up_to_the_limit() -> None:
@@ -58,14 +57,11 @@ def test_advice_is_where_uniform_braking_ends_within_0_and_the_limit(
 
 def test_leaving_times_are_distance_by_speed_up_to_a_cap() -> None:
     serving = session()
-    assert serving.leaving_time(140.0, 14.0, 0.0) == pytest.approx(10.0, abs=1e-4)
+    assert serving.leaving_time(140.0, 14.0, 0.0, 2.6, 14.0) == pytest.approx(10.0, abs=1e-4)
     from_rest = time_to_cover(20.0, 0.0, SITE.vehicle.acceleration, 14.0)
-    assert serving.leaving_time(20.0, 0.0, 0.0) == pytest.approx(from_rest)
-    assert serving.leaving_time(20.0, 0.0, 7.0) == pytest.approx(7.0 + from_rest)
-    assert serving.leaving_time(0.0, 14.0, 0.0) > 0.0
-
-
-# --- the list ---------------------------------------------------------------------------------
+    assert serving.leaving_time(20.0, 0.0, 0.0, 2.6, 14.0) == pytest.approx(from_rest)
+    assert serving.leaving_time(20.0, 0.0, 7.0, 2.6, 14.0) == pytest.approx(7.0 + from_rest)
+    assert serving.leaving_time(0.0, 14.0, 0.0, 2.6, 14.0) > 0.0
 
 
 def test_the_first_goes_and_a_later_one_in_conflict_is_advised() -> None:
@@ -129,3 +125,14 @@ def test_advice_spares_stops() -> None:
     run = minisim.simulate(four_way(250, profile="fair", horizon=900.0), V2IC(), seed=1)
     assert run.columns.waiting_time.max() < 5.0
     assert run.columns.waiting_time.mean() < 0.1
+
+
+def test_at_a_crawl_coarse_steps_serve_as_soon_as_fine_ones() -> None:
+    """Steps of 0.5 s passed the limit and fell back to 0: the last arrived at 518 s, not at 307."""
+    trips = [(0.0, lane, manoeuvre) for lane in range(4) for manoeuvre in (1, 2, 3)]
+    last = []
+    for dt in (0.1, 0.5):
+        profile = Profile(name="test", vehicle=VehicleType(), speed_limit=1.0, dt=dt)
+        scenario = replayed(four_way(profile=profile, arm_length=80.0), *trips, horizon=1000.0)
+        last.append(minisim.simulate(scenario, V2IC()).trips["arrival_s"].max())
+    assert last[1] == pytest.approx(last[0], rel=0.03)

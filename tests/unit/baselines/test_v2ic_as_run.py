@@ -30,9 +30,6 @@ def step(rules: AsRunList, *platoons: tuple[int, Platoon]) -> dict[int, float]:
     return rules.step(dict(platoons))
 
 
-# --- the conflicts ----------------------------------------------------------------------------
-
-
 def test_the_conflicts_are_those_of_right_hand_traffic() -> None:
     """The authors' table: 6, 6 and 2 conflicts of manoeuvre 1, 2 and 3."""
     names = {
@@ -58,9 +55,6 @@ def test_of_60_foes_28_are_missing_and_24_are_spurious() -> None:
     for p, row in enumerate(right_hand_conflicts()):
         listed[p, list(row)] = True
     assert (foes.sum(), (foes & ~listed).sum(), (listed & ~foes).sum()) == (60, 28, 24)
-
-
-# --- the rules --------------------------------------------------------------------------------
 
 
 def test_vehicles_register_200_m_before_the_reference_and_leave_24_m_behind_it() -> None:
@@ -110,9 +104,6 @@ def test_no_vehicle_is_regulated_past_the_list() -> None:
     """Two straight vehicles that left the list: the junction 65 m on is not regulated."""
     rules = AsRunList()
     assert step(rules, platoon(1, "a2", 430.0), platoon(2, "b2", 430.0)) == {}
-
-
-# --- runs -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("speed", "least", "most"), [(16.6, 54.25, 54.6), (14.0, 56.35, 56.7)])

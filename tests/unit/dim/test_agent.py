@@ -13,8 +13,7 @@ TABLE = DecisionTable(MATRIX)
 
 
 def percept(participants: str = "", crossing: str = "") -> Percept:
-    """Participants and crossing vehicles by movement; the id of a vehicle is its lane's index,
-    plus 10 when it is crossing."""
+    """Participants and crossing vehicles by movement; an id is the lane's, plus 10 if crossing."""
     taking_part, over_there = participants.split(), crossing.split()
     return Percept(
         tuple("abcd".index(m[0]) for m in taking_part),

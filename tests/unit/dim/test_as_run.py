@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -27,7 +27,7 @@ from minisim.junction.movements import Movement
 from scenarios import four_way, regular
 from scenarios.library import MAKERS
 from scenarios.paper import replay
-from tests.builders import replayed
+from tests.builders import EveryStep, replayed
 
 
 def car(name: str, driven: float, id: int | None = None) -> Car:
@@ -113,9 +113,7 @@ def test_of_one_lane_only_one_goes(first: str) -> None:
 
 
 @pytest.mark.parametrize(("driven", "chosen"), [(490.01, ()), (508.0, ()), (508.01, (2,))])
-def test_nothing_is_decided_while_the_junction_is_busy(
-    driven: float, chosen: tuple[int, ...]
-) -> None:
+def test_no_decision_while_the_junction_is_busy(driven: float, chosen: tuple[int, ...]) -> None:
     rule = rules()
     rule.serving = [1]
     step(rule, car("v1.c_1", driven), car("v2.a_1", 486.0))
@@ -285,19 +283,9 @@ def test_isolated_vehicles_take_the_published_time(manoeuvre: int, seconds: floa
 
 
 def test_the_session_is_woken_often_enough() -> None:
-    """Called at every step, as the authors' driver is, it says the same."""
-
-    @dataclass(frozen=True)
-    class EveryStep:
-        name: str = "every-step"
-
-        def start(self, site: minisim.Site) -> object:
-            session = AsRunDim().start(site)
-            session.plan = replace(session.plan, period=site.dt)
-            return session
-
+    """Called at every step, as the authors' script is, it says the same."""
     what = replace(replay("balanced", 350, 4), horizon=240.0)
     few = minisim.simulate(what, AsRunDim(), on_collision="record")
-    many = minisim.simulate(what, EveryStep(), on_collision="record")
+    many = minisim.simulate(what, EveryStep(AsRunDim()), on_collision="record")
     assert few.trips.equals(many.trips)
     assert few.summary()["unfinished"] > 0

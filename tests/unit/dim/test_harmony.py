@@ -1,4 +1,4 @@
-"""The harmony matrix: from geometry, from files, and as the paper has it."""
+"""The harmony matrix: from geometry, from files, and from the paper."""
 
 from __future__ import annotations
 
@@ -186,9 +186,7 @@ def test_broken_files(text: str, kind: type[Exception], message: str, tmp_path: 
 
 
 @pytest.mark.parametrize("path", ["missing/m.csv", ".", "", "nul\0"])
-def test_unreadable_and_unwritable_paths(
-    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unusable_paths(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FileError, match=r"^cannot read harmony matrix.*: [^\[]+$"):
         HarmonyMatrix.from_csv(path)

@@ -38,7 +38,7 @@ def car(vehicle: int, movement: str, past: float, speed: float) -> Observed:
 
 
 def regions(p: int, q: int) -> tuple[Region, Region]:
-    """The forbidden region of two movements, as the first and as the second has it."""
+    """The forbidden region of two movements, seen from the first and from the second."""
     shared, mirrored = region(*PLACE, p, q), region(*PLACE, q, p)
     assert shared is not None
     assert mirrored is not None
@@ -58,15 +58,12 @@ def read_as(seen: View, **readings: int) -> View:
 
 
 def braking(
-    monitors: Monitors,
-    true: View,
-    seen: dict[int, View] | None = None,
-    going: set[int] | None = None,
+    watch: Monitors, true: View, seen: dict[int, View] | None = None, going: set[int] | None = None
 ) -> dict[int, float]:
     """Vehicle -> how hard it must brake, where all see everything unless `seen` says otherwise."""
     everything = {v.id: true for v in true.vehicles}
     ids = set(everything)
-    commands = list(monitors.look(true, everything | (seen or {}), ids if going is None else going))
+    commands = list(watch.look(true, everything | (seen or {}), ids if going is None else going))
     assert all(isinstance(command, Brake) for command in commands)
     return {command.vehicle: command.deceleration for command in commands}
 
@@ -255,7 +252,7 @@ def test_where_all_stand_and_wait_the_first_lane_goes_alone() -> None:
 
 
 def stands(monitors: Monitors, seen: View, vehicle: int, decided: bool = False) -> bool:
-    """Whether a vehicle goes that sees everything."""
+    """Whether a vehicle that sees everything goes."""
     ego = next(v for v in seen.vehicles if v.id == vehicle)
     return monitors.patience.goes(seen, seen, ego, decided, (0, 1, 2, 3))
 
@@ -329,9 +326,8 @@ def test_a_session_lets_the_first_lane_go_alone_after_a_while() -> None:
         assert [c for c in found if not isinstance(c, Wake)] == commands
         assert Wake(time + SITE.dt) in found
     bare = Dim(perception=misread).start(SITE)
-    assert not any(
-        isinstance(c, Go) for t in (0.0, 9.0) for c in bare.decide(view(*WAITING, time=t))
-    )
+    later = (c for t in (0.0, 9.0) for c in bare.decide(view(*WAITING, time=t)))
+    assert not any(isinstance(c, Go) for c in later)
 
 
 def misread_pairs() -> list[tuple[Movement, Movement, int, int]]:
@@ -365,9 +361,7 @@ def meet(
     [(-0.6, 0.0, 0.3), pytest.param(np.arange(-2.0, 2.01, 0.1).round(1), marks=pytest.mark.slow)],
     ids=["some", "many"],
 )
-def test_two_that_misread_each_other_do_not_collide_nor_block(
-    profile: str, offsets: Iterable[float]
-) -> None:
+def test_two_that_misread_each_other_do_not_collide(profile: str, offsets: Iterable[float]) -> None:
     """The worst case: neither knows of the conflict until the other's motion shows it."""
     without = 0
     for pair in misread_pairs():

@@ -12,8 +12,8 @@ from tests.builders import car, view
 
 MATRIX = HarmonyMatrix.paper(4)
 TABLE = DecisionTable(MATRIX)
-STOPPABLE = Reader(4, Zones(), 2.0, "stoppable")
-PAPER = Reader(4, Zones(), 2.0, "paper")
+STOPPABLE = Reader(4, Zones(), (2.0,), "stoppable")
+PAPER = Reader(4, Zones(), (2.0,), "paper")
 
 
 def occupied(*movements: str) -> int:
@@ -56,9 +56,7 @@ def test_a_mark_passed_within_rounding_counts() -> None:
         (PAPER, 0.9, 5.0),
     ],
 )
-def test_a_committed_front_vehicle_blocks_its_lane_until_it_has_entered(
-    reader: Reader, distance: float, speed: float
-) -> None:
+def test_a_committed_vehicle_blocks_its_lane(reader: Reader, distance: float, speed: float) -> None:
     others = car(2, "a3", 7.0), car(3, "b1", 5.0)
     percept = reader.read(view(car(1, "a1", distance, speed), *others))
     assert percept == ((3,), (1,), TABLE.case(["b1"]), occupied("a1"), 0)
@@ -101,9 +99,7 @@ def test_commit_stoppable(distance: float, speed: float, committed: bool) -> Non
 @pytest.mark.parametrize(
     ("distance", "committed"), [(2.0, False), (1.0, False), (0.99, True), (0.0, True)]
 )
-def test_commit_paper_is_half_of_the_green_zone(
-    distance: float, committed: bool, speed: float
-) -> None:
+def test_commit_paper_is_half_a_green_zone(distance: float, committed: bool, speed: float) -> None:
     vehicle = car(1, "b2", distance, speed)
     assert PAPER.committed(vehicle) is committed
     assert PAPER.read(view(vehicle)).crossing == ((1,) if committed else ())
@@ -113,7 +109,7 @@ def test_commit_paper_is_half_of_the_green_zone(
 @pytest.mark.parametrize("b", [1.0, 2.0, 4.5])
 def test_braking_for_the_hold_line_never_looks_committed(green: float, b: float) -> None:
     """At v = √(2b·x) a vehicle x metres before the hold line just stops at it."""
-    reader = Reader(4, Zones(green=green), b, "stoppable")
+    reader = Reader(4, Zones(green=green), (b,), "stoppable")
     for x in (0.0, 0.1, 1.0, 3.0, 6.0):
         speed = (2 * b * x) ** 0.5 * (1 - 1e-9)
         assert not reader.committed(car(1, "a1", green + x, speed)), x

@@ -122,9 +122,7 @@ def test_safe_and_wake_ups_lose_nothing(scenario, seed, priorities, gate, order)
 
 
 @pytest.mark.parametrize(("reach", "agree"), [(100.0, True), (12.0, False)])
-def test_late_vehicles_rank_the_lanes_as_those_that_were_there(
-    reach: float, agree: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_late_vehicles_agree(reach: float, agree: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A vehicle that has watched from 100 m on knows as much as the others about every wait.
 
     One that sees only 12 m but counts as if it saw 100 m does not.
@@ -166,9 +164,7 @@ def test_late_vehicles_rank_the_lanes_as_those_that_were_there(
     st.integers(0, 200),
     st.integers(0, 200),
 )
-def test_an_observer_that_has_watched_for_the_memory_agrees(
-    passed: dict[int, int], memory: int, early: int, later: int
-) -> None:
+def test_an_observer_agrees(passed: dict[int, int], memory: int, early: int, later: int) -> None:
     """In tenths of a second: passing times, and an observer that began `early` before it must."""
     now = max(passed.values()) + later
     began = now - memory - early

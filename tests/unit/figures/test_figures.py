@@ -1,4 +1,4 @@
-"""Figures and animations: everything is drawn where the model has it."""
+"""Figures and animations: everything is drawn where the model puts it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from minisim.vehicle import VehicleType
 from scenarios import four_way
 from scenarios.controllers import VARIANTS
 from scenarios.profiles import FAIR
-from tests.builders import replayed
+from tests.builders import Fixed, replayed
 
 INTERSECTIONS = [
     Intersection((0, 120, 240)),
@@ -161,6 +161,27 @@ def test_collisions_are_ringed(crash: Run) -> None:
     assert np.linalg.norm(ring.mean(axis=0) - front) < 6.0
 
 
+def test_what_collided_stays_crossed_out_while_it_drives_on(crash: Run) -> None:
+    film, first = Frames(crash, 0.0), crash.collisions[0]
+    vehicle = crash.trajectories["vehicle"].to_numpy()
+    for time, harmed in ((-0.1, 0), (0.0, 2), (5.0, 2)):
+        rows = film.rows(film.at(first.time + time), 1e9)
+        rows = rows[np.isin(vehicle[rows], first.vehicles)]
+        strokes = film.crossed_out(rows, first.time + time)
+        assert len(strokes) == 2 * harmed
+        fronts = np.c_[film.x, film.y][rows].tolist()
+        for stroke in strokes:  # its middle is that of a body
+            away = np.linalg.norm(np.array(fronts) - stroke.mean(axis=0), axis=1)
+            assert away.min() == pytest.approx(crash.site.vehicle.length / 2.0)
+
+
+def test_a_long_title_ends_before_the_clock(crash: Run) -> None:
+    picture = Picture(replace(crash, controller=Fixed(name="long" * 20)))
+    title, clock = (picture._figure.texts[0], picture._clock)
+    clock.set_text("00:00")
+    assert title.get_window_extent().x1 < clock.get_window_extent().x0
+
+
 def test_nothing_recorded_is_an_error() -> None:
     empty = minisim.simulate(four_way(0, horizon=5), Dim(), record="all")
     with pytest.raises(InputError, match="no vehicle"):
@@ -215,8 +236,7 @@ def test_every_zone_is_coloured(picture: Picture) -> None:
     assert {tuple(rgb(colour)) for colour in style.ZONES.values()} <= seen
 
 
-#: What dichromats see, for linear RGB: Machado, Oliveira & Fernandes, IEEE TVCG 15 (2009), table of
-#: severity 1.
+#: What dichromats see, for linear RGB: Machado et al., IEEE TVCG 15 (2009), table of severity 1.
 EYES = {
     "usual": np.eye(3),
     "protanope": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
@@ -327,9 +347,7 @@ def test_a_gif_of_more_than_50_frames_per_second_keeps_its_length(tmp_path: Path
 
 
 @pytest.mark.parametrize(("start", "seconds"), [(200.0, 2.0), (90.0, 20.0), (120.0, 20.0)])
-def test_what_was_not_recorded_is_not_animated(
-    run: Run, tmp_path: Path, start: float, seconds: float
-) -> None:
+def test_no_recording_no_film(run: Run, tmp_path: Path, start: float, seconds: float) -> None:
     with pytest.raises(InputError, match="the run was recorded from 100 to 130 s"):
         write_animation(run, tmp_path / "film.gif", start=start, seconds=seconds)
     assert not list(tmp_path.iterdir())
@@ -348,9 +366,8 @@ def test_the_header_tells_recorded_arrivals_from_a_demand(run: Run) -> None:
 
 def test_html_holds_every_frame(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    frames = [
-        Image.fromarray((rng.integers(0, 4, (5, 6, 3)) * 85).astype(np.uint8)) for _ in range(4)
-    ]
+    pictures = (rng.integers(0, 4, (4, 5, 6, 3)) * 85).astype(np.uint8)
+    frames = [Image.fromarray(picture) for picture in pictures]
     palette = palette_of(Image.fromarray(np.concatenate([np.asarray(f) for f in frames])))
     palette = palette.crop((0, 0, 6, 5))
     file = tmp_path / "film.html"

@@ -287,9 +287,7 @@ def test_report_names_everything(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "the store has no run of gate" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
-def test_a_report_on_one_study_has_nothing_of_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_report_has_nothing_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report, "GALLERY", {name: GALLERY[name] for name in FEW})
     made = [Made("gate", 60, 60.0, 60, 1.0, 1.0, ())]
     archive = Archive(synthetic_find, EFFORT)

@@ -39,9 +39,7 @@ def chi_square_poisson(counts: np.ndarray, rate: float, classes: int = 4) -> flo
 @pytest.mark.parametrize(
     ("density", "classes", "seed"), [(350.0, 4, 1), (350.0, 4, 2), (350.0, 4, 3), (3600.0, 7, 8)]
 )
-def test_poisson_counts_per_second_pass_a_chi_square_test(
-    density: float, classes: int, seed: int
-) -> None:
+def test_poisson_counts_per_second_pass_chi_square(density: float, classes: int, seed: int) -> None:
     arrivals = Demand(density=density).draw(4, DAY, seed)
     for lane in range(4):
         counts = per_second(arrivals, lane, DAY)
@@ -112,14 +110,10 @@ def test_manoeuvres_do_not_depend_on_those_before_nor_on_other_lanes(model: str)
 
 def test_inflow_counts_vehicles_before_the_horizon() -> None:
     """Three vehicles in the first minute are 180 an hour, however many come later."""
-    arrivals = Arrivals(
-        np.array([0.0, 20.0, 59.9, 60.0, 61.0]), np.array([0, 0, 1, 1, 0]), np.ones(5, int)
-    )
+    time, lane = np.array([0.0, 20.0, 59.9, 60.0, 61.0]), np.array([0, 0, 1, 1, 0])
+    arrivals = Arrivals(time, lane, np.ones(5, int))
     assert arrivals.rates(3, 60.0) == pytest.approx((120.0, 60.0, 0.0))
     assert arrivals.rates(3, 3600.0) == pytest.approx((3.0, 2.0, 0.0))
-
-
-# --- shares ------------------------------------------------------------------------------------
 
 
 def test_unbalanced_demand_keeps_the_total_and_gives_each_lane_its_share() -> None:
@@ -147,9 +141,7 @@ def test_shares_are_numbers_or_a_text(shares: Shares) -> None:
 
 
 @pytest.mark.parametrize("turns", [None, (1, 2, 1), (0, 1, 0)])
-def test_manoeuvres_follow_their_shares_independently_of_the_lane(
-    turns: tuple[float, ...] | None,
-) -> None:
+def test_manoeuvres_follow_their_shares_on_every_lane(turns: tuple[float, ...] | None) -> None:
     arrivals = Demand(density=350.0, turns=turns).draw(4, DAY, seed=4)
     shares = np.array(turns or (1, 1, 1)) / sum(turns or (1, 1, 1))
     table = np.zeros((4, 3))
@@ -167,9 +159,6 @@ def test_manoeuvres_are_drawn_from_their_own_stream() -> None:
     turning = Demand(density=350.0, turns=(5, 1, 5)).draw(4, 3600.0, seed=1)
     np.testing.assert_array_equal(uniform.time, turning.time)
     assert (uniform.manoeuvre != turning.manoeuvre).any()
-
-
-# --- the table ---------------------------------------------------------------------------------
 
 
 def test_the_table_is_sorted_by_time_then_lane_and_read_only() -> None:
@@ -228,8 +217,8 @@ def test_check_names_what_the_geometry_does_not_have() -> None:
         ({"split": (0, 0)}, "split must be shares"),
         ({"split": (1, -1)}, "split must be shares"),
         ({"split": (1e308, 1e308)}, "split must be shares"),
-        ({"turns": "ab"}, "turns is uniform or written like 4:3:2:1, got 'ab'"),
-        ({"split": "uniform"}, "split is balanced or written like"),
+        ({"turns": "ab"}, "turns must be uniform or like 4:3:2:1, got 'ab'"),
+        ({"split": "uniform"}, "split must be balanced or like"),
         ({"split": 4}, "split must be a sequence"),
     ],
 )

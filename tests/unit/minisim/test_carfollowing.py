@@ -50,9 +50,6 @@ SUMO = Driver(v0=14.0, a=2.6, b=4.5, headway=1.0, min_gap=2.5)
 DRIVERS = (TREIBER, SUMO, SUMO._replace(delta=1.0), TREIBER._replace(delta=8.0))
 
 
-# --- free road ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("driver", DRIVERS)
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 1.0])
 def test_free_acceleration_is_a_times_one_minus_the_power(driver: Driver, share: float) -> None:
@@ -67,9 +64,6 @@ def test_above_the_desired_speed_braking_is_comfortable_at_most() -> None:
     assert free_road(40.0, 14.0, 2.6, 4.5, 4.0) == -4.5
     for v in (14.1, 20.0, 40.0):
         assert -4.5 <= SUMO.iidm(v, math.inf, v) < 0.0
-
-
-# --- equilibrium -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
@@ -128,9 +122,6 @@ def test_improved_idm_is_continuous_where_its_branches_meet() -> None:
         assert below == pytest.approx(above, abs=1e-6)
 
 
-# --- integration -------------------------------------------------------------------------------
-
-
 def test_ballistic_is_uniform_acceleration() -> None:
     s, v = 3.0, 5.0
     for _ in range(40):
@@ -156,10 +147,7 @@ def krauss_law(v: float, gap: float, v_leader: float, dt: float) -> float:
 
 @pytest.mark.parametrize(
     ("law", "move", "within"),
-    [
-        (lambda *state: SUMO.idm(*state[:3]), ballistic, 0.05),
-        (krauss_law, semi_implicit, 0.5),
-    ],
+    [(lambda *state: SUMO.idm(*state[:3]), ballistic, 0.05), (krauss_law, semi_implicit, 0.5)],
     ids=["idm", "krauss"],
 )
 def test_the_scheme_is_of_first_order(law: Any, move: Any, within: float) -> None:
@@ -177,9 +165,6 @@ def test_the_scheme_is_of_first_order(law: Any, move: Any, within: float) -> Non
     orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
     assert all(0.7 < order < 1.4 for order in orders), (errors, orders)
     assert errors[0] < within
-
-
-# --- stopping and slowing down -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.1, 0.5])
@@ -221,14 +206,9 @@ def test_speed_towards_asks_for_more_than_b_where_b_cannot_make_it() -> None:
     assert speed_towards(14.0, 0.0, 1.0, 3.0, 0.1) < 14.0 - 3.0 * 0.1
 
 
-# --- insertion ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("gap", [2.5, 3.0, 10.0, 80.0])
 @pytest.mark.parametrize("v_leader", [0.0, 6.0, 14.0])
-def test_insertion_speed_is_the_highest_that_keeps_the_desired_gap(
-    gap: float, v_leader: float
-) -> None:
+def test_the_insertion_speed_is_the_highest_that_keeps_the_gap(gap: float, v_leader: float) -> None:
     v = insertion_speed(gap, v_leader, 2.6, 4.5, 1.0, 2.5)
     assert v >= 0.0
     assert SUMO.z(v, gap, v_leader) == pytest.approx(1.0)

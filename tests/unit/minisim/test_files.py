@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -108,11 +108,9 @@ def test_only_ordinary_files_and_pipes_are_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-@pytest.mark.parametrize(
-    "read", [read_arrivals, read_experiments, HarmonyMatrix.from_csv, Run.load]
-)
-def test_no_device_is_read(read: Callable[[str], object]) -> None:
-    for device in ("/dev/full", "/dev/zero"):
+def test_no_device_is_read() -> None:
+    readers = (read_arrivals, read_experiments, HarmonyMatrix.from_csv, Run.load)
+    for read, device in product(readers, ("/dev/full", "/dev/zero")):
         with pytest.raises(FileError, match="neither an ordinary file nor a pipe"):
             read(device)
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import sys
+from dataclasses import replace
 
 import pytest
 
 import minisim
-from minisim.control import Marking, Open, Plan, Wake
-from minisim.errors import ControllerError, InputError
+from minisim.control import Marking, Open, Plan, Session, Site, Wake
+from minisim.errors import ControllerError, InputError, MinisimError
 from minisim.hosting import Alarm, checked_window, start
 from minisim.testing import small_scenario
 from minisim.ticks import NEVER
-from scenarios.controllers import SAFE, controller_named
+from scenarios.controllers import SAFE, VARIANTS, controller_named
 from scenarios.library import four_way
+from scenarios.profiles import FAIR
+from scenarios.termination import Terminated
 from tests.builders import Fixed, Scripted
 
 
@@ -79,8 +83,8 @@ class Broken:
     name = "broken"
     plan = Plan(period=1.0)
 
-    def __init__(self, where: str) -> None:
-        self.where = where
+    def __init__(self, where: str, raised: BaseException) -> None:
+        self.where, self.raised = where, raised
 
     def start(self, site: object) -> Broken:
         self.fail("start")
@@ -96,16 +100,68 @@ class Broken:
 
     def fail(self, where: str) -> None:
         if where == self.where:
-            raise KeyError("lost")
+            raise self.raised
 
 
 @pytest.mark.parametrize("where", ["start", "decide", "kind"])
-def test_an_error_of_a_controller_is_told_with_its_line(where: str) -> None:
+@pytest.mark.parametrize("raised", [KeyError("lost"), SystemExit("lost")])
+def test_an_error_of_a_controller_is_told_with_its_line(where: str, raised: BaseException) -> None:
+    """`sys.exit` is an error like any other."""
     line = Broken.fail.__code__.co_firstlineno + 2
-    told = rf"^controller 'broken'.*: test_hosting.py, line {line}: KeyError: 'lost'$"
+    kind = type(raised).__name__
+    told = rf"^controller 'broken'.*: test_hosting.py, line {line}: {kind}: '?lost'?$"
     with pytest.raises(ControllerError, match=told) as caught:
-        minisim.simulate(small_scenario(demand_time=20.0), Broken(where))
-    assert isinstance(caught.value.__cause__, KeyError), "the traceback is there"
+        minisim.simulate(small_scenario(demand_time=20.0), Broken(where, raised))
+    assert caught.value.__cause__ is raised, "the traceback is there"
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, Terminated])
+def test_what_ends_the_process_is_no_error_of_a_controller(raised: type[BaseException]) -> None:
+    with pytest.raises(raised):
+        minisim.simulate(small_scenario(), Broken("decide", raised()))
+
+
+def test_a_controller_without_a_name_to_read_is_refused() -> None:
+    class Nameless:
+        @property
+        def name(self) -> str:
+            sys.exit("no name")
+
+        def start(self, site: Site) -> Session:
+            raise NotImplementedError
+
+        def __repr__(self) -> str:
+            raise ZeroDivisionError
+
+    told = "a Nameless whose repr raises ZeroDivisionError has no name: test_hosting.py, line "
+    with pytest.raises(InputError, match=rf"^{told}\d+: SystemExit: no name$"):
+        minisim.simulate(small_scenario(), Nameless())
+
+
+#: Controllers that wake up at intervals: their defaults and what goes with them.
+WAKING = (
+    *VARIANTS, "dim:perception=noisy(delay=0.3)",
+    "dim:perception=noisy(intent_error=0.15,persistent=false),monitor=on",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("dt", [0.13, 0.5])
+@pytest.mark.parametrize("name", WAKING)
+def test_no_default_is_refused_at_any_step(name: str, dt: float) -> None:
+    scenario = four_way(200, horizon=2.0, profile=replace(FAIR, dt=dt))
+    minisim.simulate(scenario, controller_named(name), 1)
+
+
+@pytest.mark.parametrize("spec", [
+    "v2ic:period=0.1", "reservation:period=0.1", "dim:period=0.1",
+    "dim:perception=noisy(delay=0.3,frame=0.1)",
+    "dim:perception=noisy(delay=0.3,frame=0.1),period=1",
+])  # fmt: skip
+def test_no_interval_is_shorter_than_a_step(spec: str) -> None:
+    site = four_way(profile=replace(FAIR, dt=0.2)).site()
+    told = r"(period|frame of the perception|period of the plan) \[s\], in steps of the host, must"
+    with pytest.raises(MinisimError, match=rf"^(controller )?'?{spec[:4]}.*{told} be at least 0.2"):
+        start(controller_named(spec), site)
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
 import minisim
-from tests import ROOT
+from tests.builders import python
 
 HEAVY = {"numpy", "pandas", "numba", "matplotlib", "shapely", "networkx", "pymunk", "scipy"}
 
@@ -24,9 +21,7 @@ print(json.dumps([time.process_time() - start, sorted(sys.modules)]))
 
 def imported(name: str) -> tuple[float, set[str]]:
     """Processor time of an import in a fresh interpreter [s], and the modules that it loads."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    told = subprocess.check_output([sys.executable, "-c", PROBE.format(name)], env=environment)
-    seconds, modules = json.loads(told)
+    seconds, modules = json.loads(python("-c", PROBE.format(name)).stdout)
     return seconds, set(modules)
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -13,6 +10,7 @@ import pytest
 
 import minisim.jit
 from minisim.jit import _digest
+from tests.builders import python
 
 pytestmark = pytest.mark.skipif(not minisim.jit.COMPILED, reason="numba is missing or off")
 
@@ -44,12 +42,8 @@ print(answer(10.0), "kept" if answer.stats.cache_hits else "compiled")
 
 def ask(folder: Path, code: str = ASK) -> str:
     """What a fresh process computes with the tree's sources, and where it has the code from."""
-    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "kept")}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder, env=environment, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return done.stdout.strip()
+    kept = {"PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "kept")}
+    return python("-c", code, cwd=folder, **kept).stdout.strip()
 
 
 def copied(folder: Path) -> Path:

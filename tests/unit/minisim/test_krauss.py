@@ -21,7 +21,6 @@ from tests.builders import Fixed, replayed
 
 #: SUMO's passenger car under Krauß's law.
 CAR = VehicleType(model="krauss")
-#: The published vehicle, every driver at the limit.
 #: The vehicle of the signals by minisim's own rules, which the host shares.
 HOSTED = replace(AS_RUN_SIGNALS, vehicle=replace(AS_RUN_SIGNALS.vehicle, sumo=None))
 ALIKE = replace(HOSTED, vehicle=replace(HOSTED.vehicle, speed_deviation=0.0))
@@ -85,9 +84,7 @@ def test_it_stops_at_a_standing_obstacle(dt: float, b: float) -> None:
 
 
 @pytest.mark.parametrize(("manoeuvre", "length"), [(1, 990.53), (2, 995.9), (3, 995.7)])
-def test_an_isolated_vehicle_takes_as_long_as_in_the_published_runs(
-    manoeuvre: int, length: float
-) -> None:
+def test_an_isolated_vehicle_takes_as_long_as_published(manoeuvre: int, length: float) -> None:
     """The free road at 14 m/s and what SUMO books beside it: 0.13 … 0.17 s of starting and, in
     turns, 9.03 m at 6.51 and 14.2 m at 8.00 m/s (`my_network.net.xml`; published trips such as
     v17.c_2 of 350_TTL.xml: 69.45 s for 995.9 m at 14.37 m/s with a time loss of 0.14 s). Our turn

@@ -1,4 +1,4 @@
-"""Names of recipes, as command lines have them."""
+"""Names of recipes, as on command lines."""
 
 from __future__ import annotations
 

@@ -69,9 +69,7 @@ def test_harmless_variants_are_read_alike(csv_file: Callable[[str], Path], text:
         ('"0,5",a,1', "; write decimals with a point$"),
     ],
 )
-def test_a_malformed_line_is_named_by_its_number(
-    csv_file: Callable[[str], Path], line: str, message: str
-) -> None:
+def test_a_broken_line_is_named(csv_file: Callable[[str], Path], line: str, message: str) -> None:
     path = csv_file(GOOD + line + "\n")
     with pytest.raises(FileError, match=message) as caught:
         read_arrivals(path, n=4)
@@ -93,9 +91,7 @@ def test_a_malformed_line_is_named_by_its_number(
         ("0,a,1\n2,b,1\n", "line 1: unknown column '0'"),
     ],
 )  # fmt: skip
-def test_a_header_of_another_kind_is_refused(
-    csv_file: Callable[[str], Path], text: str, message: str
-) -> None:
+def test_odd_headers_are_refused(csv_file: Callable[[str], Path], text: str, message: str) -> None:
     with pytest.raises(FileError, match=message):
         read_arrivals(csv_file(text))
 
@@ -122,15 +118,11 @@ def test_a_table_may_have_speed_factors(csv_file: Callable[[str], Path]) -> None
         Arrivals(np.zeros(1), np.zeros(1, int), np.ones(1, int), np.array([0.1]))
 
 
-# --- the time of day ---------------------------------------------------------------------------
-
 MORNING = "demand_time_s,lane,manoeuvre\n25100,c,2\n25205.5,a,2\n25207,b,1\n28000,c,3\n"
 
 
 @pytest.mark.parametrize("start", ["07:00", "7:00", "07:00:00", 25200, 25200.0, "25200"])
-def test_a_run_may_begin_at_a_time_of_day(
-    csv_file: Callable[[str], Path], start: float | str
-) -> None:
+def test_a_run_begins_at_a_time_of_day(csv_file: Callable[[str], Path], start: float | str) -> None:
     arrivals = read_arrivals(csv_file(MORNING), 4, start)
     assert arrivals.time.tolist() == [5.5, 7.0, 2800.0]
     assert arrivals.lane.tolist() == [0, 1, 2]
@@ -147,9 +139,7 @@ def test_a_run_may_begin_at_a_time_of_day(
         ("08:00", r"no vehicle comes from '08:00' on; the last .* at 28000 s \(07:46:40\)"),
     ],
 )
-def test_a_start_that_is_no_time_or_too_late_is_refused(
-    csv_file: Callable[[str], Path], start: object, message: str
-) -> None:
+def test_a_start_is_checked(csv_file: Callable[[str], Path], start: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read_arrivals(csv_file(MORNING), 4, start)  # type: ignore[arg-type]  # wrong on purpose
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -37,8 +34,7 @@ from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.profiles import Profile
 from scenarios.scenario import Scenario
-from tests import ROOT
-from tests.builders import Fixed, Scripted, digest, replayed
+from tests.builders import Fixed, Scripted, digest, python, replayed
 
 STRAIGHT = (0.0, 0, 2)
 KRAUSS = dataclasses.replace(FAIR, name="krauss", vehicle=VehicleType(model="krauss"))
@@ -78,9 +74,7 @@ def test_turning_vehicle_takes_the_arc_at_the_lateral_limit() -> None:
 
 @pytest.mark.parametrize("hold_distance", [0.0, 2.0, 40.0])
 @pytest.mark.parametrize(("profile", "spared"), [(PAPER, 0.0), (FAIR, 0.0), (KRAUSS, 0.1)])
-def test_held_vehicle_stands_just_before_its_line(
-    hold_distance: float, profile: Profile, spared: float
-) -> None:
+def test_it_is_held_at_its_line(hold_distance: float, profile: Profile, spared: float) -> None:
     """It brakes at b, or up to a tenth less if it slows in whole steps, and not too early."""
     scenario = lone(profile, 120.0)
     run = minisim.simulate(scenario, Fixed(Plan(hold_distance=hold_distance)), record="all")
@@ -239,10 +233,7 @@ def test_hold_after_the_hold_line_stops_before_the_junction() -> None:
 
 @pytest.mark.parametrize(
     ("plan", "answer", "step"),
-    [
-        (Plan(), lambda view: [Wake(view.time + 0.7)], 0.7),
-        (Plan(period=0.5), lambda view: (), 0.5),
-    ],
+    [(Plan(), lambda view: [Wake(view.time + 0.7)], 0.7), (Plan(period=0.5), lambda view: (), 0.5)],
     ids=["wake", "period"],
 )
 def test_wake_ups_come_on_the_tick(plan: Plan, answer: Any, step: float) -> None:
@@ -391,9 +382,7 @@ for scenario, controller in (
 ):
     print(digest(minisim.simulate(scenario, controller, seed=11, record="all")))
 """
-    told = subprocess.check_output(
-        [sys.executable, "-c", code], text=True, cwd=ROOT, env={**os.environ, **environment}
-    )
+    told = python("-c", code, **environment).stdout
     assert len(told.split()) == 4
     return told
 

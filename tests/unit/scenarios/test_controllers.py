@@ -121,7 +121,7 @@ def test_the_profile_as_run_means_the_published_rules() -> None:
         ("one-at-a-time:sight=60", "unknown controller 'one-at-a-time'.*or a class of your own"),
         ("os:PathLike", "os:PathLike is not a controller: it has no name and no start"),
         ("minisim.control:Controller", "Controller is not a controller: it is a class"),
-        ({"name": 3}, "needs a name"),
+        ({"name": 3}, "needs a text as its name"),
         ({"name": "dim", "gate": 3}, "unknown gate 3"),
         (Dim, "is not a controller: it is a class"),
         (5, "5 is not a controller: it has no name and no start"),
@@ -175,9 +175,7 @@ def test_a_registered_class_that_is_not_a_controller(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("value", ["no_such_module:Thing", "baselines:Thing"])
-def test_a_broken_package_is_named_when_it_is_asked_for(
-    monkeypatch: pytest.MonkeyPatch, value: str
-) -> None:
+def test_a_broken_package_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     plugin(monkeypatch, ("extra", value))
     assert controller_named("dim") == Dim()
     with pytest.raises(InputError, match="controller extra of package minisim-extra cannot be"):

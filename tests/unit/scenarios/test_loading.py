@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from scenarios import four_way
 from scenarios.controllers import controller_named
 from scenarios.recipe import Recipe
 from scenarios.sweep.keys import key_of
-from tests import ROOT
+from tests.builders import python
 
 MINE = '''
 from dataclasses import dataclass
@@ -120,19 +119,13 @@ def test_other_processes_find_it() -> None:
     recipe = Recipe(four_way(), controller_named("own_mine:Mine(k=3)"))
     data = pickle.dumps([recipe, {"a": recipe.controller}])
     code = f"import pickle; a, b = pickle.loads({data!r}); print(a.name, b['a'] == a.controller)"
-    answer = subprocess.run(
-        [sys.executable, "-c", code], cwd="/", env={"PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert answer.stdout == "mine-3 True\n"
+    assert python("-c", code, cwd=Path("/")).stdout == "mine-3 True\n"
 
 
 @pytest.mark.usefixtures("folder")
 def test_a_sweep_says_what_a_plain_class_lacks() -> None:
     recipe = Recipe(four_way(), "own_mine:Plain(k=3)")  # type: ignore[arg-type]
-    with pytest.raises(
-        InputError, match=r"Plain is not a dataclass.*make it a frozen dataclass"
-    ) as it:
+    with pytest.raises(InputError, match=r"Plain is not a dataclass.*it a frozen dataclass") as it:
         key_of(recipe)
     assert "0x" not in str(it.value)
 
@@ -160,8 +153,8 @@ def test_a_sweep_says_what_a_plain_class_lacks() -> None:
         ("own_exits:Mine", "cannot import own_exits: own_exits.py, line 1: SystemExit: 3"),
         ("own_lacks:Mine", "own_lacks.py, line 1: ModuleNotFoundError: No module named 'own_gone'"),
         ("own_empty:Mine", "own_empty has no 'Mine', and no other controller either"),
-        ("json.py:Mine", "json.py has the name of another module, json; rename the file"),
-        ("time:Mine", "time.py has the name of another module, time; rename the file"),
+        ("json.py:Mine", "json.py has the name of another module, json; rename it"),
+        ("time:Mine", "time.py has the name of another module, time; rename it"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_sentence(folder: Path, spec: str, message: str) -> None:

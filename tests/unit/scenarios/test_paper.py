@@ -50,11 +50,8 @@ SUMO = {
 }
 
 #: The one run that parts from SUMO's: an approach lane of the 3-arm network is 1 cm longer than its
-#: siblings, from 1120 s on that decides who goes first.
+#: siblings. From 1120 s on that decides which vehicle is first.
 PARTS = Cell("balanced", 350, 3)
-
-
-# --- the grid --------------------------------------------------------------------------------
 
 
 def test_the_grids_are_every_published_run() -> None:
@@ -129,9 +126,6 @@ def test_the_published_networks_differ_in_their_waiting_positions(
     assert [name for name, way in ways.items() if way.wait > 0.0] == waits
 
 
-# --- what ran ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("controller", ["dim", "fts", "ats", "v2ic"])
 def test_at_4141_dim_loads_north_and_south_the_others_north_and_east(controller: str) -> None:
     """as_run.md, discrepancy 13; lanes are a north, b east, c south, d west."""
@@ -193,9 +187,6 @@ def test_the_names_of_arms_decide_which_lane_is_first() -> None:
     assert {str(m) for m in winner(matrix, case, "lanes", "acbd")} == {"c1"}
     assert controller_of("4:1:4:1", 200, 4) == AsRunDim(names="acbd")
     assert controller_of("4:3:2:1", 200, 4) == AsRunDim()
-
-
-# --- replays -------------------------------------------------------------------------------------
 
 
 def means(cell: Cell, seed: int = 0) -> tuple[float, float]:

@@ -83,9 +83,8 @@ def test_the_adaptive_signal_switches_with_sumo(monkeypatch: pytest.MonkeyPatch)
 def test_a_vehicle_on_the_very_line_stops_at_amber() -> None:
     """SUMO 1.18, adaptive, balanced 150: vehicle 79 (d1) slows for its turn, to the line."""
     scenario = replace(replay("balanced", 150, 4, "ats"), horizon=530.0)
-    run = minisim.simulate(
-        scenario, controller_of("balanced", 150, 4, "ats"), on_collision="record"
-    )
+    signal = controller_of("balanced", 150, 4, "ats")
+    run = minisim.simulate(scenario, signal, on_collision="record")
     trip = run.columns.travel_time[79], run.columns.waiting_time[79]
     assert trip == pytest.approx((86.62, 17.0), abs=0.021)
 

@@ -70,9 +70,6 @@ def test_poisson_interval_by_its_definition(count: int) -> None:
         poisson_interval(-1)
 
 
-# --- growing queues --------------------------------------------------------------------------
-
-
 def test_queue_growth_by_hand() -> None:
     # Quarters of 10 s. Second, [10, 20): the first trip is there for 5 s. Last, [30, 40): the
     # second for 10 s, the third for 4 s, the fourth not yet.

@@ -23,8 +23,6 @@ from tests.builders import drive, replayed, said, seen
 
 SITE = four_way(density=250).site()
 
-# Timing.
-
 
 def test_by_default_it_is_websters_signal_with_the_lost_time_as_amber() -> None:
     assert FixedTime().timing(SITE) == webster([250.0] * 4)
@@ -60,7 +58,8 @@ def test_a_textbooks_signal() -> None:
     Flows of 400 and 250 pcu/h at saturation flows of 1250 and 1000 (here at 1000) give a cycle of
     67.5 s and greens of 28.9 and 22.5 s.
     """
-    site: Any = SimpleNamespace(intersection=SimpleNamespace(n=2), demand=(320.0, 250.0))
+    junction = SimpleNamespace(n=2, approaches=(0, 1))
+    site: Any = SimpleNamespace(intersection=junction, demand=(320.0, 250.0))
     timing = FixedTime(saturation_flow=1000.0, amber=2.0, all_red=6.0).timing(site)
     assert timing.cycle == pytest.approx(67.5, abs=0.1)
     assert timing.greens == pytest.approx((28.9, 22.5), abs=0.1)
@@ -91,9 +90,6 @@ def test_a_site_that_it_cannot_serve_is_a_clear_error() -> None:
         FixedTime(greens=(5, 6, 7)).start(SITE)
     with pytest.raises(InputError, match="max_cycle"):
         FixedTime(max_cycle=10).start(SITE)
-
-
-# Schedule.
 
 
 def test_each_lane_is_open_in_turn_and_the_cycle_begins_with_a() -> None:
@@ -144,9 +140,6 @@ def test_at_amber_only_vehicles_that_cannot_stop_keep_going() -> None:
     session.decide(View(0.0, ()))
     near, far = seen(3, 0, 2, 12.0, 14.0), seen(4, 0, 2, 30.0, 14.0)
     assert said(session.decide(View(10.0, (near, far)))) == ["Close 0", "Go 3", "Wake 12"]
-
-
-# On the road.
 
 
 @pytest.mark.parametrize("start", np.arange(0.0, 6.0, 0.6).tolist())

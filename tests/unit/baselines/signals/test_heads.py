@@ -1,4 +1,4 @@
-"""Signal heads: who is let go at the end of a green, and when a head may turn green."""
+"""Signal heads: what may still go after a green, and when a head may turn green."""
 
 from __future__ import annotations
 
@@ -47,14 +47,9 @@ NEEDED = 10.0**2 / 9.0 + COMMIT_MARGIN  # to stop from 10 m/s
         ([(-3, 10), (5, 10), (30, 10)], [1]),  # inside the junction it needs nothing
     ],
 )
-def test_vehicles_that_cannot_stop_and_all_before_them_are_committed(
-    lane: list[tuple[float, float]], those: list[int]
-) -> None:
+def test_what_cannot_stop_is_committed(lane: list[tuple[float, float]], those: list[int]) -> None:
     vehicles = [observed(k, 0, 1, *place) for k, place in enumerate(lane)]
     assert [v.id for v in committed(vehicles, lambda v: can_stop(v, BRAKING))] == those
-
-
-# Heads.
 
 
 def test_the_end_of_green_closes_the_lane_and_lets_the_committed_go() -> None:
@@ -77,9 +72,7 @@ def test_the_end_of_green_closes_the_lane_and_lets_the_committed_go() -> None:
         (3, seen(1, 0, 1, -2.0), 1, False),  # a1 turns left into b: in harmony with all of b
     ],
 )
-def test_a_head_waits_for_conflicting_vehicles_in_the_junction(
-    arms: int, vehicle: Observed, lane: int, waits: bool
-) -> None:
+def test_a_head_waits_for_conflicting(arms: int, vehicle: Observed, lane: int, waits: bool) -> None:
     heads = Heads(small_scenario(arms).site(0))
     wanted = [GREEN if i == lane else RED for i in range(arms)]
     assert show(heads, [vehicle], *wanted) == ([] if waits else [f"Open {lane}"])

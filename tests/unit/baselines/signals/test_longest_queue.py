@@ -1,4 +1,4 @@
-"""Longest queue first: who is next, ties, and why no two approaches are green together."""
+"""Longest queue first: which is next, ties, and why no two approaches are green together."""
 
 from __future__ import annotations
 

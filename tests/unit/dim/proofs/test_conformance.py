@@ -71,7 +71,7 @@ def test_of_two_on_one_movement_the_last_one_leaves_it() -> None:
 
 
 def test_a_vehicle_that_appears_inside_is_refused() -> None:
-    with pytest.raises(ConformanceError, match=r"^at 3\.0 s vehicle 9 is inside unseen$"):
+    with pytest.raises(ConformanceError, match=r"^at 3\.0 s vehicle 9 entered unseen$"):
         session().decide(view(3.0, seen(9, 1, 2, -2.0)))
 
 
@@ -112,10 +112,10 @@ def test_a_front_that_the_model_has_lost_is_refused() -> None:
     checked = session()
     checked.decide(view(0.0, seen(1, 0, 2, 6.0, 1.0)))
     checked.state = checked.protocol.start
-    with pytest.raises(ConformanceError, match=r"^at 1\.0 s vehicle 1 came unseen$"):
+    with pytest.raises(ConformanceError, match=r"^at 1\.0 s vehicle 1 arrived unseen$"):
         checked.decide(view(1.0, seen(1, 0, 2, 5.0, 1.0)))
     checked.state = checked.protocol.start
-    with pytest.raises(ConformanceError, match=r"^at 1\.0 s a vehicle of lane 0 went unseen$"):
+    with pytest.raises(ConformanceError, match=r"^at 1\.0 s a vehicle of lane 0 left unseen$"):
         checked.decide(view(1.0, seen(1, 0, 2, -1.0, 1.0)))
 
 

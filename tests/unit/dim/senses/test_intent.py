@@ -33,21 +33,17 @@ def close(count: int, share: float, of: int = COUNT) -> bool:
         ("symmetric", 0.2, ((0.8, 0.1, 0.1), (0.1, 0.8, 0.1), (0.1, 0.1, 0.8)), (0.2,) * 3),
     ],
 )
-def test_how_readings_err_and_what_they_are_worth(
-    kind: str, error: float, table: object, doubt: tuple[float, ...]
-) -> None:
+def test_readings_by_hand(kind: str, error: float, table: object, doubt: tuple[float, ...]) -> None:
     """Bayes by hand: a turn is never read where there is none; of 1.5 straights 1 is one."""
     assert confusion(2, (0.0,) * 3, error, kind) == table
     assert doubts(confusion(2, (0.0,) * 3, error, kind)) == pytest.approx(doubt)
 
 
-@pytest.mark.parametrize(
-    ("side", "silent"), [("left", (0.29, 0, 0.25)), ("right", (0.25, 0, 0.29))]
-)
-def test_the_near_turn_is_mirrored(side: str, silent: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(("side", "rates"), [("left", (0.29, 0, 0.25)), ("right", (0.25, 0, 0.29))])
+def test_the_near_turn_is_mirrored(side: str, rates: tuple[float, ...]) -> None:
     """Sullivan et al. counted in right-hand traffic: right turns 29 %, left turns 25 %."""
     site = small_scenario(4, side=side).site(0)
-    assert Lane.of(site, 1, 0.0, "missed", UNSIGNALLED).silent == silent
+    assert Lane.of(site, 1, 0.0, "missed", UNSIGNALLED).silent == rates
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -76,7 +72,7 @@ def test_who_is_misread_at_a_small_error_is_at_a_larger_one(kind: str) -> None:
 def test_confidence_is_calibrated(kind: str, unsignalled: tuple[float, float]) -> None:
     """Of the readings in each tenth of confidence, the mean confidence of them is right.
 
-    All manoeuvres are driven alike.
+    All manoeuvres are equally frequent.
     """
     subject = lane(0.25, kind, unsignalled)
     bins: dict[int, list[tuple[float, bool]]] = {}

@@ -39,9 +39,8 @@ def intents(see: See, view: View, ego: int) -> dict[int, int]:
 
 def crowd(count: int, time: float = 0.0) -> View:
     """Vehicles that wait on four lanes, all turning left; for counting errors."""
-    return View(
-        time, tuple(seen(k, k * 4 // count, 1, 2.0 + k % (count // 4)) for k in range(count))
-    )
+    vehicles = (seen(k, k * 4 // count, 1, 2.0 + k % (count // 4)) for k in range(count))
+    return View(time, tuple(vehicles))
 
 
 def test_without_errors_the_runs_are_those_of_exact_perception() -> None:
@@ -259,7 +258,7 @@ def test_noise_is_new_each_frame_and_one_for_all_or_each_its_own(noise: str, fie
         (errors(alike, 0, 0.0), errors(alike, 0, 0.1)),
     ):
         assert all(a != b for a, b in zip(one, other, strict=True))
-        assert len(set(one)) == len(one), "vehicles err each for itself"
+        assert len(set(one)) == len(one), "each vehicle errs on its own"
 
 
 def test_no_vehicle_seems_to_drive_backwards() -> None:

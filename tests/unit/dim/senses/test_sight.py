@@ -19,17 +19,16 @@ from tests.builders import seen, share
 
 SITE = small_scenario(4).site(0)
 BODIES = Bodies(SITE)
-HALF = BODIES.half_length, BODIES.half_width
+HALF = SITE.vehicle.length / 2.0, SITE.vehicle.width / 2.0
 
 
 def at(x: float, y: float, heading: float = 0.0) -> Body:
     """A body whose front points `heading` radians from east."""
-    return Body(x, y, math.cos(heading), math.sin(heading))
+    return Body(x, y, math.cos(heading), math.sin(heading), *HALF)
 
 
 def outline(body: Body) -> shapely.Polygon:
-    x, y, ux, uy = body
-    (a, b) = HALF
+    x, y, ux, uy, a, b = body
     return shapely.Polygon(
         [(x + i * a * ux - j * b * uy, y + i * a * uy + j * b * ux)
          for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]

@@ -86,18 +86,17 @@ def test_a_right_of_way_that_the_truth_does_not_give_is_false() -> None:
 
 
 def test_a_right_of_way_that_is_not_given_back_is_false() -> None:
-    """b2 and d2 outvote a1, but for a b2 is b1, with which it goes."""
+    """b2 and d2 outvote a1, but a reads b2 as b1, with which it goes."""
     tally = session(told({(1, 2): 1, (1, 4): 1}))
     assert show(tally, 0.0, seen(1, 0, 2, 2.1)) == "Go 1"
     assert tally.counts["false_grants"] == 0
-    assert "Hold 1" not in show(
-        tally, 0.1, seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 2, 2.1)
-    )
+    three = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 2, 2.1)
+    assert "Hold 1" not in show(tally, 0.1, *three)
     assert tally.counts["false_grants"] == 1
 
 
 def test_one_wrong_reading_can_stop_all_vehicles() -> None:
-    """a2, b2 and d3 all conflict, so a goes; but for a d is d2, which goes with b2."""
+    """a2, b2 and d3 all conflict, so a goes; but a reads d as d2, which goes with b2."""
     trio = seen(1, 0, 2, 2.1), seen(2, 1, 2, 2.1), seen(4, 3, 3, 2.1)
     assert show(session(told()), 0.0, *trio) == "Go 1"
     tally = session(told({(1, 4): 2}))

@@ -146,7 +146,7 @@ def test_it_arrives_a_decimetre_before_the_end_of_the_road() -> None:
 
 
 def test_cruise_control_and_model_go_together() -> None:
-    with pytest.raises(InputError, match="'cc' goes with a CruiseVehicle"):
+    with pytest.raises(InputError, match="'cc' needs a CruiseVehicle"):
         VehicleType(model="cc")
     with pytest.raises(InputError, match="car-following model of a CruiseVehicle"):
         CruiseVehicle(model="idm")
@@ -311,7 +311,7 @@ def test_teleport_takes_the_one_off_the_road_that_runs_into_another_on_its_exit(
     what = replace(replay("4:3:2:1", 350, 4), horizon=200.0)
     run = minisim.simulate(what, controller_of("4:3:2:1", 350, 4), on_collision="teleport")
     assert run.columns.arrival[72] == pytest.approx(195.98)
-    with pytest.raises(InputError, match="'teleport' goes with a CruiseVehicle"):
+    with pytest.raises(InputError, match="'teleport' needs a CruiseVehicle"):
         minisim.simulate(four_way(profile="fair"), Unregulated(), on_collision="teleport")
 
 

@@ -18,11 +18,14 @@ def test_a_departure_speed_above_a_drivers_own_is_capped_and_shuts_no_lane() -> 
     assert columns.departed[columns.demand_time < 190.0].all()
 
 
-@pytest.mark.parametrize("speed", [5.0, 14.0])
+@pytest.mark.parametrize("speed", [5.0, 11.1, 14.0])
 def test_a_departure_speed_too_high_for_a_short_arm_is_capped(speed: float) -> None:
+    """Before a closed line, brakes of 2 m/s² allow 10.5 m/s: no faster one was ever inserted."""
+    gentle = VehicleType(deceleration=2.0)
     scenario = small_scenario(
-        4, density=150.0, demand_time=100.0, drain=200.0, arm_length=40.0, depart_speed=speed
-    )
+        4, density=150.0, demand_time=100.0, drain=200.0, arm_length=40.0, depart_speed=speed,
+        vehicle=gentle,
+    )  # fmt: skip
     run = simulate(scenario, AllWayStop(), seed=1, record="all")
     assert run.columns.arrived.all()
     first = run.trajectories.groupby("vehicle")["speed_mps"].first()

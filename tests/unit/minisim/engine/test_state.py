@@ -13,7 +13,7 @@ from minisim.engine.state import build_vehicles
 from minisim.vehicle import VehicleType
 from scenarios import four_way
 
-SITE = replace(four_way(profile="fair").site(5), vehicle=VehicleType(speed_deviation=0.1))
+SITE = replace(four_way(profile="fair").site(5), fleet=VehicleType(speed_deviation=0.1))
 
 
 def factors(arrivals: Arrivals, lane: int, site: Site = SITE) -> list[float]:
@@ -39,7 +39,7 @@ def test_speed_factors_are_normal_and_cut() -> None:
     drawn = np.array(factors(Arrivals(*many), 0))
     assert drawn.mean() == pytest.approx(1.0, abs=5 * 0.1 / len(drawn) ** 0.5)
     assert drawn.std() == pytest.approx(0.1, rel=0.03)
-    wild = factors(Arrivals(*many), 0, replace(SITE, vehicle=VehicleType(speed_deviation=0.5)))
+    wild = factors(Arrivals(*many), 0, replace(SITE, fleet=VehicleType(speed_deviation=0.5)))
     assert (min(wild), max(wild)) == (0.2, 2.0)
 
 

@@ -107,9 +107,7 @@ BY_HAND = Region(
         (0.0, 3.0 * STEP, math.inf, math.inf),
     ],
 )
-def test_how_far_it_is_to_a_region_by_hand(
-    first: float, second: float, room: float, way: float
-) -> None:
+def test_how_far_a_region_is_by_hand(first: float, second: float, room: float, way: float) -> None:
     assert BY_HAND.room(first, second) == pytest.approx(room)
     assert BY_HAND.way(first, second) == pytest.approx(way)
 

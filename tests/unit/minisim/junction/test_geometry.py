@@ -50,9 +50,7 @@ def test_default_radius_leaves_the_kerb_of_netconvert() -> None:
 
 @pytest.mark.parametrize("bearings", [SQUARE, STAR, ODD])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_paths_are_circular_arcs_tangent_to_both_lanes(
-    bearings: tuple[float, ...], side: str
-) -> None:
+def test_paths_are_arcs_tangent_to_both_lanes(bearings: tuple[float, ...], side: str) -> None:
     """The circle that the entry alone defines must meet the exit lane."""
     intersection = Intersection(bearings, side=side)  # type: ignore[arg-type]
     keep = 1.6 if side == "left" else -1.6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from typing import Any
@@ -90,17 +91,14 @@ def test_own_metrics_get_the_run_or_its_trips(run: Run) -> None:
         (Metric("m", lambda run: "5"), "metric 'm' must give one finite number or None, got '5'"),
         (Metric("m", lambda run: math.inf), "metric 'm' must give one finite number"),
         (Metric("m", lambda run: np.zeros(3)), 'got array.*; per="trip" takes an array'),
-        (
-            Metric("m", lambda run: 1.0, per="trip"),
-            "must give one finite number per trip, an array",
-        ),
+        (Metric("m", lambda run: 1.0, per="trip"), "must give one finite number per trip, an arr"),
         (Metric("m", lambda run: run.trips, per="trip"), "metric 'm' must give one finite number"),
         (
             Metric("m", lambda run: np.full(len(run.columns.lane), np.inf), per="trip"),
             "metric 'm' must give one finite number per trip",
         ),
         ("min_tcc_s", "unknown metric 'min_tcc_s'.*did you mean 'min_ttc_s'"),
-        (Metric("travel_time_s", len), "'travel_time_s' is there already; give yours another"),
+        (Metric("travel_time_s", len), "already a metric 'travel_time_s'; give yours another"),
         (5, "unknown metric 5"),
     ],
 )
@@ -123,7 +121,7 @@ def test_other_wrong_questions(run: Run) -> None:
         with pytest.raises(InputError, match="name of a metric must"):
             Metric(name, len)  # type: ignore[arg-type]
     for name in ("complete_m", "lanes_a_m", "movements_m", "kinds_m", "m_p95", "m_max", "m_ci95"):
-        with pytest.raises(InputError, match=f"must not be that of a column of runs, got '{name}"):
+        with pytest.raises(InputError, match=f"must not be a column of runs, got '{name}"):
             Metric(name, len)
     with pytest.raises(InputError, match="must be a function"):
         Metric("m", 5)  # type: ignore[arg-type]
@@ -133,6 +131,7 @@ def test_an_error_in_a_metric_tells_which_and_where(run: Run) -> None:
     for of, what in (
         (lambda run: 1 / 0, r"ZeroDivisionError: division by zero \(test_metrics.py, line \d+\)"),
         (lambda run: run.trips["dely"], r"KeyError: 'dely' \(test_metrics.py, line \d+\)"),
+        (lambda run: sys.exit("enough"), r"SystemExit: enough \(test_metrics.py, line \d+\)"),
         (math.sqrt, "TypeError: must be real number, not Run"),
     ):
         with pytest.raises(InputError, match=f"^metric 'broken' raised {what}$"):
@@ -154,7 +153,7 @@ def test_a_count_of_the_controller_hides_no_metric(run: Run) -> None:
     summary = counting.summary(["crossings"])
     assert (summary["honks"], summary["crossings"]) == (3, 2)
     for name, asked in (("honks", [Metric("honks", lambda run: 1)]), ("trips", [])):
-        with pytest.raises(InputError, match=f"{name!r} is also what the controller calls a count"):
+        with pytest.raises(InputError, match=f"count {name!r} has the name of another number"):
             replace(run, counts={name: 3}).summary(asked)
 
 

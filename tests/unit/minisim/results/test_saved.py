@@ -184,9 +184,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
             Run.load(path)
 
 
-def test_a_run_is_saved_whole_or_not_at_all(
-    run: Run, file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_is_saved_whole(run: Run, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = file.read_bytes()
 
     def fail(*_: Any) -> None:

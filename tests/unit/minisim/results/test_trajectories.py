@@ -64,9 +64,7 @@ def test_trips_read_back_with_empty_cells_for_what_has_not_ended(run: Run, tmp_p
     assert "nan" not in path.read_text(encoding="utf-8").lower()
 
 
-def test_parquet_without_pyarrow_says_what_to_install(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_parquet_needs_pyarrow(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"pip install 'minisim\[parquet\]'"):
         write_trips(run.trips, tmp_path / "trips.parquet")
@@ -80,9 +78,7 @@ def test_a_frame_without_the_columns_is_an_error(tmp_path: Path, write: Any) -> 
             write(frame, tmp_path / "out.csv")
 
 
-def test_fcd_follows_the_schema_of_sumo_and_says_what_the_frame_says(
-    run: Run, tmp_path: Path
-) -> None:
+def test_fcd_follows_sumos_schema_and_says_what_the_frame_says(run: Run, tmp_path: Path) -> None:
     """Element and attribute names and kinds of SUMO's fcd_file.xsd."""
     path = tmp_path / "fcd.xml"
     write_fcd(run.trajectories, path, run.site)
@@ -140,9 +136,7 @@ def test_a_movement_that_the_site_does_not_have_is_an_error(
     assert os.listdir(tmp_path) == []
 
 
-def test_a_failure_halfway_leaves_the_old_file(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_old_file_stays(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "fcd.xml"
     path.write_text("old", encoding="utf-8")
 

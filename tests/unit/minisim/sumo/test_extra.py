@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import pytest
@@ -11,6 +10,7 @@ from minisim.control import Unregulated
 from minisim.errors import MissingExtraError
 from minisim.sumo import simulate
 from minisim.testing import check_controller, small_scenario
+from tests.builders import python
 
 INSTALL = r"needs the package \w+: pip install 'minisim\[sumo\]'"
 
@@ -33,7 +33,7 @@ def test_the_rest_works_without_the_extra() -> None:
         "assert main(['run', 'four-way', '--horizon', '20']) == 0\n"
         "sys.exit(main(['run', 'four-way', '--horizon', '20', '--host', 'sumo']))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python("-c", code)
     assert done.returncode == 2
     assert "pip install 'minisim[sumo]'" in done.stderr
     assert done.stderr.count("\n") == 1, "one line"

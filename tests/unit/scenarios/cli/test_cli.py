@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import signal
@@ -202,9 +203,7 @@ def test_collision_stops_the_run_and_writes_nothing(capsys: Captured, tmp_path: 
     assert trips.exists()
 
 
-def test_without_safety_nothing_is_recorded(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_safety_no_recording(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     records, real = [], minisim.simulation.Simulation
 
     def spy(*arguments: Any, **options: Any) -> Any:
@@ -359,7 +358,7 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
     assert "no vehicle comes from '09:00' on" in fails(capsys, *run, "--start", "09:00")
     film = ("-o", str(tmp_path / "film.gif"))
     for command in (("run", "four-way"), ("animate", "four-way", *film)):
-        assert "--start goes with --arrivals" in fails(capsys, *command, "--start", "07:00")
+        assert "--start needs --arrivals" in fails(capsys, *command, "--start", "07:00")
 
 
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
@@ -382,9 +381,8 @@ def test_a_film_shows_the_run_of_the_same_options(
     recorded = tmp_path / "arrivals.csv"
     write_arrivals(four_way(300, split="4:3:2:1").arrivals(3), recorded)
     films: list[Run] = []
-    monkeypatch.setattr(
-        "figures.film.animate.write_animation", lambda run, *_, **__: films.append(run)
-    )
+    writer = "figures.film.animate.write_animation"
+    monkeypatch.setattr(writer, lambda run, *_, **__: films.append(run))
     what = ("four-way", "--seed", "3", *(text.format(arrivals=recorded) for text in more))
     for controller in ("fixed-time", "dim") if "--humans" not in what else ("dim",):
         options = (*what, "-c", controller)
@@ -396,9 +394,7 @@ def test_a_film_shows_the_run_of_the_same_options(
         pd.testing.assert_frame_equal(film[over], whole[: len(film)][over], check_dtype=False)
 
 
-def test_animate_checks_before_it_simulates(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_animate_checks(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("minisim.simulation.Simulation", None)  # would be a TypeError
     monkeypatch.setenv("PATH", here := str(tmp_path))
     for file, more, said in (
@@ -446,12 +442,10 @@ BAD = [
     (("run",), "SCENARIO"),
     (("run", "four-way", "--fo"), "--fo"),
     (("run", "for-way"), "did you mean 'four-way'"),
-    (("run", "4way"), "N-way (such as 6-way), custom; did you mean '4-way'?"),
     (("run", "custom", "--bearings", "0,x,90"), "0,x,90"),
     (("run", "custom", "--bearings", "0,nan,90"), "'nan' is not a finite number"),
     (("run", "four-way", "--arrivals", ""), "--arrivals': '' is not a file name"),
     (("run", "four-way", "--bearings", "0,90,180"), "custom"),
-    (("run", "four-way", "-c", "fixed-tim"), "did you mean 'fixed-time'"),
     (("run", "four-way", "-d", "many"), "many"),
     (("run", "four-way", "--arrivals", "missing.csv", "-d", "3"), "--density"),
     (("run", "four-way", "--trips", "/no/such/folder/t.csv"), "/no/such/folder"),
@@ -463,18 +457,14 @@ BAD = [
     (("decide", "four-way", "a1", "--order", "sise"), "did you mean 'size'"),
     (("decide", "four-way", "a1", "--plot", "p.bmp"), ".png, .pdf, .svg"),
     (("animate", "four-way"), "--out"),
-    (("run", "four-way", "--metrics", "waiting_tim_s"), "did you mean 'waiting_time_s'?"),
-    (
-        ("run", "four-way", "--metrics", "pets,trips", "--no-safety"),
-        "asks for pets, which --no-saf",
-    ),
+    (("run", "four-way", "--metrics", "pets,trips", "--no-safety"), "asks for pets, which --no"),
     (("run", "four-way", "--metrics", "own_none:delay"), "there is no own_none.py"),
     (("run", "four-way", "--by", "lan"), "did you mean 'lane'?"),
     (("controllers", "dum"), "did you mean 'dim'"),
     (("controllers", "baselines:Fixed"), "did you mean 'FixedTime'"),
     (("demo", "--seeds", "1"), "--seeds must be an integer 2 … 1000"),
     (("demo", "--out", f"{ROOT / 'pyproject.toml'}/out"), "pyproject.toml/out"),
-    (("verify", "9-way"), "9 arms have 387420488 cases, too many to try them all"),
+    (("verify", "9-way"), "9 arms have 387420488 cases, too many to try all"),
     (("verify", "four-way", "--plot", "/nowhere/x.png"), "there is no folder /nowhere"),
     (("protocol", "five-way"), "searched for 3 and 4 arms; five-way has 5"),
     (("protocol", "three-way", "--counterexample", "x.txt"), "'.txt'; allowed: .csv"),
@@ -484,15 +474,12 @@ BAD = [
     (("sweep", "paper", "--horizon", "inf"), "--horizon [s] must be a finite number, got inf"),
     (("sweep", "paper", "--jobs", "2", "--scheduler", "tcp://x:1"), "give one"),
     (("sweep", "paper", "--export", "rows.txt"), "suffix of rows.txt"),
-    (("sweep", "capacity"), "earlier ones: minisim reproduce --only capacity"),
+    (("sweep", "capacity"), "earlier ones: use minisim reproduce --only capacity"),
     (("sweep", "x" * 300), "unknown study 'xxx"),
     (("sweep", "x" * 300 + ".toml"), "File name too long"),
     (("run", "four-way", "-c", f"{'x' * 300}.py:X"), "cannot read xxx"),
     (("sweep", "/dev/full"), "/dev/full: it is neither an ordinary file nor a pipe"),
     (("sweep", "/"), "cannot read experiments from /: Is a directory"),
-    (("run", "four-way", "--arrivals", "/dev/zero"), "neither an ordinary file nor a pipe"),
-    (("run", "four-way", "--split", "(4,3,2,1"), "split is balanced or written like 4:3:2:1"),
-    (("controllers", "dim:gate=shut"), "unknown gate 'shut'"),
     (("sweep", "fare"), "unknown study 'fare'; allowed: paper, text, as-run"),
     (("figures", "maps", "fairnes"), "did you mean 'fairness'"),
     (("figures", "webster", "gate"), "gate: drawn from results; give them with --store"),
@@ -509,7 +496,7 @@ BAD = [
     (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
     (("crossval", "--replay", "--split", "1:1:1:1"), "unknown split of a published run"),
     (("crossval", "--replay", "-c", "reservation"), "unknown published controller 'reservation'"),
-    (("crossval", "--replay", "five-way", "-c", "v2ic"), "3 and 5 arms balanced only, with dim"),
+    (("crossval", "--replay", "five-way", "-c", "v2ic"), "on 3 and 5 arms, only dim and balanced"),
     (("crossval", "three-way", "-c", "v2ic-as-run"), "v2ic-as-run cannot serve three-way at 150"),
 ]
 
@@ -672,8 +659,12 @@ def test_a_faulty_controller_is_one_line(capsys: Captured, monkeypatch: pytest.M
     ["--version"], pytest.param(["sweep", "e.toml", "--jobs", "2"], marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_files_of_the_working_directory_hide_no_library(command: list[str], tmp_path: Path) -> None:
-    """Neither for the command nor for its workers; `collections.py` would, for all of Python."""
-    for name in ("dim", "statistics", "numpy", "random", "signal", "socket", "json", "scenarios"):
+    """Neither for the command nor for its workers, except those that `python -m` itself loads."""
+    (tmp_path / "modules.py").write_text("import sys; print(*sys.modules)")
+    loaded = python("-m", "modules", cwd=tmp_path).stdout.split()
+    assert "collections" in loaded
+    here = filter(importlib.util.find_spec, sys.stdlib_module_names)
+    for name in {*here, "dim", "numpy", "scenarios", "typer"}.difference(loaded):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not this one')")
     (tmp_path / "e.toml").write_text("horizon = 5\nseeds = 2\n")
     done = python("-m", "minisim", *command, cwd=tmp_path)
@@ -702,6 +693,39 @@ def test_ctrl_c_while_python_imports_shows_no_traceback(module: str, tmp_path: P
     done = python("-c", PRESSING, "reproduce", module, cwd=tmp_path)
     assert done.returncode in (130, -signal.SIGINT)
     assert done.stderr in ("", "minisim: interrupted\n")
+
+
+#: Runs minisim; a signal comes in a callback, whose exceptions Python drops.
+DROPPING = """
+import os, runpy, signal, sys, weakref
+
+number = int(sys.argv.pop())
+
+class Dropped:
+    pass
+
+class Presses:
+    def find_spec(self, name, *_):
+        if name == "minisim.simulation":
+            it = Dropped()
+            self.ref = weakref.ref(it, lambda _: os.kill(os.getpid(), number))
+            del it
+
+sys.meta_path.insert(0, Presses())
+runpy.run_module("minisim", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
+@pytest.mark.parametrize(
+    ("number", "code", "told"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_no_signal_is_lost_in_a_callback(number: int, code: int, told: str, tmp_path: Path) -> None:
+    """Python's import system has such a callback after every import."""
+    run = "run", "four-way", "--horizon", "60", str(int(number))
+    done = python("-c", DROPPING, *run, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", f"minisim: {told}\n")
 
 
 @pytest.mark.slow

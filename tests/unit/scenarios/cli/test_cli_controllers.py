@@ -39,9 +39,7 @@ def test_nested_recipes_are_listed_too(capsys: Captured) -> None:
     assert "\n  patience=2 [s]  (0.5 … 60)\n      how long " in text
 
 
-def test_a_class_of_your_own(
-    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_your_own_class(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own_signal.py").write_text(
         "from baselines import FixedTime\n\n"
@@ -67,9 +65,7 @@ def test_what_is_not_a_controller_has_no_page(capsys: Captured, name: str) -> No
     fails(capsys, "controllers", name)
 
 
-def test_registered_names_are_listed_with_their_meaning(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_registered_names_are_listed(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"extra": "baselines:FixedTime", "broken": "no_such:Thing", "dim": "dim:Dim"}
     points = [EntryPoint(name, value, "minisim.controllers") for name, value in values.items()]
     monkeypatch.setattr(table, "entry_points", lambda group: points)

@@ -32,9 +32,7 @@ def test_what_needs_no_run_needs_no_store(tmp_path: Path) -> None:
     assert {file.name for file in (tmp_path / "new").iterdir()} == names
 
 
-def test_without_a_store_what_needs_runs_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
-) -> None:
+def test_without_a_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     few = {name: GALLERY[name] for name in ("webster", "gate", "fair")}
     monkeypatch.setattr(gallery, "GALLERY", few)
     assert main(["figures", "--out", str(tmp_path)]) == 0
@@ -93,9 +91,7 @@ def test_reproduce_computes_what_is_missing(tmp_path: Path) -> None:
     assert not any(made.failed for made in first)
 
 
-def test_progress_is_told_without_a_terminal(
-    capsys: Captured, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_progress_without_a_terminal(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter([0.0, 5.0, 25.0, 30.0, 50.0])
     monkeypatch.setattr(terminal, "SILENCE", 20.0)
     monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock))

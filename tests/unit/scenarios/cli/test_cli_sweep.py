@@ -65,9 +65,7 @@ def swept(folder: Path, capsys: Captured, text: str, code: int = 0) -> str:
     return capsys.readouterr().out
 
 
-def test_the_table_shows_what_was_asked_for_and_tells_cells_apart(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_the_table_shows_what_tells_cells_apart(tmp_path: Path, capsys: Captured) -> None:
     asked = 'metrics = ["time_loss_s", "trips", "collisions", "max_braking_mps2"]\n'
     text = f'horizon = 60\nseeds = 2\nturns = ["uniform", "1:2:1"]\n{asked}'
     lines = swept(tmp_path, capsys, text).splitlines()
@@ -151,5 +149,5 @@ def test_an_ended_sweep_keeps_its_runs_and_says_how_to_continue(
         assert 0 < len(store) < 5000
         kept = f"minisim: {len(store)} of 5000 runs are in {path}"
     assert error.splitlines() == [
-        f"{kept}; the same command goes on from there", f"minisim: {word}",
+        f"{kept}; repeat the command to continue", f"minisim: {word}",
     ]  # fmt: skip

@@ -57,6 +57,7 @@ def trips(waiting: Sequence[float], travel: Sequence[float], arrived: Sequence[b
         manoeuvre=np.array([1, 2, 3, 1]), exit_lane=np.array([1, 3, 3, 2]),
         waiting_time=np.array(waiting), travel_time=np.array(travel), time_loss=zero,
         depart_delay=zero, departed=np.ones(4, bool), arrived=done,
+        type=np.zeros(4, int),
     )  # fmt: skip
 
 
@@ -74,9 +75,7 @@ def pair(seed: int = 1) -> Pair:
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
     st.lists(st.integers(0, 20), min_size=1, max_size=40),
 )
-def test_ks_distance_is_the_largest_gap_of_scipys_ecdfs(
-    first: list[int], second: list[int]
-) -> None:
+def test_ks_distance_is_the_largest_gap_of_ecdfs(first: list[int], second: list[int]) -> None:
     one, other = (stats.ecdf(sample).cdf for sample in (first, second))
     expected = max(abs(one.evaluate(x) - other.evaluate(x)) for x in range(21))
     assert ks_distance(first, second) == pytest.approx(expected, abs=1e-12)
@@ -144,9 +143,8 @@ def test_hosts_part_where_a_vehicle_is_at_two_places() -> None:
             for time in (1.0, 2.0, 3.0)
             for vehicle in (4, 5, 6)
         ]
-        return pd.DataFrame(
-            rows, columns=["time_s", "vehicle", "s_m", "speed_mps", LANE, MANOEUVRE]
-        )
+        columns = ["time_s", "vehicle", "s_m", "speed_mps", LANE, MANOEUVRE]
+        return pd.DataFrame(rows, columns=columns)
 
     same = frame({})
     assert hosts.first_parting(same, frame({(4, 1.0): 0.4})) is None
@@ -286,9 +284,7 @@ def test_verdicts_over_few_trips_are_marked() -> None:
     assert "few trips |" not in markdown([many], "x", {})
 
 
-def test_runs_of_sumo_are_kept_and_used_again(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_sumos_runs_are_used_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ran: list[int] = []
 
     def instead(scenario: Any, controller: Any, seed: int, **options: Any) -> Run:

@@ -18,6 +18,7 @@ from scenarios.studies import NAMES, SEARCHES, study_named
 from scenarios.studies.capacity import CapacityStudy
 from scenarios.studies.shared.effort import Effort
 from scenarios.studies.shared.points import ControllerPoint, fair
+from scenarios.studies.shared.study import Results
 from scenarios.sweep.keys import key_of
 from tests.builders import synthetic_find, synthetic_row
 
@@ -51,7 +52,7 @@ def test_priorities_by_inflow_where_the_text_has_them() -> None:
 
 
 def test_the_as_run_study_runs_what_ran() -> None:
-    """Discrepancies 10 to 14, of which tests/unit/scenarios/test_paper.py has the details."""
+    """Discrepancies 10 to 14; tests/unit/scenarios/test_paper.py has the details."""
     points = [point for point in study_named("as-run").points if point.arms == 4]
     for name, series in SERIES.items():
         for point in (point for point in points if point.series == series):
@@ -89,9 +90,8 @@ def test_results_say_what_is_missing() -> None:
         return None if recipe.seed == 1 else {**synthetic_row(recipe), "error": "broken"}
 
     results = study.collect(effort, lambda asked: [*map(row_of, asked)])
-    assert all(
-        runs == (2 if point.series == "dim" else 0, 2) for point, runs in results.runs.items()
-    )
+    wanted = {point: (2 if point.series == "dim" else 0, 2) for point in results.runs}
+    assert results.runs == wanted
     assert results.rows["error"].notna().sum() == len(study.points) // 2
     assert len(results.good) == len(study.points)
     assert study.collect(effort, lambda asked: [None] * len(asked)).good.empty
@@ -106,3 +106,11 @@ def test_efforts_choose_points_and_seeds() -> None:
     assert few.groupby("series")["seed"].nunique().to_dict() == {
         "dim": 5, "fixed-time": 5, "adaptive": 5, "v2ic": 3,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["text", "as-run", "fair"])
+def test_a_verdict_without_runs_says_how_to_make_them(name: str) -> None:
+    study, effort = study_named(name), Effort()
+    assert study.verdict is not None
+    said = study.verdict(Results.of(study, effort, [(point, None) for point in study.points]))
+    assert effort.command(name) in said

@@ -103,7 +103,7 @@ def test_pairs_cancel_what_they_share() -> None:
 def test_differences_need_common_arrivals(rows: pd.DataFrame) -> None:
     other = rows.copy()
     other.loc[other["controller"] == "dim", "arrivals"] = "others"
-    with pytest.raises(InputError, match="did not meet the same arrivals"):
+    with pytest.raises(InputError, match="had different arrivals"):
         differences(other, "waiting_time_s", "dim", "dim:gate=harmonious")
     with pytest.raises(InputError, match="unknown controller of these rows 'dmi'"):
         differences(rows, "waiting_time_s", "dmi", "dim")
@@ -173,9 +173,7 @@ def test_the_code_of_an_own_metric_is_part_of_the_key() -> None:
 LIMIT = 1.0
 
 
-def test_a_global_that_an_own_metric_reads_is_part_of_the_key(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_global_that_a_metric_reads_is_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     recipe = Recipe(four_way(), Dim(), metrics=(Metric("mine", lambda run: LIMIT),))
     before = key_of(recipe)
     monkeypatch.setattr(sys.modules[__name__], "LIMIT", 2.0)
@@ -210,7 +208,7 @@ def test_what_has_no_canonical_form(odd: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "density", "horizon", "profile", "controller", "expected"),
+    ("make", "density", "horizon", "profile", "controller", "wanted"),
     [
         (four_way, 300, 900, "paper", "dim", (275, 31, 5.91, 99.77, 6.88)),
         (three_way, 350, 900, "fair", "dim:gate=harmonious", (243, 29, 0.96, 75.65, -0.74)),
@@ -219,19 +217,14 @@ def test_what_has_no_canonical_form(odd: object) -> None:
     ],
 )
 def test_changed_results_need_another_version(
-    make: Any,
-    density: int,
-    horizon: int,
-    profile: str,
-    controller: str,
-    expected: tuple[float, ...],
+    make: Any, density: int, horizon: int, profile: str, controller: str, wanted: tuple[float, ...]
 ) -> None:
     """Stores keep rows by version. When rows change, raise `RESULTS` and update these numbers."""
     scenario = make(density, horizon=horizon, profile=profile)
     row = outcome_of(Recipe(scenario, controller, 1, on_collision="record")).row
     times = ("waiting_time_s", "complete_travel_time_s", "queue_growth")
     found = [row[column] for column in ("trips", "unfinished", *times)]
-    assert found == pytest.approx(expected, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
+    assert found == pytest.approx(wanted, abs=0.006), "raise scenarios.sweep.keys.RESULTS"
     assert RESULTS == 5
 
 
@@ -303,7 +296,7 @@ def test_a_run_counts_once() -> None:
     frame = pd.DataFrame({
         "who": ["x", "x", "y"], "m": 1.0, "where": 1, "seed": 1, "arrivals": "same", "error": None,
     })  # fmt: skip
-    with pytest.raises(InputError, match="x has several runs of one seed; where are the same"):
+    with pytest.raises(InputError, match="x has several runs of one seed with equal where"):
         pairs(frame, "m", "who", ("x", "y"), ["where"])
 
 

@@ -10,7 +10,7 @@ import pytest
 from baselines import FixedTime
 from dim import Dim, Zones
 from minisim.errors import FileError, InputError
-from minisim.recorded import write_arrivals
+from minisim.recorded import read_arrivals, write_arrivals
 from scenarios import five_way, four_way, from_bearings, three_way
 from scenarios.recipe import Recipe
 from scenarios.sweep.file import read_experiments
@@ -122,6 +122,17 @@ def test_recorded_arrivals_are_found_beside_the_file(tmp_path: Path) -> None:
     assert later.scenario.recorded.time.tolist() == expected.tolist()
 
 
+def test_arrivals_of_a_smaller_junction_are_refused(tmp_path: Path) -> None:
+    """As on the command line and in Python."""
+    write_arrivals(three_way(300, horizon=300).arrivals(1), tmp_path / "a.csv")
+    told = "looks like arrivals of a junction with 3 arms: none comes from lane d or"
+    with pytest.raises(InputError, match=rf"e.toml: .*a.csv {told}"):
+        read(tmp_path, 'arrivals = "a.csv"\n')
+    with pytest.raises(InputError, match=told):
+        read_arrivals(tmp_path / "a.csv", 4)
+    assert len(read_arrivals(tmp_path / "a.csv")) == len(read_arrivals(tmp_path / "a.csv", 3)) > 30
+
+
 def test_the_command_line_may_replace_seeds_and_horizon(tmp_path: Path) -> None:
     file = tmp_path / "e.toml"
     file.write_text("seeds = 5\nhorizon = 100\n")
@@ -154,7 +165,7 @@ WRONG = [
     ('controller = {name = "unregulated", x = 3}', r"unregulated has no parameters, got x"),
     ('profile = "fare"', r"unknown profile 'fare'.*'fair'"),
     ("profile = 3", r"unknown profile 3"),
-    ('split = "4-3"', r"split is balanced or written like"),
+    ('split = "4-3"', r"split must be balanced or like"),
     ("density = []", r"density is an empty list"),
     ('density = "many"', r"density"),
     ("seeds = 0", r"toml: seeds must be an integer 1 … .*, got 0; or a list of seeds"),
@@ -169,19 +180,17 @@ WRONG = [
     ('arrivals = "a.csv"\nsplit = "1:1:1:1"', r"arrivals replaces split"),
     ('arrivals = "a.csv"', r"a\.csv"),
     ("arrivals = 3", r"arrivals must be a text"),
-    ('start = "07:00"', r"start goes with arrivals"),
+    ('start = "07:00"', r"start needs arrivals"),
     ('controller = ["dim", {name = "dim", label = "dim", order = "lanes"}]',
      r"both be called dim.*label"),
     ("density = [1, 2", r"not valid TOML"),
-    ("min_headway = 2", r"min_headway goes with the model 'shifted'"),
+    ("min_headway = 2", r"min_headway needs the model 'shifted'"),
     ("seeds = 1\n[[experiment]]\nseeds = 2", r"seeds above the blocks is never used"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG)
-def test_what_is_wrong_is_named_with_its_place(
-    text: str, message: str, tmp_path: Path, capsys: Captured
-) -> None:
+def test_wrong_places_are_named(text: str, message: str, tmp_path: Path, capsys: Captured) -> None:
     with pytest.raises((InputError, FileError), match=message) as caught:
         read(tmp_path, text)
     file = str(tmp_path / "e.toml")
@@ -197,9 +206,7 @@ def test_what_is_not_a_file_of_experiments(tmp_path: Path) -> None:
             read_experiments(tmp_path / name)
 
 
-def test_a_controller_that_cannot_serve_is_told_before_anything_runs(
-    tmp_path: Path, capsys: Captured
-) -> None:
+def test_a_controller_that_cannot_serve_is_told_first(tmp_path: Path, capsys: Captured) -> None:
     file, store = tmp_path / "e.toml", tmp_path / "s.db"
     file.write_text('scenario = "three-way"\ncontroller = "fixed-time:greens=(1,2)"\n')
     said = fails(capsys, "sweep", str(file), "--out", str(store))

@@ -179,9 +179,39 @@ def test_what_has_no_description_cannot_be_stored(tmp_path: Path) -> None:
         sweep([replace(recipe_of(), controller=odd)], jobs=1, store=store)
 
 
-def test_another_writer_is_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome
+class Plain:
+    """A controller that is no dataclass."""
+
+    name = "plain"
+    version: Any = 1
+
+    def __init__(self, sight: float = 30.0) -> None:
+        self.sight = sight
+
+    def start(self, site: Site) -> Any:
+        return ScriptedSession(Plan(sight=self.sight, lanes_open=True), lambda view: ())
+
+
+def test_a_plain_class_with_a_version_is_known_by_it_and_its_attributes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def recipe(sight: float = 30.0) -> Recipe:
+        return Recipe(four_way(50, horizon=5), Plain(sight), on_collision="record")
+
+    with Store(tmp_path / "s.db") as store:
+        rows = sweep([recipe(), recipe(31.0), recipe()], jobs=1, store=store)
+        assert rows["error"].isna().all()
+        assert len(store) == 2
+    first = key_of(recipe())
+    monkeypatch.setattr(Plain, "version", 2)
+    keys._code.cache_clear()
+    assert key_of(recipe()) != first
+    monkeypatch.setattr(Plain, "version", None)
+    with pytest.raises(InputError, match=r"Plain is not a dataclass.*or give it a `version`"):
+        key_of(recipe())
+
+
+def test_writers_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, outcome: Outcome) -> None:
     monkeypatch.setattr("scenarios.sweep.store.PATIENCE", 0.2)
     with Store(tmp_path / "s.db") as ours, Store(tmp_path / "s.db") as theirs:
         ours.put(recipe_of(1), outcome)
@@ -196,9 +226,7 @@ def test_another_writer_is_waited_for(
         assert len(ours) == 3
 
 
-def test_a_store_that_another_holds_is_told_soon(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_store_in_use_is_told_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scenarios.sweep.store.OPENING", 0.1)
     with Store(tmp_path / "s.db") as theirs:
         theirs._database.executescript("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE")

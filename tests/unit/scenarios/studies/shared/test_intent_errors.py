@@ -40,9 +40,8 @@ def test_runs_without_tally_have_their_trips() -> None:
 def test_the_study_goes_over_rates_kinds_and_manners() -> None:
     cases = [c for c in study_named("perception").points if isinstance(c, IntentErrorPoint)]
     assert len(cases) == len(set(cases)) == 3 + 2 * 2 * 4 * 6 + 2 * 4 + 3
-    errors = {
-        (c.kind, c.shared, c.persistent, c.rate) for c in cases if c.series == "dim" and c.rate
-    }
+    of_dim = (c for c in cases if c.series == "dim" and c.rate)
+    errors = {(c.kind, c.shared, c.persistent, c.rate) for c in of_dim}
     assert len(errors) == 2 * len(MANNERS) * (len(RATES) - 1)
     exact = [c.recipe(1).controller for c in cases if c.perception.period is None]
     assert exact == [Dim(), Dim(monitor=Monitor()), Dim(order="lanes")]
