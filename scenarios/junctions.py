@@ -48,7 +48,7 @@ def junction_from(path: AnyPath, node: str | None = None, side: str | None = Non
         return Named(stem if node is None else f"{stem} {node}", made)
     if node is not None or side is not None:
         given = "node" if node is not None else "side"
-        raise InputError(f"{given} goes with a town's network, not with the junction of {path}")
+        raise InputError(f"{given} needs a town's network, not the junction of {path}")
     try:
         table = tomllib.loads(read_file("junction", path).decode())
     except (ValueError, RecursionError) as error:

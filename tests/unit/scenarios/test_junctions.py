@@ -84,13 +84,13 @@ def test_broken_tables_are_refused(tmp_path: Path, text: str, message: str) -> N
 def test_a_file_has_the_whole_junction(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("bearings = [0, 90, 180]\n")
-    with pytest.raises(InputError, match="lane_width goes with bearings"):
+    with pytest.raises(InputError, match="lane_width needs bearings"):
         from_file(path, lane_width=3.0)
-    with pytest.raises(InputError, match="side goes with a town's network"):
+    with pytest.raises(InputError, match="side needs a town's network"):
         from_file(path, side="left")
-    with pytest.raises(InputError, match="node goes with a town's network"):
+    with pytest.raises(InputError, match="node needs a town's network"):
         scenario_named("four-way", node="7")
-    with pytest.raises(InputError, match="bearings go with the scenario 'custom'"):
+    with pytest.raises(InputError, match="bearings need the scenario 'custom'"):
         scenario_named(str(path), bearings=[0, 90, 180])
     with pytest.raises(FileError, match="cannot read junction from"):
         scenario_named(str(tmp_path / "none.toml"))
