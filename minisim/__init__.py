@@ -18,39 +18,56 @@ from minisim.version import __version__
 # in the working directory. Type checkers know the name.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from minisim.arrivals import Arrivals, Demand
+    from minisim.arrivals import Arrivals
+    from minisim.counts import read_counts
+    from minisim.demand import Demand, DemandProfile, Period
+    from minisim.demandfile import read_demand, write_demand
     from minisim.errors import MinisimError
     from minisim.junction.geometry import Intersection
     from minisim.junction.movements import Movement
+    from minisim.junction.roads import Road
     from minisim.recorded import read_arrivals, write_arrivals
     from minisim.results.run import Run
     from minisim.simulation import Simulation, simulate
+    from minisim.town import read_junction
     from minisim.vehicle import VehicleType
 
 _NAMES = {
-    "minisim.arrivals": ("Arrivals", "Demand"),
+    "minisim.arrivals": ("Arrivals",),
+    "minisim.counts": ("read_counts",),
+    "minisim.demandfile": ("read_demand", "write_demand"),
+    "minisim.demand": ("Demand", "DemandProfile", "Period"),
     "minisim.errors": ("MinisimError",),
     "minisim.junction.geometry": ("Intersection",),
     "minisim.junction.movements": ("Movement",),
+    "minisim.junction.roads": ("Road",),
     "minisim.recorded": ("read_arrivals", "write_arrivals"),
     "minisim.results.run": ("Run",),
     "minisim.simulation": ("Simulation", "simulate"),
+    "minisim.town": ("read_junction",),
     "minisim.vehicle": ("VehicleType",),
 }
 
 __all__ = [
     "Arrivals",
     "Demand",
+    "DemandProfile",
     "Intersection",
     "MinisimError",
     "Movement",
+    "Period",
+    "Road",
     "Run",
     "Simulation",
     "VehicleType",
     "__version__",
     "read_arrivals",
+    "read_counts",
+    "read_demand",
+    "read_junction",
     "simulate",
     "write_arrivals",
+    "write_demand",
 ]
 
 

@@ -1,8 +1,8 @@
 """What a controller sees and may command: the door between the simulator and the controllers.
 
 Controllers may also import `junction`, `vehicle`, `fleet`, `parameters`, `names`, `errors`,
-`files`, `streams`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports the
-engine, the hosts or the results; `make lint` checks this.
+`files`, `streams`, `inflow`, `laws`, `carfollowing` and `jit` from `minisim`. None of these imports
+the engine, the hosts or the results; `make lint` checks this.
 
 A `Controller` is a frozen recipe. For each run the host (minisim, or SUMO) calls
 `controller.start(site)` and gets a `Session`: the mutable side, with a `Plan` of what it needs.
@@ -19,6 +19,7 @@ from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 from minisim.errors import InputError, instance, number, printable, told
 from minisim.fleet import Fleet
+from minisim.inflow import Inflow
 from minisim.junction.conflicts import conflicts, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools, Movement
@@ -57,12 +58,18 @@ class Site:
     intersection: Intersection = part("its geometry", Intersection)
     fleet: Fleet = checked("the vehicles' types", lambda _, value: _fleet(value), "a Fleet")
     speed_limit: float = real("of the roads, the highest one", "m/s", above=0, high=100)
-    demand: Reals[tuple[float, ...]] = reals("expected inflow of each lane", "veh/h")
+    demand: Reals[tuple[float, ...]] = reals(
+        "expected inflow of each lane, mean over the run", "veh/h"
+    )
     dt: float = real("step of the host", "s", default=0.1, low=0.001, high=0.5)
     seed: int = whole("of the run, for random numbers (`minisim.streams`)", default=0, low=0)
     limits: Reals[tuple[float, ...]] = reals(
         "of each arm's road; by default its own in the intersection, or else `speed_limit`",
         "m/s", default=(),
+    )  # fmt: skip
+    inflow: Inflow | None = part(
+        "expected by time of the run; none if it is always `demand`", Inflow,
+        optional=True, default=None,
     )  # fmt: skip
 
     @property
@@ -87,6 +94,8 @@ class Site:
         if len(self.demand) != self.intersection.n or min(self.demand) < 0:
             wanted = f"{self.intersection.n} numbers ≥ 0 [veh/h]"
             raise InputError(f"demand must be {wanted}, got {self.demand}")
+        if self.inflow is not None and len(self.inflow.rates[0]) != self.intersection.n:
+            raise InputError(f"inflow must have {self.intersection.n} lanes, got {self.inflow}")
         self._set_limits()
         if self.intersection.roads is not None and self.vehicle.sumo is not None:
             raise InputError(
@@ -124,6 +133,10 @@ class Site:
             raise InputError(f"limits must be one per arm, {n} numbers, got {self.limits}")
         for limit in self.limits:
             number("limits [m/s]", limit, above=0, high=self.speed_limit)
+
+    def expected(self, start: float, end: float) -> tuple[float, ...]:
+        """Expected inflow of each lane from `start` to `end` of the run [s], in veh/h."""
+        return self.demand if self.inflow is None else self.inflow.mean(start, end)
 
     def period(self, name: str, seconds: float) -> float:
         """The time between two wake-ups [s]; raises `InputError` if it is below the host's step."""

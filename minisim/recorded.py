@@ -9,9 +9,11 @@ import re
 
 import numpy as np
 
-from minisim.arrivals import LEAST_FACTOR, MAX_TIME, MOST_FACTOR, Arrivals
+from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
+from minisim.clock import clock, seconds_of
 from minisim.errors import FileError, InputError, choice, instance, integer, number, show
 from minisim.files import AnyPath, read_file, write_text
+from minisim.inflow import MAX_TIME
 from minisim.junction.movements import ARM_NAMES
 
 COLUMNS = ("demand_time_s", "lane", "manoeuvre")
@@ -75,26 +77,6 @@ def write_arrivals(arrivals: Arrivals, path: AnyPath) -> None:
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
     write_text(path, text.getvalue())
-
-
-def seconds_of(start: object) -> float:
-    """A time of day such as "07:00" or "07:00:30", or seconds, as seconds; raises `InputError`."""
-    value = start
-    if isinstance(start, str):
-        parts = re.fullmatch(r"([0-9]{1,2}):([0-5][0-9])(?::([0-5][0-9]))?", start.strip())
-        try:
-            hour, minute, second = map(int, parts.groups("0")) if parts else (0, 0, float(start))
-        except ValueError:
-            wanted = "a time of day such as 07:00 or seconds"
-            raise InputError(f"start must be {wanted}, got {show(start)}") from None
-        value = 3600 * hour + 60 * minute + second
-    return number("start [s]", value, low=0, high=MAX_TIME)
-
-
-def clock(time: float) -> str:
-    """A time in seconds, also as a time of day: "25205 s (07:00:05)"."""
-    minutes, second = divmod(math.floor(time), 60)
-    return f"{time:g} s ({minutes // 60:02d}:{minutes % 60:02d}:{second:02d})"
 
 
 def _lines(path: AnyPath) -> list[tuple[str, list[str]]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, get_args
 
-from minisim.arrivals import MAX_DENSITY, Arrivals, Demand
+from minisim.arrivals import Arrivals
 from minisim.control import (
     Advise,
     Brake,
@@ -26,6 +26,7 @@ from minisim.control import (
     Wake,
     as_controller,
 )
+from minisim.demand import Demand
 from minisim.errors import (
     ControllerError,
     InputError,
@@ -37,6 +38,7 @@ from minisim.errors import (
     show,
 )
 from minisim.fleet import Fleet
+from minisim.inflow import MAX_DENSITY
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Reals, declared, part, real, reals, text, word

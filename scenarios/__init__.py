@@ -7,7 +7,14 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from scenarios.library import five_way, four_way, from_bearings, regular, three_way
+    from scenarios.library import (
+        five_way,
+        four_way,
+        from_bearings,
+        from_file,
+        regular,
+        three_way,
+    )
     from scenarios.profiles import AS_RUN, FAIR, PAPER, PROFILES, Profile
     from scenarios.scenario import Scenario
 
@@ -21,6 +28,7 @@ __all__ = [
     "five_way",
     "four_way",
     "from_bearings",
+    "from_file",
     "regular",
     "three_way",
 ]

@@ -16,6 +16,7 @@ AXES: dict[str, Any] = {
     "unit": "veh",
     "fleet": None,
     "arrivals": None,
+    "demand": None,
     "controller": "dim",
     "humans": 0.0,
     "seeds": 10,
@@ -23,7 +24,7 @@ AXES: dict[str, Any] = {
 
 #: Key with one value for a block -> its default.
 SINGLE: dict[str, Any] = {
-    "horizon": 3600.0, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
+    "horizon": None, "warmup": 0.0, "min_headway": 1.5, "on_collision": "stop",
     "metrics": (), "start": None,
 }  # fmt: skip
 

@@ -1,24 +1,28 @@
-"""Ready-made scenarios: the paper's three junctions, regular ones, and any bearings.
+"""Ready-made scenarios: the paper's three junctions, regular ones, any bearings, and files.
 
-All take the same keywords, `Options`, and call `from_bearings`.
+All take the same keywords, `Options`; those from files leave out the geometry's.
 """
 
 from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.demand import Demand, DemandProfile, Turns
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
+from minisim.files import AnyPath
 from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
 from minisim.vehicle import VehicleType
+from scenarios.junctions import is_junction_file, junction_from
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named
 from scenarios.published import PUBLISHED_ARMS, published_ways
 from scenarios.scenario import Scenario
@@ -35,7 +39,8 @@ class Options(TypedDict, total=False):
 
     A profile may be a name, a fleet as for `minisim.fleet.fleet_named`, and shares (`split`,
     `turns`) numbers or a text such as "4:3:2:1". `unit` is that of the density: "veh", or passenger
-    car units (`minisim.fleet.PCU`).
+    car units (`minisim.fleet.PCU`). A `demand` by time of day replaces all that says how many
+    vehicles come; a run of it lasts until its end, unless there is a `horizon`.
     """
 
     name: str
@@ -47,7 +52,7 @@ class Options(TypedDict, total=False):
     roads: Sequence[Road] | Mapping[str, Any] | None
     forbidden: Sequence[str]
     split: str | Sequence[float] | None
-    turns: str | Sequence[float] | None
+    turns: Turns
     model: str
     min_headway: float
     profile: str | Profile
@@ -56,6 +61,7 @@ class Options(TypedDict, total=False):
     horizon: float
     warmup: float
     recorded: Arrivals | None
+    demand: DemandProfile
 
 
 #: Mean inflow per lane by default [veh/h].
@@ -64,10 +70,13 @@ DENSITY = 350.0
 #: The unit of a density that counts vehicles.
 VEHICLES = "veh"
 
-#: Keywords that recorded arrivals replace.
+#: Keywords that recorded arrivals replace, and a demand by time of day.
 DRAWN = ("density", "split", "turns", "model", "min_headway", "unit")
 
 _PARTS = (Intersection, Demand, Scenario)
+
+#: Keywords of the geometry.
+GEOMETRY = tuple(it.name for it in fields(Intersection) if it.name in Options.__annotations__)
 
 _Maker = TypeVar("_Maker", bound=Callable[..., Scenario])
 
@@ -126,29 +135,60 @@ def from_bearings(
     a mapping of arms to roads, such as `{"b": Road(traffic="in")}`; the others are as usual.
     """
     given: dict[str, Any] = {"name": "custom", **options}
+    geometry = {key: given.pop(key) for key in GEOMETRY if key in given}
+    places = numbers("bearings", bearings)
+    if isinstance(geometry.get("roads"), Mapping):
+        geometry["roads"] = _roads(geometry["roads"], len(places))
+    return _scenario(partial(Intersection, places, **geometry), density, given)
+
+
+@_shown
+def from_file(
+    path: AnyPath, density: float | None = None, node: str | None = None,
+    **options: Unpack[Options],
+) -> Scenario:  # fmt: skip
+    """A junction from a file: a node of a town's network, or a table in TOML.
+
+    `InputError` as `from_bearings`, or for a keyword of the geometry, which the file gives (only an
+    extract of OpenStreetMap needs a side); and what `junction_from` raises.
+    """
+    given: dict[str, Any] = dict(options)
+    side = given.pop("side", None)
+    for key in GEOMETRY:
+        if key in given:
+            raise InputError(f"{key} needs bearings; {path} has the whole junction")
+    name, intersection = junction_from(path, node, side)
+    return _scenario(lambda: intersection, density, {"name": name, **given})
+
+
+def _scenario(
+    junction: Callable[[], Intersection], density: float | None, given: dict[str, Any]
+) -> Scenario:
+    """A scenario from keywords that are not the geometry's."""
     for key in given:
         choice("keyword of a scenario", key, ("density", *Options.__annotations__))
     if density is not None:
         given["density"] = density
-    clash = [key for key in DRAWN if key in given]
-    if given.get("recorded") is not None and clash:
-        raise InputError(f"recorded replaces {', '.join(clash)}; give one or the other")
+    for whole in ("recorded", "demand"):
+        if given.get(whole) is not None:
+            refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in given))
+    day = given.pop("demand", None)
     if "min_headway" in given and given.get("model") != "shifted":
         raise InputError("min_headway needs the model 'shifted'")
     profile = given["profile"] = profile_named(given.get("profile", "paper"))
     if given.get("fleet") is not None:
         given["fleet"] = fleet_named(given["fleet"], profile.vehicle)
     unit = choice("unit", given.pop("unit", VEHICLES), (VEHICLES, *PCU))
-    bearings = numbers("bearings", bearings)
-    if isinstance(given.get("roads"), Mapping):
-        given["roads"] = _roads(given["roads"], len(bearings))
-    geometry, demand, rest = (
+    demand, rest = (
         {field.name: given[field.name] for field in fields(kind) if field.name in given}
-        for kind in _PARTS
+        for kind in (Demand, Scenario)
     )
+    if day is not None:
+        instance("demand", day, DemandProfile)
+        rest = {"horizon": day.duration, **rest}
     made = Scenario(
-        intersection=Intersection(bearings=bearings, **geometry),
-        demand=Demand(**{"density": DENSITY, **demand}),
+        intersection=junction(),
+        demand=day or Demand(**{"density": DENSITY, **demand}),
         **rest,
     )
     return made if unit == VEHICLES else _in_vehicles(made, unit)
@@ -156,21 +196,38 @@ def from_bearings(
 
 def _in_vehicles(scenario: Scenario, unit: str) -> Scenario:
     """The same scenario, with an inflow that was given in passenger car units as vehicles."""
+    demand = scenario.demand
     if scenario.fleet is None:
         raise InputError(f"unit {unit!r} needs a fleet, such as car:0.8,bus:0.2")
-    n = scenario.intersection.n
-    means = mean_pcu(scenario.fleet, unit, n)
-    rates = [rate / mean for rate, mean in zip(scenario.demand.rates(n), means, strict=True)]
-    split = scenario.demand.split if len(set(means)) == 1 else tuple(rates)
-    return replace(scenario, demand=replace(scenario.demand, density=sum(rates) / n, split=split))
+    assert isinstance(demand, Demand)  # a demand by time of day replaces the unit
+    means = mean_pcu(scenario.fleet, unit, scenario.intersection.n)
+    rates = [rate / mean for rate, mean in zip(scenario.rates, means, strict=True)]
+    split = demand.split if len(set(means)) == 1 else tuple(rates)
+    density = sum(rates) / len(scenario.intersection.approaches)
+    return replace(scenario, demand=replace(demand, density=density, split=split))
 
 
-def scenario_named(name: str, bearings: Sequence[float] | None = None, **options: Any) -> Scenario:
-    """The scenario of a command-line name: three-way, four-way, five-way, N-way or custom.
+def refuse_beside(whole: str, others: Iterable[str]) -> None:
+    """Raise `InputError` for other options beside one that replaces them."""
+    if clash := [other for other in others if other != whole]:
+        raise InputError(f"{whole} replaces {', '.join(clash)}; give one or the other")
 
-    `InputError` for an unknown name (with the nearest one), or only one of `custom` and bearings.
+
+def scenario_named(
+    name: str, bearings: Sequence[float] | None = None, node: str | None = None, **options: Any
+) -> Scenario:
+    """The scenario of a command-line name: three-way, four-way, five-way, N-way, custom or a file.
+
+    `InputError` for an unknown name (with the nearest one), only one of `custom` and bearings, or a
+    node without a file; and what `from_file` raises.
     """
     instance("scenario", name, str)
+    if is_junction_file(name):
+        if bearings is not None:
+            raise InputError(f"bearings need the scenario 'custom', not the file {name}")
+        return from_file(name, node=node, **options)
+    if node is not None:
+        raise InputError(f"node needs a town's network, such as town.net.xml, not {name!r}")
     if name == "custom":
         if bearings is None:
             raise InputError("scenario 'custom' needs bearings, such as 0,80,190,260")
@@ -186,7 +243,7 @@ def scenario_named(name: str, bearings: Sequence[float] | None = None, **options
     near = nearest(counts[0] if counts else name, [*counts, *makers, "custom"])
     raise InputError(
         f"unknown scenario {show(name)}; allowed: {', '.join(makers)}, N-way (such as 6-way), "
-        f"custom{near}"
+        f"custom, or a file such as junction.toml{near}"
     )
 
 

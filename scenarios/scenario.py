@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.clock import clock
 from minisim.control import Site
+from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, number
 from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
-from minisim.recorded import clock
 from scenarios.profiles import PAPER, Profile
 
 
@@ -18,7 +19,7 @@ class Scenario:
 
     name: str = text('such as "four-way"', label="scenario name")
     intersection: Intersection = part("the geometry", Intersection)
-    demand: Demand = part("what to draw arrivals from", Demand)
+    demand: Demand | DemandProfile = part("what to draw arrivals from", (Demand, DemandProfile))
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
     fleet: Fleet | None = part(
         "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
@@ -38,9 +39,7 @@ class Scenario:
         number("warmup [s]", self.warmup, below=self.horizon)
         n = self.intersection.n
         allowed = self.intersection.allowed_by_lane
-        self.demand.rates(n, allowed)
-        if self.demand.turns is not None and len(self.demand.turns) != n - 1:
-            raise InputError(f"turns has {len(self.demand.turns)} shares for {n - 1} manoeuvres")
+        self.demand.check(n, self.horizon, allowed)
         self.vehicles.check(n)
         if self.recorded is not None:
             self.recorded.check(n, allowed)
@@ -71,7 +70,7 @@ class Scenario:
     @property
     def density(self) -> float:
         """Mean inflow per lane [veh/h], as demanded or as recorded."""
-        if self.recorded is None:
+        if self.recorded is None and isinstance(self.demand, Demand):
             return self.demand.density
         return sum(self.rates) / len(self.intersection.approaches)
 
@@ -81,10 +80,12 @@ class Scenario:
         n = self.intersection.n
         if self.recorded is not None:
             return self.recorded.rates(n, self.horizon)
-        return self.demand.rates(n, self.intersection.allowed_by_lane)
+        return self.demand.inflow(n, self.intersection.allowed_by_lane).mean(0.0, self.horizon)
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
+        junction = self.intersection
+        varies = self.recorded is None and isinstance(self.demand, DemandProfile)
         return Site(
             intersection=self.intersection,
             fleet=self.vehicles,
@@ -92,6 +93,7 @@ class Scenario:
             demand=self.rates,
             dt=self.profile.dt,
             seed=seed,
+            inflow=self.demand.inflow(junction.n, junction.allowed_by_lane) if varies else None,
         )
 
     def arrivals(self, seed: int) -> Arrivals:

@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
-from minisim.arrivals import Demand
 from minisim.control import Controller
+from minisim.demand import MODELS, Demand, DemandProfile, Period
 from minisim.errors import InputError, MissingExtraError
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import entry_room
@@ -140,16 +140,38 @@ def fleets(draw: st.DrawFn, intersection: Intersection) -> Fleet:
 def demands(draw: st.DrawFn, n: int, max_density: float = 350.0) -> Demand:
     """Balanced or split demand on n lanes, uniform or uneven turns, every arrival model."""
 
-    def shares(count: int) -> st.SearchStrategy[tuple[float, ...] | None]:
-        some = st.lists(st.integers(0, 4), min_size=count, max_size=count).filter(any)
-        return st.none() | some.map(tuple)
-
     return Demand(
         density=draw(floats(20.0, max_density)),
         split=draw(shares(n)),
-        turns=draw(shares(n - 1)),
-        model=draw(st.sampled_from(["poisson", "exponential", "shifted"])),
+        turns=draw(turns(n)),
+        model=draw(st.sampled_from(MODELS)),
     )
+
+
+@st.composite
+def demand_profiles(draw: st.DrawFn, n: int, max_density: float = 350.0) -> DemandProfile:
+    """Demand on n lanes over up to 5 periods of up to 20 minutes, begun in any of them."""
+    edges = sorted(draw(st.sets(st.integers(0, 1200), min_size=2, max_size=6)))
+    rates = st.tuples(*[st.just(0.0) | floats(1.0, max_density)] * n)
+    return DemandProfile(
+        periods=tuple(
+            Period(start=start, end=end, rates=draw(rates), turns=draw(turns(n)))
+            for start, end in itertools.pairwise(edges)
+        ),
+        start=draw(st.integers(edges[0], edges[-1] - 1)),
+        model=draw(st.sampled_from(MODELS)),
+    )
+
+
+def turns(n: int) -> st.SearchStrategy[tuple[Any, ...] | None]:
+    """Shares of the manoeuvres of n arms: the same on every lane, or by lane."""
+    return shares(n - 1) | st.lists(shares(n - 1), min_size=n, max_size=n).map(tuple)
+
+
+def shares(count: int) -> st.SearchStrategy[tuple[float, ...] | None]:
+    """Shares, not all zero; None is equal ones."""
+    some = st.lists(st.integers(0, 4), min_size=count, max_size=count).filter(any)
+    return st.none() | some.map(tuple)
 
 
 @st.composite

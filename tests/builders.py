@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import math
 import os
 import signal
@@ -12,6 +13,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -371,3 +373,48 @@ def stored(path: Path) -> int:
     except FileError:
         assert not path.exists() or not path.stat().st_size, "never a broken store"
         return 0
+
+
+def town_text(
+    places: Mapping[str, tuple[float, float]],
+    *,
+    one_way: Sequence[str] = (),
+    lanes: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    missing: Sequence[tuple[str, str]] = (),
+    left: bool = False,
+    extra: str = "",
+) -> str:
+    """A network of SUMO: a node C in the origin, with straight roads to other places [m].
+
+    Edges are called like `aC` and `Ca`; of `one_way` ones there is no other. `lanes` gives edges
+    attributes for each of their lanes, in XML; connections in `missing` are left out.
+    """
+    edges, text = {}, []
+    for name, place in places.items():
+        edges |= {
+            f"{name}C": (name, "C", place, (0.0, 0.0)),
+            f"C{name}": ("C", name, (0, 0), place),
+        }
+    for edge in one_way:
+        edges.pop(edge[::-1])
+    for edge, (origin, target, start, end) in edges.items():
+        (x, y), (u, v) = start, end
+        length = math.dist(start, end)
+        dx, dy = (u - x) / length, (v - y) / length
+        side = 0.0 if edge in one_way else -1.6 if left else 1.6
+        cut = 7.2
+        begin, stop = (cut, length) if origin == "C" else (0.0, length - cut)
+        shape = " ".join(f"{x + dx * s + dy * side:.3f},{y + dy * s - dx * side:.3f}"
+                         for s in (begin, stop))  # fmt: skip
+        text.append(f'<edge id="{edge}" from="{origin}" to="{target}" name="{edge} street">')
+        common = f'speed="13.89" length="{stop - begin:.2f}" shape="{shape}"'
+        for k, own in enumerate(lanes.get(edge, [""])):
+            text.append(f'<lane id="{edge}_{k}" {common} {own}/>')
+        text.append("</edge>")
+    for name, (x, y) in {**places, "C": (0.0, 0.0)}.items():
+        text.append(f'<junction id="{name}" type="priority" x="{x}" y="{y}"/>')
+    for into, out_of in itertools.product(edges, edges):
+        if into[-1] == out_of[0] == "C" and (into, out_of) not in missing:
+            text.append(f'<connection from="{into}" to="{out_of}" fromLane="0" toLane="0"/>')
+    lefthand = ' lefthand="true"' if left else ""
+    return "\n".join([f"<net{lefthand}>", *text, extra, "</net>", ""])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from itertools import accumulate, count
+from itertools import accumulate, count, pairwise
 from numbers import Real
 from typing import Any
 
@@ -58,14 +59,21 @@ class FixedTime:
     )  # fmt: skip
     all_red: float = real("all-red after every amber", "s", low=0, high=60, default=0.0)
     order: tuple[int, ...] | None = lane_order()
+    plans: float | None = real(
+        "length of the periods of the run with greens of their own, for a demand that varies; each "
+        "begins when the last cycle before it ends; none is one plan for all", "s",
+        low=60, high=1e6, optional=True, default=None,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         if self.greens is not None:
-            websters = "lost_time", "equal_greens", "max_cycle"
+            websters = "lost_time", "equal_greens", "max_cycle", "plans"
             refuse_idle(self, "Webster's greens (greens=none)", *websters)
 
-    def timing(self, site: Site) -> SignalTiming:
+    def timing(self, site: Site, demand: Sequence[float] | None = None) -> SignalTiming:
         """The cycle and greens at this site, and each lane's degree of saturation there.
+
+        They are for the expected `demand` of the lanes [veh/h], by default the mean over the run.
 
         Raises `InputError` if the number of greens is not the number of lanes, `max_cycle` is too
         short, or `order` does not list every lane once.
@@ -73,11 +81,11 @@ class FixedTime:
         n, change = site.intersection.n, self.amber + self.all_red
         lost = change if self.lost_time is None else self.lost_time
         longer, flow = change - lost, self.saturation_flow
-        capped = False
+        capped, demand = False, site.demand if demand is None else demand
         if self.greens is None:
             lanes = site.intersection.approaches
             optimum = webster(
-                [site.demand[lane] for lane in lanes],
+                [demand[lane] for lane in lanes],
                 saturation_flow=flow, lost_time_per_phase=lost,
                 equal_greens=self.equal_greens, min_green=MIN_GREEN + max(longer, 0.0),
                 max_cycle=self.max_cycle,
@@ -91,11 +99,20 @@ class FixedTime:
         if len(greens) != n:
             raise InputError(f"greens has {len(greens)} values for {n} lanes")
         cycle = self._program(greens, site).cycle
-        return timing_of(greens, cycle, site.demand, flow, longer=longer, capped=capped)
+        return timing_of(greens, cycle, demand, flow, longer=longer, capped=capped)
+
+    def timings(self, site: Site) -> list[SignalTiming]:
+        """The timing of each plan, one after the other; a single one without `plans`."""
+        if self.plans is None or site.inflow is None:
+            return [self.timing(site)]
+        periods = math.floor(site.inflow.starts[-1] / self.plans) + 1
+        edges = [k * self.plans for k in range(periods + 1)]
+        return [self.timing(site, site.expected(*edge)) for edge in pairwise(edges)]
 
     def start(self, site: Site) -> FixedTimeSession:
         """Begin a run; raises `InputError` as `timing` does."""
-        return FixedTimeSession(site, self._program(self.timing(site).greens, site))
+        programs = [self._program(timing.greens, site) for timing in self.timings(site)]
+        return FixedTimeSession(site, Programs(programs, self.plans or math.inf))
 
     def _program(self, greens: Sequence[float], site: Site) -> Program:
         return Program(full_order(self.order, site.intersection), greens, self.amber, self.all_red)
@@ -136,12 +153,39 @@ class Program:
         return min(cycle * self.cycle + self._starts[k], (cycle + 1) * self.cycle)
 
 
-class FixedTimeSession:
-    """Shows a program; called when it switches, and when a vehicle clears the junction."""
+class Programs:
+    """Programs one after the other, each `length` [s] after the last or as soon as its cycle ends.
 
-    def __init__(self, site: Site, program: Program) -> None:
+    A program for less than a cycle of the one before is left out.
+    """
+
+    def __init__(self, programs: Sequence[Program], length: float) -> None:
+        self._starts, self._programs = [0.0], [programs[0]]
+        for k, program in enumerate(programs[1:], start=1):
+            begun, last = self._starts[-1], self._programs[-1]
+            start = begun + math.ceil((k * length - begun) / last.cycle) * last.cycle
+            if start < (k + 1) * length:
+                self._starts.append(start)
+                self._programs.append(program)
+
+    def colours(self, time: float) -> list[Colour]:
+        """What the heads of all lanes show from `time` [s] on."""
+        k = bisect_right(self._starts, time) - 1
+        return self._programs[k].colours(time - self._starts[k])
+
+    def next_switch(self, time: float) -> float:
+        """The first time after `time` at which a head may change [s]."""
+        k = bisect_right(self._starts, time) - 1
+        switch = self._starts[k] + self._programs[k].next_switch(time - self._starts[k])
+        return min([switch, *self._starts[k + 1 : k + 2]])
+
+
+class FixedTimeSession:
+    """Shows programs; called when it switches, and when a vehicle clears the junction."""
+
+    def __init__(self, site: Site, programs: Programs) -> None:
         self.plan = Plan(wake_on_clear=True, sight=stopping_sight(site))
-        self._program = program
+        self._programs = programs
         self._heads = Heads(site)
         # In SUMO, a switch acts on the move that ends at its time.
         self._early = site.dt if site.looks_out else 0.0
@@ -150,5 +194,8 @@ class FixedTimeSession:
     def decide(self, view: View) -> Iterable[Command]:
         """Turn the heads to what the program shows; a switch less than half a step away is due."""
         now = view.time + self._half_step + self._early
-        wanted = self._program.colours(now)
-        return [*self._heads.show(view, wanted), Wake(self._program.next_switch(now) - self._early)]
+        wanted = self._programs.colours(now)
+        return [
+            *self._heads.show(view, wanted),
+            Wake(self._programs.next_switch(now) - self._early),
+        ]

@@ -105,7 +105,7 @@ def zone_words(plan: Plan) -> dict[str, str]:
 def hold_lines(intersection: Intersection, plan: Plan) -> Floats:
     """Where vehicles without the right of way stop: one line per lane, shape (n, 2, 2) [m].
 
-    A lane on which no vehicle comes has one of no length.
+    The line of a lane on which no vehicle comes is NaN, and not drawn.
     """
     at = plan.hold_distance
     lines = np.array([lane_strip(intersection, i, at, at)[:2] for i in range(intersection.n)])

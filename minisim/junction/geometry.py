@@ -20,19 +20,16 @@ import numpy as np
 
 from minisim.errors import InputError, instance, items, number, numbers
 from minisim.fields import Takes
-from minisim.junction.curves import Curve, join
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
-from minisim.junction.paths import ARC_SEGMENTS, Floats, Path, Way
+from minisim.junction.paths import Path, Way
 from minisim.junction.roads import Road
+from minisim.junction.tracing import MIN_PATH_RADIUS, build_path, smallest_radius
 from minisim.parameters import Reals, checked, declared, part, real, word
 
 #: Smallest angle between two arms [deg].
 MIN_ANGLE = 30.0
 #: Kerb radius between neighbouring arms [m]; netconvert's default `radius` is also 4 m.
 KERB_RADIUS = 4.0
-#: Smallest radius of a path that a car can follow [m]: passenger cars turn within 5–6 m (AASHTO
-#: Green Book, design vehicle P: centre-line radius 6.4 m); the authors' 5-arm network has 4.5 m.
-MIN_PATH_RADIUS = 4.0
 
 
 @dataclass(frozen=True)
@@ -136,8 +133,7 @@ class Intersection:
         if self.junction_radius is None:
             object.__setattr__(self, "junction_radius", smallest)
         number("junction_radius [m]", self.junction_radius, above=0, below=min(self.lengths) - 10)
-        radii = map(self._radius, self.movements)
-        tightest = min(compress(radii, self.allowed))
+        tightest = min(smallest_radius(self, m) for m in compress(self.movements, self.allowed))
         if tightest < MIN_PATH_RADIUS - 1e-9:
             raise InputError(
                 f"junction_radius {self.junction_radius:g} m leaves a path of radius "
@@ -178,7 +174,7 @@ class Intersection:
         """The same by lane and manoeuvre, shape (n, n−1)."""
         return self.allowed.reshape(self.n, self.n - 1)
 
-    @property
+    @cached_property
     def approaches(self) -> tuple[int, ...]:
         """The arms from which some movement is allowed."""
         return tuple(np.unique(self.movements.origins[self.allowed]).tolist())
@@ -188,7 +184,7 @@ class Intersection:
         """The arms into which some movement is allowed."""
         return tuple(np.unique(self.movements.exits[self.allowed]).tolist())
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[float, ...]:
         """Distance from the centre to the far end of each arm's road [m]."""
         return tuple(road.length or self.arm_length for road in self._each_road)
@@ -210,7 +206,7 @@ class Intersection:
         each = zip(self.lane_widths, self.offsets, strict=True)
         return tuple(width if offset else width / 2.0 for width, offset in each)
 
-    @property
+    @cached_property
     def approach_length(self) -> float:
         """Distance from the far end of the longest approach lane to the junction entry [m].
 
@@ -247,7 +243,7 @@ class Intersection:
     @cached_property
     def paths(self) -> tuple[Path, ...]:
         """One path per movement, in the order of `movements`."""
-        return tuple(self._build_path(m) for m in self.movements)
+        return tuple(build_path(self, m) for m in self.movements)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
         """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²].
@@ -261,75 +257,6 @@ class Intersection:
     @property
     def _each_road(self) -> tuple[Road, ...]:
         return self.roads or (Road(),) * self.n
-
-    def _half_angle(self, movement: Movement) -> float:
-        """Half the clockwise angle from the arm of origin to the arm of exit [rad]."""
-        to = self.bearings[self.exit_arm(movement)]
-        return math.radians((to - self.bearings[movement.origin]) % 360.0) / 2.0
-
-    def _radius(self, movement: Movement) -> float:
-        """Smallest radius of a path [m]; at most 0 if one arc should do, and none can."""
-        if self._mirrored(movement):
-            return self._arc_radius(movement)
-        return self._curve(movement).radius
-
-    def _mirrored(self, movement: Movement) -> bool:
-        """Whether the lanes mirror each other, so that one arc joins them."""
-        return self.offsets[movement.origin] == self.offsets[self.exit_arm(movement)]
-
-    def _arc_radius(self, movement: Movement) -> float:
-        slope = math.tan(self._half_angle(movement))
-        offset = self.offsets[movement.origin] / slope
-        # From the entry to where the two lane centre lines meet.
-        tangent = self.junction_radius + (-offset if self.side == "left" else offset)
-        return tangent * min(abs(slope), 1e6)
-
-    def _ends(self, movement: Movement) -> tuple[Floats, Floats, Floats, Floats]:
-        """Position and unit heading at the entry, and at the exit."""
-        exit_arm, arms = self.exit_arm(movement), self.arms
-        heading_in, heading_out = (
-            -np.array(arms[movement.origin].outward),
-            np.array(arms[exit_arm].outward),
-        )
-        left_in, left_out = (np.array([-y, x]) for x, y in (heading_in, heading_out))
-        keep = 1.0 if self.side == "left" else -1.0
-        offset, offset_out = keep * self.offsets[movement.origin], keep * self.offsets[exit_arm]
-        start = -heading_in * self.junction_radius + left_in * offset
-        end = heading_out * self.junction_radius + left_out * offset_out
-        return start, heading_in, end, heading_out
-
-    def _curve(self, movement: Movement) -> Curve:
-        return join(*self._ends(movement), ARC_SEGMENTS + 1)
-
-    def _build_path(self, movement: Movement) -> Path:
-        exit_arm, entry = self.exit_arm(movement), self.approach_length
-        start, heading_in, end, heading_out = self._ends(movement)
-
-        # Clockwise turn: 0 for straight on, positive to the right.
-        turn = 2.0 * self._half_angle(movement) - math.pi
-        mirrored = self._mirrored(movement)
-        straight = mirrored and abs(turn) < 1e-4
-        radius = math.inf if straight else self._radius(movement)
-        t = np.linspace(0.0, 1.0, ARC_SEGMENTS + 1)[:, None]
-        if self.ways is not None:
-            way = self.ways[self.index(movement)]
-            length, points = way.length, way.resampled(ARC_SEGMENTS + 1)
-        elif straight:
-            length, points = float(np.linalg.norm(end - start)), start + (end - start) * t
-        elif not mirrored or radius < MIN_PATH_RADIUS - 1e-9:  # too tight only if not allowed
-            points, length, radius = self._curve(movement)
-        else:
-            length, angle = radius * abs(turn), t * abs(turn)
-            inward = math.copysign(1.0, turn) * (1.0 - np.cos(angle))
-            left_in = np.array([-heading_in[1], heading_in[0]])
-            points = start + radius * (np.sin(angle) * heading_in - inward * left_in)
-            points[-1] = end
-        return Path(
-            movement, exit_arm, entry=entry, exit=entry + length,
-            length=entry + length + (self.lengths[exit_arm] - self.junction_radius), radius=radius,
-            points=points, heading_in=heading_in, heading_out=heading_out,
-            start=entry - (self.lengths[movement.origin] - self.junction_radius),
-        )  # fmt: skip
 
     def _check_roads(self) -> None:
         if self.roads is not None and len(self.roads) != self.n:

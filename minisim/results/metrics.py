@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 RESERVED: Final = frozenset({
     "arms", "arrivals", "complete", "controller", "cpu_s", "density", "difference", "error",
     "failed", "growing", "horizon_s", "host", "kind", "kinds", "lane", "lanes", "manoeuvre",
-    "movements", "pairs", "profile", "recipe", "runs", "scenario", "seed", "side", "split",
-    "too_short", "turns", "vehicle", "version", "warmup_s",
+    "movements", "pairs", "profile", "recipe", "runs", "scenario", "seed", "side", "spillback_s",
+    "split", "too_short", "turns", "vehicle", "version", "warmup_s",
 })  # fmt: skip
 
 #: What trips can be grouped by -> the groups' key in a summary.
@@ -193,6 +193,12 @@ TABLE: Final = (
         "depart_delay_s", lambda trips: trips.depart_delay, "s", "trip", "trips", "queue",
         title="departure delay", symbol="D", meaning="from demand to insertion",
         equation=f"depart − demand {_TRIPINFO}", usual=True,
+    ),
+    Metric(
+        "control_delay_s", lambda trips: trips.time_loss + trips.depart_delay, "s", "trip", "trips",
+        "queue", title="control delay", symbol="d",
+        meaning="what the junction costs against driving on at the limit",
+        equation="time loss + departure delay; by it HCM 2016 grades the level of service",
     ),
     Metric(
         "collisions", lambda run: len(run.collisions), title="collisions",

@@ -16,11 +16,12 @@ LONGEST = 60
 
 
 def as_text(run: Run) -> str:
-    """What was run, its trips and its means, in three lines."""
+    """What was run, its trips and its means, in three lines; a fourth if queues spilled back."""
     summary = run.summary()
     shown = [(METRICS[name], _number(summary[name])) for name in MEANS]
     means = ", ".join(f"{metric.title} {value} {metric.unit}" for metric, value in shown)
-    return f"Run of {_what(summary)}\n  {_trips(summary)}\n  means: {means}"
+    lines = (f"Run of {_what(summary)}", _trips(summary), f"means: {means}", spilled(summary))
+    return "\n  ".join(filter(None, lines))
 
 
 def as_html(run: Run) -> str:
@@ -30,7 +31,8 @@ def as_html(run: Run) -> str:
     head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     lanes = "".join(_html_row(lane, means) for lane, means in summary["lanes"].items())
     return (
-        f"<div><p><strong>{escape(_what(summary))}</strong><br>{escape(_trips(summary))}</p>"
+        f"<div><p><strong>{escape(_what(summary))}</strong><br>{escape(_trips(summary))}"
+        f"{'<br>' if spilled(summary) else ''}{escape(spilled(summary))}</p>"
         f"<table><thead><tr>{head}</tr></thead><tbody>{lanes}{_html_row('all', summary)}"
         "</tbody></table></div>"
     )
@@ -55,6 +57,13 @@ def conditions(summary: Mapping[str, Any]) -> str:
         f"{summary['density']:g} veh/h/lane, profile {summary['profile']}, "
         f"seed {summary['seed']}, {summary['horizon_s']:g} s{warmup}{host}"
     )
+
+
+def spilled(summary: Mapping[str, Any]) -> str:
+    """Which queues reached the end of their road, and when; empty if none did."""
+    since = {lane: means["spillback_s"] for lane, means in summary["lanes"].items()}
+    told = [f"of lane {lane} at {time:g} s" for lane, time in since.items() if time is not None]
+    return f"the queue reached the end of the road {', '.join(told)}" if told else ""
 
 
 def _trips(summary: Mapping[str, Any]) -> str:

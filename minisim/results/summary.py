@@ -20,6 +20,7 @@ from minisim.results.metrics import (
     Metric,
     asked_metrics,
 )  # fmt: skip
+from minisim.results.spillback import spillback
 from minisim.results.trips import Ints, Trips
 
 if TYPE_CHECKING:
@@ -61,7 +62,8 @@ def summarise(
 
     The means at the top and in each group are in SUMO's form; those under `complete` are in the
     complete form. Trips are grouped by lane (`lanes`) and, if there are several, by kind (`kinds`)
-    and type (`types`).
+    and type (`types`). `spillback_s`, of each lane and of all, is when a queue first reached the
+    end of its road (`minisim.results.spillback`), None if none did.
 
     Args:
         run: what to measure, without the warm-up of its scenario (`Run.counted`).
@@ -74,6 +76,7 @@ def summarise(
     not recorded, a metric whose function raises or returns the wrong type or shape, or a
     controller's count that has the name of another number.
     """
+    full = spillback(run.columns, run.site.vehicle, float(run.scenario.warmup))
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]
@@ -84,7 +87,9 @@ def summarise(
     several = ["kinds"] * bool(run.kinds) + ["types"] * (len(run.site.types) > 1)
     for key in dict.fromkeys(("lanes", *several, *keys)):
         summary[key] = {name: measured.of(rows) for name, rows in _groups(run, key).items()}
-    summary["complete"] = complete
+    for lane, name in enumerate(summary["lanes"]):
+        summary["lanes"][name]["spillback_s"] = full.get(lane)
+    summary |= {"complete": complete, "spillback_s": min(full.values(), default=None)}
     summary |= {m.name: m.number(run) for m in table if m.per == "run" and m.needs != "trips"}
     for name in summary.keys() & run.counts.keys():
         if name not in METRICS or METRICS[name].needs != "counts":

@@ -4,7 +4,7 @@
 
     run = simulate(four_way(density=350), Dim(), seed=1)  # a Run, as minisim.simulate returns
 
-This package is the only one that knows about SUMO.
+This package is the only one that runs SUMO. `minisim.town` reads the format of its networks.
 """
 
 from __future__ import annotations

@@ -36,12 +36,14 @@ def animate(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
-    horizon: options.Horizon = 3600.0,
+    horizon: options.Horizon = None,
     arrivals: options.Arrivals = None,
+    demand: options.DemandFile = None,
     start: options.Start = None,
 ) -> None:  # fmt: skip
     """Write an animation of a run: which vehicles wait, have right of way, and cross."""
@@ -49,20 +51,19 @@ def animate(
     from figures.film.encode import animation_format
     from minisim.files import check_apart, check_file
     from scenarios.controllers import controller_named
-    from scenarios.profiles import profile_named
     from scenarios.recipe import Recipe
 
-    check_apart({"--arrivals": arrivals, "--out": out})
+    check_apart({"--arrivals": arrivals, "--demand": demand, "--out": out})
     animation_format(out)
     check_file(out)
-    number("--from [s]", begin, low=0, below=horizon)
-    number("--seconds", seconds, above=0, high=min(3600.0, horizon - begin))
-    frame_times(begin, seconds, fps, profile_named(profile).dt)
     junction = options.build_scenario(
-        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon,
+        profile=profile, side=side, node=node, horizon=horizon,
     )  # fmt: skip
+    number("--from [s]", begin, low=0, below=junction.horizon)
+    number("--seconds", seconds, above=0, high=min(3600.0, junction.horizon - begin))
+    frame_times(begin, seconds, fps, junction.profile.dt)
     who = controller_named(controller, profile)
     recipe = Recipe(junction, who, seed, humans, on_collision="record")
     end = begin + seconds

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,6 +16,9 @@ from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.options import option
 from scenarios.cli.shared.terminal import bar
+
+if TYPE_CHECKING:
+    from scenarios.scenario import Scenario
 
 #: What is compared by default, and with --quick.
 CONTROLLERS = ["dim", "fixed-time"]
@@ -44,7 +48,9 @@ def crossval(
     context: typer.Context,
     scenarios: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENARIO]...", help="three-way, four-way, five-way or N-way."),
+        typer.Argument(
+            metavar="[SCENARIO]...", help="three-way, four-way, five-way, N-way, or a file."
+        ),
     ] = None,
     controller: Annotated[
         list[str] | None,
@@ -65,27 +71,36 @@ def crossval(
     ] = None,
     seeds: Annotated[int | None, option("Runs per cell, 1 … 1000; 3, or 2 with --quick.")] = None,
     horizon: Annotated[float | None, option("Of each run; 3600, or 300 with --quick.", "S")] = None,
+    demand: options.DemandFile = None,
+    start: options.Start = None,
     replay: Annotated[
         bool,
         option("Replay published runs: their arrivals, vehicles and controllers; compare with the "
                "paper too. With another --profile only the arrivals are theirs.", None, "--replay"),
     ] = False,
+    node: options.Node = None,
     jobs: options.Jobs = None,
     out: options.Folder = Path("out/crossval"),
     quick: options.Quick = False,
 ) -> None:  # fmt: skip
     """Compare minisim, SUMO and the paper on common arrivals, trip by trip."""
+    from minisim.demandfile import read_demand
     from minisim.files import make_folder
     from minisim.sumo.host import sumo_home
     from scenarios.crossval import Case, crossvalidate, film, replayed_cases, write_report
     from scenarios.crossval.report import CSV, REPORT, summary
-    from scenarios.library import scenario_named
+    from scenarios.library import refuse_beside, scenario_named
     from scenarios.sweep.file import check_can_run
 
     options.check_distinct({
         "SCENARIO": scenarios, "--controller": controller, "--density": density, "--split": split,
     })  # fmt: skip
-    if horizon is None:
+    if demand is not None:
+        given = {"--replay": replay, "--density": density, "--split": split}
+        refuse_beside("--demand", [name for name, value in given.items() if value])
+    elif start is not None:
+        raise InputError("--start needs --demand: it is a time of day there")
+    if horizon is None and (quick or demand is None):
         horizon = 300.0 if quick else 3600.0
     who = controller or (["dim"] if replay else CONTROLLERS)
     densities = density or (QUICK_DENSITIES if quick else [] if replay else DENSITIES)
@@ -93,12 +108,20 @@ def crossval(
     if replay:
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
-        cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon)
+        if node is not None:
+            raise InputError("--node does not go with --replay: published junctions are no towns'")
+        cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon or 0.0)
     else:
-        profile = "fair" if profile is None else profile
-        make = partial(scenario_named, profile=profile, horizon=horizon)
-        cells = product(scenarios or ["four-way"], splits, who, densities)
-        cases = [Case(make(name, density=q, split=shares), it) for name, shares, it, q in cells]
+        more: dict[str, Any] = {} if horizon is None else {"horizon": horizon}
+        more |= {"node": node, "profile": profile or "fair"}
+        make: Callable[..., Scenario] = partial(scenario_named, **more)
+        where = scenarios or ["four-way"]
+        if demand is None:
+            cells = product(where, splits, who, densities)
+            cases = [Case(make(name, density=q, split=shares), it) for name, shares, it, q in cells]
+        else:
+            day = read_demand(demand, start)
+            cases = [Case(make(name, demand=day), it) for name, it in product(where, who)]
     count = (2 if quick else 3) if seeds is None else integer("--seeds", seeds, low=1, high=1000)
     numbers = range(1, 1 + count)
     workers = options.processes(jobs)

@@ -21,7 +21,7 @@ from scenarios.cli.shared.proof import answer, harmony_table, junction
 def harmony(
     scenario: options.ScenarioName,
     bearings: options.Bearings = None,
-    side: options.Side = "left",
+    side: options.Side = None,
     profile: options.ProfileName = "paper",
     clearance: Annotated[
         float, typer.Option(metavar="M", help="Room between the paths of two bodies in metres.")
@@ -38,10 +38,10 @@ def harmony(
         return
     facts = {
         "scenario": what.name,
-        "side": side,
+        "side": what.intersection.side,
         "clearance_m": clearance,
         "movements": list(matrix.movements.names),
         "harmony": matrix.values.astype(int).tolist(),
     }
-    title = Text(f"{what.name}, {side}-hand traffic: ● harmony, · conflict")
+    title = Text(f"{what.name}, {what.intersection.side}-hand traffic: ● harmony, · conflict")
     answer(as_json, facts, title, harmony_table(matrix))

@@ -63,7 +63,7 @@ def protocol(
                        "FILE.csv"),
     ] = None,
     bearings: options.Bearings = None,
-    side: options.Side = "left",
+    side: options.Side = None,
     profile: options.ProfileName = "paper",
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip

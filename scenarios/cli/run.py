@@ -23,8 +23,7 @@ _sumo = partial(option, rich_help_panel="SUMO")
     epilog="Means are over the trips that ended; [bold]with unfinished[/bold] counts all. Exit "
     "codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
     "[bold]minisim controllers[/bold].\n\n"
-    "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json\n\n"
-    "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
+    "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json"
 )
 def run(
     scenario: options.ScenarioName,
@@ -36,11 +35,12 @@ def run(
     unit: options.Unit = None,
     fleet: options.Fleet = None,
     profile: options.ProfileName = "paper",
-    side: options.Side = "left",
+    side: options.Side = None,
     bearings: options.Bearings = None,
+    node: options.Node = None,
     lane_width: options.LaneWidth = None,
     seed: options.Seed = 0,
-    horizon: options.Horizon = 3600.0,
+    horizon: options.Horizon = None,
     warmup: Annotated[float, option("Measure only after this.", "S")] = 0.0,
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
@@ -48,6 +48,7 @@ def run(
     by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
+    demand: options.DemandFile = None,
     start: options.Start = None,
     trips: Annotated[Path | None, _file("Write the trips (.csv, .parquet).")] = None,
     trajectories: Annotated[Path | None, _file("Write trajectories (.csv, .parquet).")] = None,
@@ -68,8 +69,8 @@ def run(
     from scenarios.sweep.rows import identity_of
 
     check_apart({
-        "--arrivals": arrivals, "--trips": trips, "--trajectories": trajectories, "--fcd": fcd,
-        "--sumo-fcd": sumo_fcd,
+        "--arrivals": arrivals, "--demand": demand, "--trips": trips,
+        "--trajectories": trajectories, "--fcd": fcd, "--sumo-fcd": sumo_fcd,
     })  # fmt: skip
     for table in filter(None, (trips, trajectories)):
         check_table(table)
@@ -88,9 +89,9 @@ def run(
         need = "needs" if len(refused) == 1 else "need"
         raise InputError(f"{' and '.join(refused)} {need} --host sumo")
     junction = options.build_scenario(
-        scenario, bearings, arrivals, start, density=density, split=split, turns=turns,
+        scenario, bearings, arrivals, start, demand, density=density, split=split, turns=turns,
         unit=unit, fleet=fleet, lane_width=lane_width,
-        profile=profile, side=side, horizon=horizon, warmup=warmup,
+        profile=profile, side=side, node=node, horizon=horizon, warmup=warmup,
     )  # fmt: skip
     recipe = Recipe(
         junction, controller_named(controller, profile), seed, humans,

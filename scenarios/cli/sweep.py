@@ -83,8 +83,8 @@ def sweep(
     horizon: Annotated[float | None, option("Simulated time; the file's, or 3600.", "S")] = None,
 ) -> None:
     """Run many experiments over seeds, and keep the results; stored runs are not repeated."""
-    from minisim.arrivals import MAX_TIME
     from minisim.files import check_apart, check_table, write_table
+    from minisim.inflow import MAX_TIME
     from scenarios.cli.shared.report import sweep_notes, sweep_table
     from scenarios.sweep.cells import cells
     from scenarios.sweep.cluster import cluster

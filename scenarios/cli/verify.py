@@ -18,7 +18,7 @@ def verify(
     scenario: options.ScenarioName,
     order: options.Order = "size",
     bearings: options.Bearings = None,
-    side: options.Side = "left",
+    side: options.Side = None,
     profile: options.ProfileName = "paper",
     plot: Plot = None,
     as_json: options.AsJson = False,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from minisim.arrivals import BALANCED, read_shares, shares_text
+from minisim.demand import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
 from scenarios import paper
@@ -67,12 +67,12 @@ class Case:
         """The demand's split, such as "4:3:2:1"; for a published run, the one in its label."""
         if self.published is not None:
             return self.published.split
-        return shares_text(self.scenario.demand.split, BALANCED)
+        return self.scenario.demand.words[0]
 
     @property
     def density(self) -> float:
         """Mean demanded inflow per lane [veh/h]."""
-        return self.scenario.demand.density
+        return self.scenario.density if self.published is None else self.published.density
 
     @property
     def name(self) -> str:

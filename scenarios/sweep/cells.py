@@ -28,7 +28,9 @@ CELL: Final = (
 SUMS: Final = ("trips", "unfinished", "collisions")
 
 #: Other columns of runs that are not metrics.
-OTHERS: Final = ("recipe", "host", "seed", "growing", "arrivals", "cpu_s", "version", "error")
+OTHERS: Final = (
+    "recipe", "host", "seed", "growing", "spillback_s", "arrivals", "cpu_s", "version", "error",
+)  # fmt: skip
 
 
 def cells(rows: pd.DataFrame) -> pd.DataFrame:
@@ -38,7 +40,8 @@ def cells(rows: pd.DataFrame) -> pd.DataFrame:
         `CELL`; the numbers of `runs` that succeeded and that `failed`; the sums `trips`,
         `unfinished` and `collisions`; the means of the columns `averaged`, with the half widths of
         the 95 % confidence interval (`…_ci95`) and of the 95 % prediction interval for one more run
-        (`…_pi95`), NaN if unknown; `growing` (`saturated`), `too_short` and the mean `cpu_s`.
+        (`…_pi95`), NaN if unknown; `growing` (`saturated`), `too_short`, `spillback` (whether a
+        queue reached the end of its road) and the mean `cpu_s`.
 
     Raises:
         InputError: rows of one cell that differ in more than their seed, or have the same seed.
@@ -140,7 +143,9 @@ def _averaged(good: pd.DataFrame) -> dict[str, object]:
             cell[f"{metric}_ci95"] = interval.half_width
             cell[f"{metric}_pi95"] = prediction_interval(values).half_width
     cpu = float(good["cpu_s"].mean())
-    return {**cell, "growing": saturated(good), "too_short": too_short(good), "cpu_s": cpu}
+    spilled = "spillback_s" in good and bool(good["spillback_s"].notna().any())
+    unsettled = {"growing": saturated(good), "too_short": too_short(good), "spillback": spilled}
+    return {**cell, **unsettled, "cpu_s": cpu}
 
 
 def saturated(good: pd.DataFrame) -> bool:

@@ -8,6 +8,7 @@
     # fleet = { car = 0.9, bus = 0.1 }  # shares of vehicle types, perhaps with unit = "pcu"
     # humans = [0, 0.2]                 # with controllers of DIM only
     # arrivals = "count.csv"            # a table to replay instead of density, split and turns,
+    # demand = "day.toml"               # or demand by time of day (`minisim.demandfile`)
     # start = "07:00"                   # from this time of day on
 
     [[experiment]]                      # the lines above apply here too
@@ -16,6 +17,9 @@
     [[experiment]]
     scenario = { name = "custom", label = "skewed", bearings = [0, 80, 190, 260] }
     controller = { name = "dim", label = "west first", priorities = [1, 2, 3, 0] }
+
+    [[experiment]]                      # a file, see `scenarios.junctions`; or a junction.toml
+    scenario = { name = "town.net.xml", node = "252016277" }
 
 Without one, the file is a block. A controller's table has a name, a label and parameters.
 """
@@ -33,7 +37,7 @@ from pathlib import Path
 from typing import Any
 
 from minisim import hosting
-from minisim.arrivals import MAX_TIME
+from minisim.demandfile import read_demand
 from minisim.errors import (
     FileError,
     InputError,
@@ -45,10 +49,12 @@ from minisim.errors import (
     show,
 )
 from minisim.files import read_file
+from minisim.inflow import MAX_TIME
 from minisim.recorded import read_arrivals
 from scenarios.controllers import controller_named
 from scenarios.defaults import AXES, CUSTOM, SINGLE
-from scenarios.library import DRAWN, scenario_named
+from scenarios.junctions import is_junction_file
+from scenarios.library import DRAWN, refuse_beside, scenario_named
 from scenarios.loading import metrics_named
 from scenarios.recipe import Recipe
 from scenarios.scenario import Scenario
@@ -62,7 +68,10 @@ MAX_RUNS = 1_000_000
 SHARES = ("split", "turns")
 
 #: Keys of a scenario's table.
-JUNCTION = ("name", "label", "bearings", "lane_width", "junction_radius", "arm_length")
+JUNCTION = (
+    "name", "label", "bearings", "lane_width", "junction_radius", "arm_length", "roads",
+    "forbidden", "node",
+)  # fmt: skip
 
 
 def read_experiments(
@@ -125,9 +134,12 @@ def check_can_run(recipes: Iterable[Recipe]) -> None:
 
 def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
     """Every combination of a block."""
-    if "arrivals" in block and (clash := [key for key in DRAWN if key in block]):
-        raise InputError(f"arrivals replaces {', '.join(clash)}; give one or the other")
+    for whole in ("arrivals", "demand"):
+        if whole in block:
+            refuse_beside(whole, (key for key in ("demand", *DRAWN) if key in block))
     axes = {key: _listed(key, block.get(key, default)) for key, default in AXES.items()}
+    if "side" not in block:  # a file of a junction has its own
+        axes["side"] = [None]
     if "min_headway" in block and "shifted" not in axes["model"]:
         raise InputError("min_headway needs the model 'shifted'")
     seeds = axes["seeds"] = _seeds(block.get("seeds", AXES["seeds"]))
@@ -150,16 +162,25 @@ def _recipes(block: Mapping[str, Any], folder: Path) -> Iterator[Recipe]:
 
 def _scenario(chosen: dict[str, Any], folder: Path) -> Scenario:
     recorded, start = chosen.pop("arrivals"), chosen.pop("start")
-    if recorded is None and start is not None:
-        raise InputError("start needs arrivals: it is a time in the table")
-    if chosen["model"] != "shifted":
+    if recorded is None and chosen["demand"] is None and start is not None:
+        raise InputError("start needs arrivals or demand: it is a time of day there")
+    if chosen["demand"] is not None:
+        instance("demand", chosen["demand"], str)
+        chosen["demand"] = read_demand(folder / chosen["demand"], start)
+        chosen = {key: value for key, value in chosen.items() if key not in DRAWN}
+    elif chosen["model"] != "shifted":
         del chosen["min_headway"]
+    for key in ("side", "horizon"):
+        if chosen[key] is None:
+            del chosen[key]
     with _at("scenario"):
         junction = _table(chosen.pop("scenario"))
         label = junction.pop("label", "")
         _check_keys("key of a scenario", junction, JUNCTION)
         if junction["name"] == "custom" and "bearings" not in junction:
             raise InputError(f"custom needs bearings, such as scenario = {CUSTOM}")
+        if isinstance(junction["name"], str) and is_junction_file(junction["name"]):
+            junction["name"] = str(folder / junction["name"])
     made = scenario_named(**junction, **chosen)
     if recorded is not None:
         instance("arrivals", recorded, str)

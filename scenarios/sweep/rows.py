@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from minisim.arrivals import BALANCED, UNIFORM, shares_text
 from minisim.errors import MinisimError
 from minisim.junction.movements import ARM_NAMES
 from minisim.results.run import environment
@@ -35,8 +34,8 @@ class Outcome(NamedTuple):
 def identity_of(recipe: Recipe) -> Row:
     """The columns that say what was run."""
     scenario = recipe.scenario
-    demand, intersection = scenario.demand, scenario.intersection
-    recorded = scenario.recorded is not None
+    intersection, recorded = scenario.intersection, scenario.recorded is not None
+    split, turns = ("recorded", "recorded") if recorded else scenario.demand.words
     return {
         "controller": recipe.name,
         "scenario": scenario.name,
@@ -45,8 +44,8 @@ def identity_of(recipe: Recipe) -> Row:
         "profile": scenario.profile.name,
         "fleet": str(scenario.vehicles),
         "density": scenario.density,
-        "split": "recorded" if recorded else shares_text(demand.split, BALANCED),
-        "turns": "recorded" if recorded else shares_text(demand.turns, UNIFORM),
+        "split": split,
+        "turns": turns,
         "seed": recipe.seed,
         "horizon_s": scenario.horizon,
         "warmup_s": scenario.warmup,

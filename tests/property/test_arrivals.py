@@ -12,11 +12,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.demand import Demand, DemandProfile, Period
+from minisim.demandfile import read_demand, write_demand
 from minisim.errors import FileError
 from minisim.recorded import read_arrivals, write_arrivals
 from minisim.streams import stream
-from scenarios.strategies import demands, floats
+from scenarios.strategies import demand_profiles, demands, floats
 
 N = 4
 
@@ -103,3 +105,76 @@ def test_ranks_count_the_vehicles_of_each_lane(table: Arrivals) -> None:
 def test_different_seeds_give_different_streams(one: int, other: int) -> None:
     same = stream(one, "arrivals").bytes(16) == stream(other, "arrivals").bytes(16)
     assert same == (one == other)
+
+
+@given(demand_profiles(N), st.integers(0, 2**32), st.data())
+def test_what_comes_before_a_time_does_not_depend_on_what_comes_after(
+    demand: DemandProfile, seed: int, data: st.DataObject
+) -> None:
+    """Other rates and turns, or more of the same, from a period on."""
+    k = data.draw(st.integers(0, len(demand.ahead) - 1))
+    one, other = demand.ahead[k], data.draw(demand_profiles(N)).periods[0]
+    changed = replace(one, rates=other.rates, turns=other.turns)
+    more = Period(start=demand.periods[-1].end, end=10_000, rates=other.rates, turns=other.turns)
+    periods = (*(changed if it is one else it for it in demand.periods), more)
+    until = float(max(one.start - demand.start, 0))
+    mine, theirs = (
+        [row for row in rows(it.draw(N, demand.duration, seed)) if row[0] < until]
+        for it in (demand, replace(demand, periods=periods))
+    )
+    assert mine == theirs
+
+
+@given(demand_profiles(N), st.integers(0, 2**32), st.integers(0, N - 1), floats(0.0, 300.0))
+def test_the_profile_of_a_lane_changes_no_other(
+    demand: DemandProfile, seed: int, lane: int, rate: float
+) -> None:
+    def other(period: Period) -> Period:
+        rates = tuple(rate if k == lane else it for k, it in enumerate(period.rates))
+        return replace(period, rates=rates)
+
+    changed = replace(demand, periods=tuple(map(other, demand.periods)))
+    mine, theirs = (
+        [row for row in rows(it.draw(N, demand.duration, seed)) if row[1] != lane]
+        for it in (demand, changed)
+    )
+    assert mine == theirs
+
+
+@given(demand_profiles(N), st.integers(0, 2**32), st.data())
+def test_a_period_divided_into_two_draws_the_same(
+    demand: DemandProfile, seed: int, data: st.DataObject
+) -> None:
+    """So a profile that is always the same is a constant demand."""
+    one = data.draw(
+        st.sampled_from([it for it in demand.periods if it.end - it.start > 1] or [None])
+    )
+    if one is None:
+        return
+    middle = data.draw(st.integers(one.start + 1, one.end - 1))
+    halves = (replace(one, end=middle), replace(one, start=middle))
+    periods = [half for it in demand.periods for half in (halves if it is one else (it,))]
+    mine, theirs = (
+        rows(it.draw(N, demand.duration, seed))
+        for it in (demand, replace(demand, periods=tuple(periods)))
+    )
+    np.testing.assert_allclose(mine, theirs, rtol=1e-9)  # headways differ by rounding
+
+
+@given(demand_profiles(N), st.floats(0.0, 4000.0), st.floats(0.0, 4000.0))
+def test_the_mean_inflow_is_that_of_all_seconds(
+    demand: DemandProfile, first: float, length: float
+) -> None:
+    inflow = demand.inflow(N)
+    whole = np.array(inflow.mean(first, first + length)) * length
+    parts = [np.array(inflow.mean(a, a + length / 7)) * length / 7
+             for a in first + length / 7 * np.arange(7)]  # fmt: skip
+    np.testing.assert_allclose(whole, np.sum(parts, axis=0), atol=1e-6)
+
+
+@given(demand_profiles(N))
+def test_writing_and_reading_demand_changes_nothing(demand: DemandProfile) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "day.toml"
+        write_demand(demand, path)
+        assert read_demand(path) == demand

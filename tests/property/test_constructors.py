@@ -18,8 +18,9 @@ import scenarios
 from baselines import webster, webster_delay
 from dim import HarmonyMatrix, explain
 from minisim import simulate
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
 from minisim.control import Marking, Site, Unregulated
+from minisim.demand import Demand
 from minisim.errors import MinisimError
 from minisim.junction.geometry import Intersection
 from minisim.parameters import parameters

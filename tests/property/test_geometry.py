@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from minisim.control import Site
 from minisim.errors import InputError
 from minisim.junction.conflicts import conflicts, corridor, entry_room
-from minisim.junction.geometry import MIN_PATH_RADIUS, Intersection
+from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.junction.partings import branch
+from minisim.junction.tracing import MIN_PATH_RADIUS
 from minisim.vehicle import VehicleType
 from scenarios.strategies import bearings, floats, intersections, vehicles
 from tests.builders import share

@@ -26,7 +26,8 @@ def option(help: str, metavar: str | None = None, *flags: str, **more: Any) -> A
 
 
 ScenarioName = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom.")
+    str,
+    typer.Argument(metavar="SCENARIO", help="three-way, four-way, 6-way, …, custom; or a file."),
 ]
 ControllerName = Annotated[
     str, option("What decides: dim, dim:gate=harmonious, …", "SPEC", "--controller", "-c")
@@ -43,10 +44,11 @@ LaneWidth = Annotated[float | None, option("Width of every lane; 3.2 by default.
 ProfileName = Annotated[
     str, option("Vehicle and speeds: paper, fair, as_run.", "NAME", "--profile", "-p")
 ]
-Side = Annotated[str, option("Traffic keeps left or right.", "SIDE")]
+Side = Annotated[str | None, option("Traffic keeps left (the default) or right.", "SIDE")]
+Node = Annotated[str | None, option("Of a town's network; see minisim junction.", "ID")]
 Bearings = Annotated[str | None, option("Custom's arms, from north.", "0,90,…")]
 Seed = Annotated[int, option("Seed of the arrivals; 0 by default.", "N", "--seed", "-s")]
-Horizon = Annotated[float, option("Simulated time; 3600 by default.", "S")]
+Horizon = Annotated[float | None, option("Simulated time; 3600 by default.", "S")]
 Order = Annotated[
     str,
     typer.Option(
@@ -73,7 +75,13 @@ Arrivals = Annotated[
            rich_help_panel=FILES),
 ]  # fmt: skip
 
-Start = Annotated[str | None, option("Begin here in the table.", "07:00", rich_help_panel=FILES)]
+DemandFile = Annotated[
+    Path | None,
+    option("Draw from these rates by time of day.", "FILE", "--demand", parser=_file_name,
+           rich_help_panel=FILES),
+]  # fmt: skip
+
+Start = Annotated[str | None, option("Begin here in the file.", "07:00", rich_help_panel=FILES)]
 
 
 def processes(jobs: int | None) -> int:
@@ -90,18 +98,28 @@ def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
 
 
 def build_scenario(
-    name: str, bearings: str | None, file: Path | None = None, start: str | None = None, **more: Any
+    name: str,
+    bearings: str | None,
+    file: Path | None = None,
+    start: str | None = None,
+    demand: Path | None = None,
+    **more: Any,
 ) -> Scenario:
     """The scenario that the options describe; None means not given."""
+    from minisim.demandfile import read_demand
     from minisim.recorded import read_arrivals
-    from scenarios.library import scenario_named
+    from scenarios.library import refuse_beside, scenario_named
 
     given = {key: value for key, value in more.items() if value is not None}
-    clash = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
-    if file is not None and clash:
-        raise InputError(f"--arrivals replaces {', '.join(clash)}; give one or the other")
-    if file is None and start is not None:
-        raise InputError("--start needs --arrivals: it is a time in the table")
+    drawn = [f"--{key}" for key in ("density", "split", "turns", "unit") if key in given]
+    if demand is not None:
+        refuse_beside("--demand", drawn)
+        given["demand"] = read_demand(demand, start)
+        drawn = ["--demand"]
+    if file is not None:
+        refuse_beside("--arrivals", drawn)
+    elif demand is None and start is not None:
+        raise InputError("--start needs --arrivals or --demand: it is a time of day there")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
     if file is None:
         return made

@@ -37,7 +37,7 @@ Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", call
 
 
 def junction(
-    name: str, bearings: str | None, side: str, profile: str, clearance: float = CLEARANCE
+    name: str, bearings: str | None, side: str | None, profile: str, clearance: float = CLEARANCE
 ) -> tuple[Scenario, HarmonyMatrix]:
     """A scenario and the harmony matrix of its movements."""
     from dim import HarmonyMatrix

@@ -9,8 +9,10 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from minisim.clock import time_of_day
+from minisim.junction.movements import ARM_NAMES
 from minisim.results.metrics import GROUPS, METRICS, SPREAD, Metric, asked_metrics, heading
-from minisim.results.show import conditions
+from minisim.results.show import conditions, spilled
 from scenarios.statistics import FILLING, Interval
 from scenarios.sweep.cells import SUMS
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from figures.studies.shared.section import Item
+    from minisim.counts import Count
     from scenarios.recipe import Recipe
 
 #: The closest calls, which are printed for every run.
@@ -40,6 +43,8 @@ def run_parts(
     what = f"{summary['scenario']}, {summary['controller']}"
     yield Text.assemble((what, "bold"), f": {conditions(summary)}")
     yield _run_table(summary, metrics, by)
+    if told := spilled(summary):
+        yield Text(f"  {told}", "yellow")
     yield _safety(summary)
     if counts:
         yield Text("  " + "   ".join(_counted(name, value) for name, value in counts.items()))
@@ -135,6 +140,7 @@ def sweep_table(cells: pd.DataFrame, experiments: Iterable[Recipe]) -> Table:
         unfinished = f"{cell['unfinished'] / cell['trips']:.0%}" if cell["trips"] else "–"
         collisions = Text(f"{cell['collisions']:.0f}", "bold red" if cell["collisions"] else "")
         unsettled = "too short" if cell["too_short"] else "growing" if cell["growing"] else ""
+        unsettled += f"{', ' * bool(unsettled)}spill-back" if cell["spillback"] else ""
         table.add_row(*named, *means, unfinished, collisions, Text(unsettled, "yellow"))
     return table
 
@@ -146,6 +152,8 @@ def sweep_notes(rows: pd.DataFrame, cells: pd.DataFrame, experiments: Sequence[R
         f"simulate {FILLING:g} travel times or more.",
         "growing": "growing: queues had not settled by the horizon; a mean delay there says how "
         "long was simulated.",
+        "spillback": "spill-back: in a run or more, a queue reached the end of its road; vehicles "
+        "then wait before it (departure delay), not on it.",
     }
     notes = [text for key, text in meanings.items() if key in cells and cells[key].eq(True).any()]
     text = Text("\n").join(Text(f"  {note}") for note in (*notes, *_capped(experiments)))
@@ -168,7 +176,8 @@ def _capped(experiments: Sequence[Recipe]) -> Iterable[str]:
         f"Webster's capacity; the cycle is capped at {signal.max_cycle:g} s."
         for experiment in experiments
         for signal, scenario in [(experiment.controller, experiment.scenario)]
-        if isinstance(signal, FixedTime) and signal.timing(scenario.site()).capped
+        if isinstance(signal, FixedTime)
+        and any(it.capped for it in signal.timings(scenario.site()))
     )
 
 
@@ -191,3 +200,51 @@ def _means(means: Mapping[str, Any], columns: Iterable[str]) -> list[str]:
 
 def _seconds(value: float | None, unit: str = "") -> str:
     return "–" if value is None else f"{value if isinstance(value, int) else f'{value:.2f}'}{unit}"
+
+
+def count_facts(count: Count) -> dict[str, Any]:
+    """What was understood of a count, and what was left out."""
+    movements = {
+        f"{lane}{turn}": total
+        for lane, row in zip(ARM_NAMES, count.vehicles.sum((0, 3)).tolist(), strict=False)
+        for turn, total in enumerate(row, start=1)
+    }
+    return {
+        "arms": dict(zip(ARM_NAMES, count.arms, strict=False)),
+        "intervals": len(count.edges) - 1,
+        "from": time_of_day(count.edges[0]),
+        "until": time_of_day(count.edges[-1]),
+        "vehicles": float(count.vehicles.sum()),
+        "movements": movements,
+        "types": dict(zip(count.types, count.vehicles.sum((0, 1, 2)).tolist(), strict=True)),
+        "classes": dict(count.classes),
+        "fleet": count.fleet,
+        "left_out": dict(count.left_out),
+        "notes": list(count.notes),
+    }
+
+
+def count_parts(count: Count) -> Iterator[Text | Table]:
+    """The same as text: sums by arm and movement, by class, and what was left out."""
+    facts = count_facts(count)
+    yield Text.assemble(
+        (count.name, "bold"), f": {facts['vehicles']:g} vehicles, {facts['from']}-{facts['until']},"
+        f" {facts['intervals']} intervals",
+    )  # fmt: skip
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("lane")
+    table.add_column("arm")
+    for turn in range(1, len(count.arms)):
+        table.add_column(f"manoeuvre {turn}", justify="right")
+    table.add_column("all", justify="right")
+    for lane, arm in facts["arms"].items():
+        row = [facts["movements"][f"{lane}{turn}"] for turn in range(1, len(count.arms))]
+        table.add_row(lane, arm, *(f"{total:g}" for total in (*row, sum(row))))
+    yield table
+    for kind, total in facts["types"].items():
+        said = ", ".join(name for name, it in count.classes.items() if it == kind)
+        yield Text(f"  {kind} ({said}): {total:g}")
+    for what, total in facts["left_out"].items():
+        yield Text(f"  left out: {total:g} {what}", "yellow")
+    for note in facts["notes"]:
+        yield Text(f"  {note}", "dim")

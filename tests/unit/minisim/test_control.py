@@ -46,11 +46,14 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
     [
         ({"demand": (1.0, 2.0)}, "demand must be 4 numbers"),
         ({"demand": (1.0, 2.0, 3.0, -1.0)}, "demand must be 4 numbers"),
-        ({"vehicle": VehicleType(length=12.0, width=2.5)}, r"12 × 2\.5 m do not fit lanes of 3\.2"),
-        ({"vehicle": VehicleType(width=3.3)}, "do not fit lanes"),
+        (
+            {"fleet": VehicleType(length=12.0, width=2.5)},
+            r"12 × 2\.5 m \(car\) do not fit lanes of 3\.2",
+        ),
+        ({"fleet": VehicleType(width=3.3)}, "do not fit lanes"),
         (
             {
-                "vehicle": VehicleType(length=12.0),
+                "fleet": VehicleType(length=12.0),
                 "intersection": Intersection(
                     FOUR.bearings, lane_width=6.0, junction_radius=20.0, arm_length=31.0
                 ),
@@ -60,7 +63,7 @@ def test_conflicts_leave_out_movements_of_one_arm() -> None:
     ],
 )
 def test_sites_are_checked(change: dict[str, object], message: str) -> None:
-    options = {"intersection": FOUR, "vehicle": VehicleType(), "speed_limit": 14.0}
+    options = {"intersection": FOUR, "fleet": VehicleType(), "speed_limit": 14.0}
     with pytest.raises(InputError, match=message):
         Site(**{**options, "demand": (350.0,) * 4, **change})  # type: ignore[arg-type]
 

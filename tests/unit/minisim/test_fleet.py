@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from minisim.arrivals import Demand
+from minisim.demand import Demand
 from minisim.errors import InputError
 from minisim.fleet import MIXES, PCU, TYPES, Fleet, fleet_named, mean_pcu, pcu_factors
 from minisim.vehicle import CruiseVehicle, VehicleType

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
+from minisim.demand import Demand
 from minisim.errors import FileError, InputError
 from minisim.recorded import read_arrivals, write_arrivals
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import scenarios
-from minisim.arrivals import Demand
+from minisim.demand import Demand, DemandProfile, Period
 from minisim.errors import InputError
 from scenarios.library import (
     Options,
@@ -72,6 +73,30 @@ def test_recorded_arrivals_replace_the_demand() -> None:
         four_way(100, split="4:3:2:1", recorded=recorded)
     with pytest.raises(InputError, match="min_headway needs the model 'shifted'"):
         four_way(min_headway=2.0)
+
+
+def test_demand_by_time_of_day_replaces_the_constant_one_and_gives_the_horizon() -> None:
+    half = Period(start=0, end=1800, rates=(100, 0, 200), turns="1:3")
+    day = DemandProfile(periods=(half, replace(half, start=1800, end=3600, rates=(300, 0, 0))))
+    scenario = three_way(demand=day)
+    assert scenario.horizon == 3600.0
+    assert scenario.rates == pytest.approx((200, 0, 100))
+    assert scenario.density == pytest.approx(100)
+    site = scenario.site(1)
+    assert site.expected(0, 1800) == (100, 0, 200)
+    assert site.expected(900, 2700) == pytest.approx((200, 0, 100))
+    assert three_way(demand=day, horizon=1800).site(1).demand == (100, 0, 200)
+    assert three_way(100).site(1).expected(900, 2700) == (100, 100, 100)
+    with pytest.raises(InputError, match="demand replaces density, split; give one or the"):
+        three_way(100, demand=day, split="1:1:1")
+    with pytest.raises(InputError, match="recorded replaces demand"):
+        three_way(demand=day, recorded=scenario.arrivals(1))
+    with pytest.raises(InputError, match="'profile' has 3 lanes, the junction has 4"):
+        four_way(demand=day)
+    with pytest.raises(InputError, match="ends 3600 s after the start, before the run of 3601 s"):
+        three_way(demand=day, horizon=3601)
+    with pytest.raises(InputError, match="demand must be a DemandProfile"):
+        three_way(demand="day.toml")
 
 
 @pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])
@@ -136,9 +161,9 @@ def test_scenarios_have_the_names_of_the_command_line() -> None:
     ("name", "message"),
     [
         ("four_way", "unknown scenario 'four_way'.*did you mean 'four-way'"),
-        ("4way", r"N-way \(such as 6-way\), custom; did you mean '4-way'"),
+        ("4way", r"N-way \(such as 6-way\), custom, or .*; did you mean '4-way'"),
         ("4-ways", "did you mean '4-way'"),
-        ("junction", r"custom$"),
+        ("junction", r"custom, or a file such as junction.toml$"),
         ("9" * 5000, "unknown scenario"),
         ("2-way", "number of arms must be an integer 3 … 12, got 2"),
         ("-way", "unknown scenario"),

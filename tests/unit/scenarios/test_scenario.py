@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from minisim import simulate
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
 from minisim.control import Unregulated
+from minisim.demand import Demand
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.vehicle import VehicleType

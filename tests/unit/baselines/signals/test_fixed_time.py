@@ -12,12 +12,17 @@ import pytest
 
 import minisim
 from baselines import FixedTime
+from baselines.signals.fixed_time import Program, Programs
+from baselines.signals.heads import Colour
 from baselines.signals.webster import MIN_GREEN, webster
+from minisim import simulate
 from minisim.control import View
+from minisim.demand import DemandProfile, Period
 from minisim.errors import InputError
 from minisim.results.safety import safety_summary
 from minisim.testing import drained, small_scenario
 from minisim.vehicle import VehicleType
+from scenarios import Scenario
 from scenarios.library import four_way
 from tests.builders import drive, replayed, said, seen
 
@@ -192,3 +197,47 @@ def test_waiting_grows_with_the_red() -> None:
     waiting = minisim.simulate(scenario, FixedTime(greens=green), 1).summary()["waiting_time_s"]
     red = cycle - green
     assert waiting == pytest.approx(red * red / (2 * cycle), rel=0.15)
+
+
+def day(*rates: float, length: int = 3600) -> Scenario:
+    """Periods of this length, in which lane a has these inflows and all others 100 veh/h."""
+    starts = range(0, length * len(rates), length)
+    periods = [Period(start=s, end=s + length, rates=(r, 100.0, 100.0, 100.0))
+               for s, r in zip(starts, rates, strict=True)]  # fmt: skip
+    return four_way(demand=DemandProfile(periods=tuple(periods)), profile="fair")
+
+
+def test_each_plan_has_websters_greens_for_the_demand_of_its_time() -> None:
+    site = day(100.0, 700.0, 300.0).site()
+    signal = FixedTime(plans=7200)
+    for timing, rate in zip(signal.timings(site), (400.0, 300.0), strict=True):
+        alone = replace(site, demand=(rate, 100.0, 100.0, 100.0), inflow=None)
+        assert timing == FixedTime().timing(alone)
+    assert FixedTime().timings(site) == [FixedTime().timing(site)]
+    assert len(FixedTime(plans=7200).timings(replace(site, inflow=None))) == 1
+
+
+def test_a_plan_begins_when_the_cycle_before_it_ends() -> None:
+    cycle = Program((0, 1), (10.0, 20.0), 2.0, 0.0), Program((0, 1), (30.0, 5.0), 2.0, 0.0)
+    programs = Programs(cycle, 100.0)  # cycles of 34 s, then 39 s: the second begins at 102 s
+    assert programs.colours(99.0) == [Colour.RED, Colour.GREEN] == cycle[0].colours(99.0)
+    assert programs.colours(101.0) == [Colour.RED, Colour.AMBER]
+    assert programs.next_switch(101.0) == 102.0
+    assert programs.colours(102.0) == [Colour.GREEN, Colour.RED]
+    assert programs.next_switch(102.0) == 132.0
+    assert programs.colours(102.0 + 39.0 * 50 + 33.0) == cycle[1].colours(33.0)
+
+
+def test_plans_shorter_than_a_cycle_are_left_out() -> None:
+    long, short = Program((0, 1), (100.0, 100.0), 2.0, 0.0), Program((0, 1), (5.0, 5.0), 2.0, 0.0)
+    programs = Programs([long, short, short, short, long], 60.0)
+    assert programs.next_switch(203.0) == 204.0  # the fourth begins: its 180 … 240 s hold 204 s
+    assert programs.colours(204.0 + 6.0) == [Colour.AMBER, Colour.RED]
+
+
+def test_plans_of_a_constant_demand_change_nothing() -> None:
+    always = day(200.0, 200.0, 200.0, length=600)
+    runs = [simulate(always, FixedTime(plans=plans), 1) for plans in (None, 600.0)]
+    assert runs[0].trips.equals(runs[1].trips)
+    with pytest.raises(InputError, match="plans has an effect only with Webster's greens"):
+        FixedTime(greens=20, plans=600)

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from minisim.arrivals import Arrivals, Demand
+from minisim.arrivals import Arrivals
 from minisim.control import Site
+from minisim.demand import Demand
 from minisim.engine.state import build_vehicles
 from minisim.vehicle import VehicleType
 from scenarios import four_way

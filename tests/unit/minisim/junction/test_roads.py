@@ -9,8 +9,9 @@ import pytest
 
 from minisim.control import Site
 from minisim.errors import InputError
-from minisim.junction.geometry import MIN_PATH_RADIUS, Intersection
+from minisim.junction.geometry import Intersection
 from minisim.junction.roads import Road
+from minisim.junction.tracing import MIN_PATH_RADIUS
 from minisim.vehicle import VehicleType
 from scenarios import four_way, from_bearings
 

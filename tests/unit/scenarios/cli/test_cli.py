@@ -361,6 +361,24 @@ def test_a_run_begins_at_a_time_of_day(capsys: Captured, tmp_path: Path) -> None
         assert "--start needs --arrivals" in fails(capsys, *command, "--start", "07:00")
 
 
+def test_a_run_draws_from_demand_by_time_of_day(capsys: Captured, tmp_path: Path) -> None:
+    day = tmp_path / "day.toml"
+    quarter = '[[period]]\nstart = "07:{}"\nend = "07:{}"\nrates = [{}, 0, 0]\nturns = "1:0"\n'
+    day.write_text(quarter.format("00", "15", 800) + quarter.format("15", "20", 0))
+    run = ("run", "three-way", "--demand", str(day), "--no-safety")
+    whole = answer(capsys, *run, "--by", "movement")
+    assert whole["horizon_s"] == 1200.0
+    assert whole["density"] == pytest.approx(200)
+    assert whole["trips"] == whole["movements"]["a1"]["trips"] == 206
+    assert answer(capsys, *run, "--start", "07:15")["trips"] == 0
+    assert answer(capsys, *run, "--horizon", "450")["trips"] == 95
+    assert "before the run of 3600 s" in fails(capsys, *run, "--horizon", "3600")
+    assert "--demand replaces --density" in fails(capsys, *run, "-d", "350")
+    assert "--arrivals replaces --demand" in fails(capsys, *run, "--arrivals", "x.csv")
+    film = ("animate", "three-way", "--demand", str(day), "-o", str(tmp_path / "film.gif"))
+    assert "--from [s] must be at least 0 and below 1200" in fails(capsys, *film, "--from", "1200")
+
+
 def test_animate_writes_a_gif(capsys: Captured, tmp_path: Path) -> None:
     file = tmp_path / "film.gif"
     what = "animate four-way --from 60 --seconds 2 --fps 5 --density 400 -o"
@@ -747,3 +765,24 @@ def test_ctrl_c_shows_no_traceback_at_any_moment(seconds: float, tmp_path: Path)
     assert process.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in told
     assert "KeyboardInterrupt" not in told
+
+
+def test_counts_says_what_it_understood_and_saves_a_demand(
+    capsys: Captured, tmp_path: Path
+) -> None:
+    sheet, day = tmp_path / "sheet.csv", tmp_path / "day.toml"
+    rows = [f"7:{k},{arm},{turn},{12 + k},3" for k in (15, 30) for arm in "NES" for turn in "LR"]
+    sheet.write_text("\n".join(["time,approach,turn,car,bicycle", *rows, "7:15,N,U,2,0"]))
+    text = ok(capsys, "counts", str(sheet), "--save", str(day))
+    assert "sheet: 414 vehicles, 07:15-07:45, 2 intervals" in text
+    assert "left out: 36 bicycle (bicycles are not simulated)" in text
+    assert "left out: 2 U-turns" in text
+    facts = answer(capsys, "counts", str(sheet))
+    assert facts["arms"] == {"a": "N", "b": "E", "c": "S"}
+    assert facts["movements"]["a1"] == 69
+    run = answer(capsys, "run", "three-way", "--demand", str(day), "--no-safety")
+    assert run["horizon_s"] == 1800.0
+    assert abs(run["trips"] - 414) < 5 * 414**0.5
+    assert "the junction has 4" in fails(capsys, "run", "four-way", "--demand", str(day))
+    sheet.write_text(sheet.read_text().replace("7:15,N,L", "7:15,N,X"))
+    assert "unknown turn 'X'" in fails(capsys, "counts", str(sheet))

@@ -1,0 +1,66 @@
+"""Level of service over a day: control delay by the interval in which vehicles came."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from minisim.clock import time_of_day
+from minisim.errors import choice, number
+from minisim.results.metrics import METRICS
+from minisim.results.run import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Longest mean control delay of the levels A … E [s]; beyond is F. Highway Capacity Manual, 6th
+#: ed. (2016): exhibit 19-8 for signalised junctions; 20-2 and 21-8 for two-way and all-way stops.
+LEVELS: Final = {
+    "signalised": (10.0, 20.0, 35.0, 55.0, 80.0),
+    "unsignalised": (10.0, 15.0, 25.0, 35.0, 50.0),
+}
+
+
+def level_of_service(delay: float, kind: str = "unsignalised") -> str:
+    """The level A … F of a mean control delay [s]; "" for NaN; raises `InputError`."""
+    limits = LEVELS[choice("kind of junction", kind, LEVELS)]
+    return "" if math.isnan(delay) else "ABCDEF"[int(np.searchsorted(limits, delay))]
+
+
+def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd.DataFrame:
+    """What vehicles met that came in each interval of a run, from its warm-up on.
+
+    Columns: `start_s` of the run; `time`, the time of day if the demand has one; `trips`, how many
+    came, and `served`, how many of them arrived before the end; the means over all that came of
+    `waiting_time_s` and `control_delay_s`, with what unfinished ones had by the end, NaN if none
+    came; and the level of service `los`. Control delay is time loss and departure delay: what the
+    junction costs against driving on at the limit.
+
+    Args:
+        run: what to look at.
+        interval: its length [s].
+        kind: of the junction, for the level of service: "signalised" or "unsignalised".
+    """
+    import pandas as pd
+
+    number("interval [s]", interval, low=1, high=1e6)
+    trips, begin = run.counted.columns, float(run.scenario.warmup)
+    edges = np.arange(begin, trips.end, interval)
+    of = np.searchsorted(edges, trips.demand_time, side="right") - 1
+    midnight = getattr(getattr(run.scenario, "demand", None), "start", 0.0)
+    delay = METRICS["control_delay_s"].values(trips, len(of))
+
+    def total(values: object = None) -> np.ndarray:
+        return np.bincount(of, weights=values, minlength=len(edges))  # type: ignore[arg-type]
+
+    came = total()
+    with np.errstate(invalid="ignore"):
+        waiting, mean = total(trips.waiting_time) / came, total(delay) / came
+    return pd.DataFrame({
+        "start_s": edges, "time": [time_of_day(midnight + edge) for edge in edges],
+        "trips": came.astype(int), "served": total(trips.arrived).astype(int),
+        "waiting_time_s": waiting, "control_delay_s": mean,
+        "los": [level_of_service(one, kind) for one in mean],
+    })  # fmt: skip

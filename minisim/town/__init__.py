@@ -1,0 +1,16 @@
+"""Junctions of real towns: networks of SUMO and extracts of OpenStreetMap.
+
+    from minisim.town import read_junction, survey
+
+    read_junction("town.net.xml", node="252016277")  # an Intersection
+    survey("town.net.xml")  # every node, and whether the simulator can say it
+
+Networks are read as they are; an extract of OpenStreetMap goes through netconvert first (extra
+`sumo`).
+"""
+
+from __future__ import annotations
+
+from minisim.town.surveying import Survey, read_junction, survey, survey_of
+
+__all__ = ["Survey", "read_junction", "survey", "survey_of"]

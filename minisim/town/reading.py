@@ -1,0 +1,204 @@
+"""A SUMO network as plain data: its nodes, edges and connections for cars.
+
+The format: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html. A file may be hostile, so it
+is limited in size, and no document type is allowed, without which XML has no entities.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import math
+import zlib
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+from xml.parsers import expat
+
+import numpy as np
+
+from minisim.errors import FileError
+from minisim.files import AnyPath, read_file
+from minisim.junction.paths import Floats
+
+#: The largest file read [bytes]; SUMO's network of Berlin has 0.4 GB.
+LARGEST = 2**29
+
+#: The first bytes of a file packed by gzip.
+PACKED = b"\x1f\x8b"
+
+#: SUMO's default width of a lane [m] (`SUMO_const_laneWidth`).
+LANE_WIDTH = 3.2
+
+#: SUMO's class of a car.
+CAR = "passenger"
+
+#: Edges that are no roads: inside junctions, and for pedestrians.
+NO_ROADS = ("internal", "crossing", "walkingarea", "connector")
+
+#: What elements are and have.
+Element = Callable[[str, dict[str, str]], None]
+
+
+class Edge(NamedTuple):
+    """A road in one direction, with its lanes for cars."""
+
+    id: str
+    origin: str  #: id of the node where it begins
+    target: str  #: and where it ends
+    street: str  #: name of the street, or empty
+    lanes: int  #: number of lanes for cars
+    shape: Floats  #: polyline of the first of them [m], shape (k, 2)
+    length: float  #: [m]
+    speed: float  #: limit [m/s]
+    width: float  #: of the lane [m]
+
+
+class Node(NamedTuple):
+    """Where edges meet."""
+
+    id: str
+    kind: str  #: SUMO's type, such as "priority" or "traffic_light"
+    x: float  #: [m]
+    y: float  #: [m]
+
+
+class Town(NamedTuple):
+    """A network's roads for cars."""
+
+    name: str  #: of its file
+    left: bool  #: whether traffic keeps to the left
+    nodes: Mapping[str, Node]
+    into: Mapping[str, list[Edge]]  #: node -> edges that end there
+    out_of: Mapping[str, list[Edge]]  #: node -> edges that begin there
+    turns: frozenset[tuple[str, str]]  #: edges that a connection for cars joins
+
+
+def read_town(path: AnyPath) -> Town:
+    """Read a network (.net.xml, perhaps packed by gzip).
+
+    Raises `FileError`: unreadable, too large, broken or hostile XML, or no network.
+    """
+    made = _Maker(str(path))
+    parse(path, made.element)
+    if made.root != "net":
+        raise FileError(
+            f"{path} is neither a network of SUMO (<net>) nor an extract of OpenStreetMap (<osm>): "
+            f"it begins with <{made.root}>"
+        )
+    return made.town()
+
+
+def root_of(path: AnyPath) -> str:
+    """The name of a file's first element; raises `FileError` as `read_town`."""
+    names: list[str] = []
+    parse(path, lambda name, _: None if names else names.append(name))
+    return names[0]
+
+
+def parse(path: AnyPath, element: Element) -> None:
+    """Call `element` for every element of an XML file; raises `FileError` as `read_town`."""
+    content = read_file("network", path, LARGEST)
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = element
+
+    def refuse(*_: object) -> None:
+        raise FileError(
+            f"{path} declares a document type, which may hide entities; a network has none"
+        )
+
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        source: io.IOBase = io.BytesIO(content)
+        if content.startswith(PACKED):
+            source = gzip.GzipFile(fileobj=io.BytesIO(content))
+        size = 0
+        while block := source.read(1 << 20):
+            size += len(block)
+            if size > LARGEST:
+                raise FileError(f"{path} is larger than {LARGEST >> 20} MiB when unpacked")
+            parser.Parse(block, False)
+        parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        raise FileError(f"{path} is not a network: the XML is broken: {error}") from error
+    except (OSError, EOFError, zlib.error) as error:
+        raise FileError(f"{path} cannot be unpacked: {error}") from error
+
+
+class _Maker:
+    """Collects what the elements say."""
+
+    def __init__(self, name: str) -> None:
+        self._name, self.root, self._left = name, "", False
+        self._nodes: dict[str, Node] = {}
+        self._edges: dict[str, Edge] = {}
+        self._turns: set[tuple[str, str]] = set()
+        self._cars: dict[str, list[bool]] = {}  # edge: whether each of its lanes is for cars
+        self._edge: dict[str, str] | None = None
+
+    def element(self, name: str, has: dict[str, str]) -> None:
+        """Take note of one element."""
+        if not self.root:
+            self.root, self._left = name, has.get("lefthand") in ("true", "1")
+        try:
+            if name == "edge":
+                self._edge = has if has.get("function") not in NO_ROADS else None
+                self._cars[has["id"]] = []
+            elif name == "lane" and self._edge is not None:
+                self._lane(self._edge, has)
+            elif name == "junction" and has.get("type") != "internal":
+                x, y = (_number(has[key]) for key in "xy")
+                self._nodes[has["id"]] = Node(has["id"], has.get("type", ""), x, y)
+            elif name == "connection":
+                self._connection(has)
+        except (KeyError, ValueError, OverflowError) as error:
+            why = f"no {error}" if isinstance(error, KeyError) else str(error)
+            which = has.get("id", has.get("from", ""))
+            raise FileError(f"{self._name}: <{name}> {which!r}: {why}") from error
+
+    def _lane(self, edge: dict[str, str], has: dict[str, str]) -> None:
+        cars = _for_cars(has)
+        self._cars[edge["id"]].append(cars)
+        if not cars:
+            return
+        if known := self._edges.get(edge["id"]):
+            self._edges[known.id] = known._replace(lanes=known.lanes + 1)
+            return
+        shape = [[_number(x) for x in point.split(",")[:2]] for point in has["shape"].split()]
+        if len(shape) < 2 or any(len(point) != 2 for point in shape):
+            raise ValueError("its shape needs two points or more, such as 0,0 50,0")
+        self._edges[edge["id"]] = Edge(
+            edge["id"], edge["from"], edge["to"], edge.get("name", ""), 1, np.array(shape),
+            _number(has["length"]), _number(has["speed"]), _number(has.get("width", LANE_WIDTH)),
+        )  # fmt: skip
+
+    def _connection(self, has: dict[str, str]) -> None:
+        """Note a connection between two lanes for cars; edges come before connections."""
+        ends = (has["from"], has["fromLane"]), (has["to"], has["toLane"])
+        lanes = [self._cars.get(edge, [])[int(lane) :][:1] for edge, lane in ends]
+        if all(lane == [True] for lane in lanes) and _for_cars(has):
+            self._turns.add((has["from"], has["to"]))
+
+    def town(self) -> Town:
+        """What was collected; roads without an end in the network are left out."""
+        into: dict[str, list[Edge]] = {node: [] for node in self._nodes}
+        out_of: dict[str, list[Edge]] = {node: [] for node in self._nodes}
+        for edge in self._edges.values():
+            if edge.origin in self._nodes and edge.target in self._nodes:
+                into[edge.target].append(edge)
+                out_of[edge.origin].append(edge)
+        turns = frozenset(self._turns)
+        return Town(self._name, self._left, self._nodes, into, out_of, turns)
+
+
+def _for_cars(has: Mapping[str, str]) -> bool:
+    """Whether the permissions of a lane or connection let cars in."""
+    if "allow" in has:
+        return bool({CAR, "all"} & set(has["allow"].split()))
+    return not {CAR, "all"} & set(has.get("disallow", "").split())
+
+
+def _number(text: str | float) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not a finite number")
+    return value

@@ -1,0 +1,207 @@
+"""Count sheets in three usual forms, what is left out of them, and broken ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from minisim.counts import Count, read_counts
+from minisim.errors import FileError, InputError, MinisimError
+from minisim.fleet import fleet_named
+from minisim.vehicle import VehicleType
+from scenarios import four_way
+
+#: German: a row per stream and interval, a column per class; streams by approach and letter.
+GERMAN = "\n".join([
+    "zufahrt,spur,kennung,intervall_start,intervall_ende,rad,krad,pkw,lkw,bus",
+    *(f"{arm},1,{arm}{turn}..(1),{start},{end},2,1,{n},0,{bus}"
+      for start, end, n in (("06:00", "06:15", 20), ("06:15", "06:30", 40))
+      for arm in "ABCD" for turn, bus in (("L", 0), ("G", 3), ("R", 0))),
+    "B,2,BW..(14),06:00,06:15,0,0,7,0,0",
+    "B,2,BW..(14),06:15,06:30,0,0,0,0,0",
+])  # fmt: skip
+
+#: American: a row per interval with a column per movement, no classes.
+MOVES = [f"{way}{turn}" for way in ("NB", "SB", "EB", "WB") for turn in "LTRU"]
+AMERICAN = "\n".join([
+    "\t".join(["Time", *MOVES]),
+    "\t".join(["7:45 AM", *(["10", "80", "5", "1"] * 4)]),
+    "\t".join(["8:00 AM", *(["20", "90", "15", "0"] * 4)]),
+])  # fmt: skip
+
+#: British: a row per interval, pair of arms and class; semicolons and decimal commas.
+BRITISH = "\n".join([
+    "Time;From;To;Class;Vehicles",
+    *(f"{time};{a};{b};{kind};{n}"
+      for time in ("07:00 - 07:15", "07:15 - 07:30")
+      for a in "123" for b in "123" if a != b
+      for kind, n in (("Car", "12,5"), ("OGV1", "2"), ("PSV", "1"), ("Pedal Cycle", "4"))),
+])  # fmt: skip
+
+
+def read(
+    folder: Path, text: str, mapping: Mapping[str, Any] | None = None, encoding: str = "utf-8"
+) -> Count:
+    path = folder / "sheet.csv"
+    path.write_bytes(text.encode(encoding))
+    return read_counts(path, mapping)
+
+
+def test_a_row_per_stream_and_a_column_per_class(tmp_path: Path) -> None:
+    count = read(tmp_path, GERMAN)
+    assert count.arms == ("A", "B", "C", "D")
+    assert count.edges == (21_600, 22_500, 23_400)
+    assert count.types == ("motorcycle", "car", "bus")
+    assert count.classes["rad"] == "bicycles are not simulated"
+    assert count.left_out == {"rad (bicycles are not simulated)": 48, "U-turns": 7}
+    first, second = count.demand.periods
+    assert first.rates == (4 * 66,) * 4
+    assert first.turns == ((21, 24, 21),) * 4
+    assert second.rates == (4 * 126,) * 4
+    assert count.fleet["bus"] == pytest.approx([6 / 192] * 4)
+    assert any("spur" in note for note in count.notes)
+    assert "no vehicle was counted of: truck" in count.notes
+    fleet_named(count.fleet, VehicleType()).check(4)
+
+
+def test_a_column_per_movement(tmp_path: Path) -> None:
+    """NB is traffic to the north, from the south: lane c of N, E, S, W."""
+    text = AMERICAN.replace("\t10\t80\t5\t1", "\t11\t80\t5\t1", 1)
+    count = read(tmp_path, text, encoding="utf-8-sig")
+    assert count.arms == ("N", "E", "S", "W")
+    assert count.edges == (27_900, 28_800, 29_700)
+    assert count.types == ("car",)
+    assert count.left_out == {"U-turns": 4}
+    assert count.demand.periods[0].turns == ((10, 80, 5), (10, 80, 5), (11, 80, 5), (10, 80, 5))
+    assert "no classes: all count as cars" in count.notes
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_a_row_per_pair_of_arms_and_class(tmp_path: Path, encoding: str) -> None:
+    count = read(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}, encoding)
+    assert count.arms == ("1", "2", "3")
+    assert count.types == ("car", "bus", "truck")
+    assert count.vehicles.shape == (2, 3, 2, 3)
+    assert (count.vehicles == [12.5, 1, 2]).all()
+    assert count.left_out == {"Pedal Cycle (left out)": 48}
+
+
+def test_a_mapping_says_what_a_sheet_does_not(tmp_path: Path) -> None:
+    text = GERMAN.replace("zufahrt", "leg no").replace("pkw", "P").replace(",A,", ",A,")
+    mapping = {"approach": "leg no", "classes": {"P": "car"}, "arms": ["D", "A", "B", "C"],
+               "turns": {"AG..(1)": "left", "AL..(1)": 2}, "from": "06:15"}  # fmt: skip
+    count = read(tmp_path, text, mapping)
+    assert count.arms == ("D", "A", "B", "C")
+    assert count.demand.periods[0].turns[1] == (44, 41, 41)
+    assert count.left_out["outside from … until"] > 0
+
+
+def test_three_arms_are_left_and_right_of_each_other(tmp_path: Path) -> None:
+    """At a T, the way ahead is the left one or the right one of the two."""
+    text = "time,approach,turn,car\n" + "".join(
+        f"{time},{arm},{turn},{n}\n"
+        for time in ("7:00", "8:00")
+        for arm, turn, n in (
+            ("N", "left", 1), ("N", "right", 2), ("E", "thru", 3), ("E", "right", 4),
+            ("W", "left", 5), ("W", "thru", 6),
+        )
+    )  # fmt: skip
+    count = read(tmp_path, text)
+    assert count.arms == ("N", "E", "W")
+    assert count.demand.periods[0].turns == ((1, 2), (3, 4), (5, 6))
+
+
+def test_a_missing_row_is_named(tmp_path: Path) -> None:
+    lines = [line for line in GERMAN.splitlines() if not line.startswith("C,1,CG..(1),06:15")]
+    count = read(tmp_path, "\n".join(lines))
+    assert "C, manoeuvre 2: no row for the intervals from 06:15; taken as 0" in count.notes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("06:15,06:30", "06:30,06:45", r"06:00-06:15 and 06:30-06:45 leave a hole; a mapping"),
+        ("06:15,06:30", "06:10,06:25", r"06:00-06:15 and 06:10-06:25 overlap"),
+        ("A,1,AG..(1),06:00,06:15", "A,1,AG..(1),06:00,06:20", r"begin at 06:00 and overlap"),
+        ("pkw", "pkww", r"unknown class 'pkww'; did you mean 'pkw'\?"),
+        ("AL..(1)", "A?", r"line 2: unknown turn 'A\?'; a mapping can say what it is"),
+        ("2,1,20,0", "2,1,-20,0", r"line 2: a count must be a number 0 … 1e6, got '-20'"),
+        ("2,1,20,0", "2,1,many,0", r"line 2: a count must be a number"),
+        ("2,1,20,0", "2,1,20", r"line 2: 10 cells are needed, got 9"),
+        ("06:00,06:15", "06:0x,06:15", r"line 2: a time must be a time of day"),
+        ("zufahrt,", "x,", r"no column has the approach, and none is a movement such as NBL"),
+        ("kennung", "x", r"no column has the turn or the exit"),
+        ("intervall_start", "x", r"no column has the start of the intervals"),
+        ("spur", "bus", r"more than one column 'bus'"),
+        ("rad,krad,pkw,lkw,bus", "a,b,c,d,e", r"no column has counts: none is a class"),
+    ],
+)
+def test_a_sheet_that_is_wrong_is_refused_in_one_sentence(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    with pytest.raises(FileError, match=message) as caught:
+        read(tmp_path, GERMAN.replace(old, new))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "is not a table"),
+        (b"a,b\n", "has no counts, only a header"),
+        (b"\x00\x01,\x02", "it is not text"),
+        (b'zufahrt,start\n"A', "cannot read counts"),
+        (b"hello\nworld\n", "is not a table"),
+    ],
+)
+def test_what_is_no_sheet_is_refused(tmp_path: Path, data: bytes, message: str) -> None:
+    (tmp_path / "sheet.csv").write_bytes(data)
+    with pytest.raises(FileError, match=message):
+        read_counts(tmp_path / "sheet.csv")
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ({"aproach": "zufahrt"}, "unknown key of a mapping 'aproach'.*did you mean 'approach'"),
+        ({"approach": "Zufart"}, "unknown column of .* for approach: 'Zufart'.*'zufahrt'"),
+        ({"classes": {"pkw": "cra"}}, "unknown type of the class 'pkw', 'cra'.*'car'"),
+        ({"arms": ["A", "B", "C"]}, "unknown arm of .* 'D'"),
+        ({"arms": 4}, "arms must be a sequence"),
+        ({"turns": {"AL..(1)": 4}}, "4 arms have manoeuvres 1 … 3"),
+        ({"from": "09:00"}, "nothing is left to simulate"),
+        ({"from": "9h"}, "from must be a time of day"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(
+    tmp_path: Path, mapping: dict[str, object], message: str
+) -> None:
+    with pytest.raises(MinisimError, match=message):
+        read(tmp_path, GERMAN, mapping)
+
+
+def test_five_arms_need_exits(tmp_path: Path) -> None:
+    text = "time,approach,turn,car\n" + "".join(
+        f"7:00,{k},left,1\n8:00,{k},left,1\n" for k in "12345"
+    )
+    with pytest.raises(FileError, match="with 5 arms, left on '1' does not say which exit"):
+        read(tmp_path, text)
+
+
+def test_a_count_is_of_one_junction(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="'sheet' has 3 lanes, the junction has 4"):
+        four_way(demand=read(tmp_path, BRITISH, {"classes": {"Pedal Cycle": "left out"}}).demand)
+
+
+def test_what_is_drawn_is_what_was_counted(tmp_path: Path) -> None:
+    """Vehicles by movement over 40 runs, against the sheet's sums: Pearson's χ² of 12 cells."""
+    count = read(tmp_path, GERMAN)
+    sheet, drawn = 40 * count.vehicles.sum((0, 3)), np.zeros((4, 3))
+    for seed in range(40):
+        it = count.demand.draw(4, count.demand.duration, seed)
+        np.add.at(drawn, (it.lane, it.manoeuvre - 1), 1)
+    assert ((drawn - sheet) ** 2 / sheet).sum() < 32.9  # 0.1 % of χ² with 12 degrees of freedom

@@ -1,0 +1,81 @@
+"""`minisim junction`, and junction files on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scenarios.cli import main
+from tests.builders import town_text
+
+PLACES = {"n": (0.0, 200.0), "e": (200.0, 0.0), "s": (0.0, -200.0)}
+
+
+@pytest.fixture
+def town(tmp_path: Path) -> str:
+    path = tmp_path / "town.net.xml"
+    path.write_text(town_text(PLACES, missing=[("nC", "Ce")]))
+    return str(path)
+
+
+def test_a_junction_is_told_saved_and_run(
+    town: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    saved = str(tmp_path / "junction.toml")
+    assert main(["junction", town, "--node", "C", "--save", saved]) == 0
+    told = capsys.readouterr().out
+    assert "node C (priority): right-hand traffic, junction radius 7.2 m" in told
+    assert "a2" in told
+    assert "a1" not in told
+    runs = []
+    for words in ([saved], [town, "--node", "C"]):
+        assert main(["run", *words, "--horizon", "60", "--json", "--no-safety"]) == 0
+        runs.append(json.loads(capsys.readouterr().out))
+    assert runs[0]["trips"] == runs[1]["trips"] > 0
+
+
+def test_all_nodes_are_listed_with_their_verdicts(
+    town: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["junction", town, "--list"]) == 0
+    told = capsys.readouterr().out
+    assert "1 arm for cars; 3 are needed" in told
+    assert "1 of 4 nodes can be read; 1 have 3 or more arms with one lane per direction" in told
+    assert main(["junction", town, "--list", "--json"]) == 0
+    rows = {row["node"]: row for row in json.loads(capsys.readouterr().out)}
+    assert [name for name, row in rows.items() if row["readable"]] == ["C"]
+    assert main(["junction", town, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["roads"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--node", "D"], "no node 'D' among the 4"),
+        (["--node", "n"], "cannot be read: 1 arm for cars"),
+        (["--side", "left"], "side is only for an extract"),
+        (["--side", "up"], "unknown side 'up'"),
+        (["--list", "--node", "C"], "leave out --node and --save"),
+        (["--save", "junction.txt"], "junction.txt"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_code_2(
+    town: str, words: list[str], message: str, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    assert main(["junction", town, *words]) == 2
+    told = capsys.readouterr()
+    assert message in told.err
+    assert told.err.count("\n") == 1
+    assert not told.out
+
+
+def test_a_hostile_file_is_one_sentence_and_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bomb.net.xml"
+    path.write_text('<!DOCTYPE n [<!ENTITY a "ha">]><net>&a;</net>')
+    for words in (["junction", str(path), "--list"], ["run", str(path)]):
+        assert main(words) == 2
+        assert "declares a document type" in capsys.readouterr().err
