@@ -68,6 +68,14 @@ class Count:
             periods.append(Period(start=start, end=end, rates=rates, turns=turns))
         return DemandProfile(name=self.name, periods=tuple(periods))
 
+    @property
+    def mix(self) -> str:
+        """The fleet over all lanes, as `minisim run --fleet` takes it."""
+        totals = self.vehicles.sum((0, 1, 2))
+        shares = [round(float(it), 4) for it in totals / totals.sum()]
+        shares[int(np.argmax(shares))] += 1.0 - sum(shares)
+        return ",".join(f"{kind}:{it:.4f}" for kind, it in zip(self.types, shares, strict=True))
+
     @cached_property
     def fleet(self) -> dict[str, list[float]]:
         """Share of each type on each lane, as `minisim.fleet.fleet_named` takes it."""

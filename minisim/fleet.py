@@ -185,13 +185,14 @@ class Fleet:
         """Index of the type of each vehicle, shape (k,), by its lane and its place there."""
         if len(self.types) == 1:
             return np.zeros(len(lane), int)
-        draws = Draws(seed, "types")
-        bounds = [np.cumsum(self.of_lane(i)) for i in range(lane.max(initial=0) + 1)]
-        last = len(self.types) - 1
-        return np.array([
-            min(int(bounds[i].searchsorted(draws.uniform(i, r), side="right")), last)
-            for i, r in zip(lane.tolist(), rank.tolist(), strict=True)
-        ], int)  # fmt: skip
+        draws, types = Draws(seed, "types"), np.zeros(len(lane), int)
+        drawn = np.array(
+            [draws.uniform(*of) for of in zip(lane.tolist(), rank.tolist(), strict=True)]
+        )
+        for i in range(lane.max(initial=0) + 1):
+            bounds = np.cumsum(self.of_lane(i))[:-1]  # without the last, which rounding may miss
+            types[lane == i] = bounds.searchsorted(drawn[lane == i], side="right")
+        return types
 
     def indices(self, names: npt.NDArray[np.str_]) -> Ints:
         """The indices of named types; `InputError` for a name that is not in the fleet."""

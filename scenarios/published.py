@@ -34,8 +34,8 @@ def published_ways(arms: int, turnarounds: str | None = None, network: str = "")
         arms: how many.
         turnarounds: arms at whose far end the road leads back; None: as in the authors' networks.
         network: "signals" for that of the signals, "waiting" for that of the fixed-time signal at
-            4:1:4:1; both have 4 arms. They differ in the places to wait inside for vehicles that
-            turn far: none, and one on each such way, where the others have two.
+            4:1:4:1. They differ in the places to wait inside for vehicles that turn far: none, and
+            one on each such way, where the others of 4 arms have two.
 
     Raises `InputError` for another number of arms.
     """

@@ -70,8 +70,8 @@ def _gaps(bearings: tuple[float, ...]) -> Iterator[float]:
     return (b - a for a, b in pairwise((*bearings, bearings[0] + 360.0)))
 
 
-def _roads(name: str, value: Any) -> tuple[Road, ...] | None:
-    """One `Road` per arm; None if all are like the others."""
+def _roads(name: str, value: Any) -> tuple[Road, ...]:
+    """One `Road` per arm, each given as such or as a table of its parameters."""
     given = items(name, value, "a Road per arm")
     roads = tuple(Road(**road) if isinstance(road, Mapping) else road for road in given)
     for i, road in enumerate(roads):
@@ -101,15 +101,18 @@ class Intersection:
     side: Literal["left", "right"] = word(
         "of the road that traffic keeps to", ("left", "right"), default="left"
     )
-    lane_width: float = real("width of every lane", "m", default=3.2, low=2, high=6)
+    lane_width: float = real(
+        "width of every lane, unless its road has another", "m", default=3.2, low=2, high=6
+    )
     junction_radius: float = real(
         "distance of every entry and exit from the centre; none means the smallest with a kerb of "
         f"{KERB_RADIUS:g} m",
         "m", above=0, optional=True, default=None,
     )  # fmt: skip
     arm_length: float = real(
-        "from the centre to the far end of each road", "m", default=500.0, low=20, high=20_000
-    )
+        "from the centre to the far end of each road, unless it has another length", "m",
+        default=500.0, low=20, high=20_000,
+    )  # fmt: skip
     ways: tuple[Way, ...] | None = part(
         "another simulator's curves through the junction, one Way per movement, in order; none "
         "means arcs",

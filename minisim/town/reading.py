@@ -65,7 +65,6 @@ class Node(NamedTuple):
 class Town(NamedTuple):
     """A network's roads for cars."""
 
-    name: str  #: of its file
     left: bool  #: whether traffic keeps to the left
     nodes: Mapping[str, Node]
     into: Mapping[str, list[Edge]]  #: node -> edges that end there
@@ -73,26 +72,21 @@ class Town(NamedTuple):
     turns: frozenset[tuple[str, str]]  #: edges that a connection for cars joins
 
 
-def read_town(path: AnyPath) -> Town:
-    """Read a network (.net.xml, perhaps packed by gzip).
+def read_town(path: AnyPath) -> Town | None:
+    """Read a network (.net.xml, perhaps packed by gzip); None for an extract of OpenStreetMap.
 
-    Raises `FileError`: unreadable, too large, broken or hostile XML, or no network.
+    Raises `FileError`: unreadable, too large, broken or hostile XML, or neither of the two.
     """
     made = _Maker(str(path))
     parse(path, made.element)
+    if made.root == "osm":
+        return None
     if made.root != "net":
         raise FileError(
             f"{path} is neither a network of SUMO (<net>) nor an extract of OpenStreetMap (<osm>): "
             f"it begins with <{made.root}>"
         )
     return made.town()
-
-
-def root_of(path: AnyPath) -> str:
-    """The name of a file's first element; raises `FileError` as `read_town`."""
-    names: list[str] = []
-    parse(path, lambda name, _: None if names else names.append(name))
-    return names[0]
 
 
 def parse(path: AnyPath, element: Element) -> None:
@@ -187,7 +181,7 @@ class _Maker:
                 into[edge.target].append(edge)
                 out_of[edge.origin].append(edge)
         turns = frozenset(self._turns)
-        return Town(self._name, self._left, self._nodes, into, out_of, turns)
+        return Town(self._left, self._nodes, into, out_of, turns)
 
 
 def _for_cars(has: Mapping[str, str]) -> bool:

@@ -19,7 +19,7 @@ from minisim.junction.movements import ARM_NAMES, movements_of
 from minisim.junction.paths import Floats
 from minisim.junction.roads import Road
 from minisim.town.arms import Arm, arms_of, bearing_of, centre_of, length_of, off_lane
-from minisim.town.reading import Node, Town, read_town, root_of
+from minisim.town.reading import Node, Town, read_town
 from minisim.vehicle import VehicleType
 
 #: The longest road [m], as junctions on paper have it.
@@ -119,12 +119,11 @@ def _surveys(town: Town) -> Iterator[Survey]:
 
 def town_of(path: AnyPath, side: str | None = None) -> Town:
     """A network, or an extract that netconvert has turned into one."""
-    if root_of(path) != "osm":
+    town = read_town(path)
+    if town is not None:
         if side is not None:
-            raise InputError(
-                "side is only for an extract of OpenStreetMap: a network knows its own"
-            )
-        return read_town(path)
+            raise InputError("side is for an extract of OpenStreetMap: a network knows its own")
+        return town
     from minisim.sumo.host import sumo_home
     from minisim.sumo.network import run_tool
 
@@ -136,7 +135,9 @@ def town_of(path: AnyPath, side: str | None = None) -> Town:
             "--geometry.remove", "true", "--junctions.join", "true", "--no-turnarounds", "true",
             "--keep-edges.by-vclass", "passenger",
         ], Path(folder), home)  # fmt: skip
-        return read_town(Path(folder) / "town.net.xml")._replace(name=str(path))
+        town = read_town(Path(folder) / "town.net.xml")
+        assert town is not None
+        return town
 
 
 def survey_node(town: Town, node: str) -> Survey:

@@ -23,7 +23,8 @@ _sumo = partial(option, rich_help_panel="SUMO")
     epilog="Means are over the trips that ended; [bold]with unfinished[/bold] counts all. Exit "
     "codes: 0 done, 1 a collision ended the run, 2 bad input. See also "
     "[bold]minisim controllers[/bold].\n\n"
-    "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json"
+    "minisim run five-way -c dim:gate=harmonious -d 350 -p fair --json\n\n"
+    "minisim run four-way -c fixed-time --split 4:3:2:1 --trips trips.csv"
 )
 def run(
     scenario: options.ScenarioName,

@@ -59,7 +59,7 @@ CASES: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "stream": (stream, {"seed": 1, "name": "arrivals"}),
     "Site": (
         Site,
-        {"intersection": FOUR, "vehicle": CAR, "speed_limit": 14.0, "demand": (1.0,) * 4,
+        {"intersection": FOUR, "fleet": CAR, "speed_limit": 14.0, "demand": (1.0,) * 4,
          "dt": 0.1, "seed": 0},
     ),
     "Marking": (Marking, {"name": "red", "start": 30.0, "end": 8.0, "speed": 5.0}),
@@ -82,7 +82,7 @@ CASES: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "HarmonyMatrix": (HarmonyMatrix, {"n": 3, "values": np.zeros((6, 6), dtype=int)}),
     "HarmonyMatrix.paper": (HarmonyMatrix.paper, {"n": 4}),
     "HarmonyMatrix.from_geometry": (
-        HarmonyMatrix.from_geometry, {"intersection": FOUR, "vehicle": CAR, "clearance": 0.5}
+        HarmonyMatrix.from_geometry, {"intersection": FOUR, "vehicles": CAR, "clearance": 0.5}
     ),
     "explain": (
         explain,

@@ -219,6 +219,7 @@ def count_facts(count: Count) -> dict[str, Any]:
         "types": dict(zip(count.types, count.vehicles.sum((0, 1, 2)).tolist(), strict=True)),
         "classes": dict(count.classes),
         "fleet": count.fleet,
+        "mix": count.mix,
         "left_out": dict(count.left_out),
         "notes": list(count.notes),
     }
@@ -244,6 +245,7 @@ def count_parts(count: Count) -> Iterator[Text | Table]:
     for kind, total in facts["types"].items():
         said = ", ".join(name for name, it in count.classes.items() if it == kind)
         yield Text(f"  {kind} ({said}): {total:g}")
+    yield Text.assemble("  over all lanes: --fleet ", (count.mix, "bold"))
     for what, total in facts["left_out"].items():
         yield Text(f"  left out: {total:g} {what}", "yellow")
     for note in facts["notes"]:

@@ -65,7 +65,9 @@ def test_a_row_per_stream_and_a_column_per_class(tmp_path: Path) -> None:
     assert count.fleet["bus"] == pytest.approx([6 / 192] * 4)
     assert any("spur" in note for note in count.notes)
     assert "no vehicle was counted of: truck" in count.notes
-    fleet_named(count.fleet, VehicleType()).check(4)
+    assert count.mix == "motorcycle:0.0312,car:0.9376,bus:0.0312"
+    for fleet in (count.fleet, count.mix):
+        fleet_named(fleet, VehicleType()).check(4)
 
 
 def test_a_column_per_movement(tmp_path: Path) -> None:

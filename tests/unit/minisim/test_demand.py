@@ -288,3 +288,23 @@ def test_a_profile_must_fit_the_junction_and_the_run() -> None:
     crowded = replace(PROFILE, model="shifted", min_headway=10)
     with pytest.raises(InputError, match="400 veh/h leave no room for a min_headway of 10 s"):
         crowded.check(4, 60.0)
+
+
+def test_forbidden_manoeuvres_are_not_drawn_and_no_share_of_them_is_dropped() -> None:
+    allowed = np.ones((4, 3), bool)
+    allowed[0, 0] = False  # as in a no-left-turn
+    allowed[3] = False  # an exit only
+    quiet = replace(NOON, rates=(100, 50, 20, 0), turns=None)
+    demand = DemandProfile(name="Market", periods=(quiet,))
+    demand.check(4, 60.0, allowed)
+    drawn = demand.draw(4, 7200.0, 1, allowed)
+    assert not ((drawn.lane == 0) & (drawn.manoeuvre == 1)).any()
+    assert (drawn.manoeuvre[drawn.lane == 1] == 1).any()
+    by_lane = replace(demand, periods=(replace(quiet, turns="1:1:1/1:1:1/1:1:1/1:1:1"),))
+    message = "turns of 07:15-09:15 send vehicles of lane a where none may go"
+    with pytest.raises(InputError, match=message):
+        by_lane.check(4, 60.0, allowed)
+    with pytest.raises(InputError, match="turns leave lane a none of the manoeuvres allowed"):
+        replace(demand, periods=(replace(quiet, turns="1:0:0"),)).check(4, 60.0, allowed)
+    with pytest.raises(InputError, match="'Market' has vehicles from lane d, but none may come"):
+        replace(demand, periods=(NOON,)).check(4, 60.0, allowed)

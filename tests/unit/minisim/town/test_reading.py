@@ -26,6 +26,7 @@ def test_a_network_is_read_packed_or_not(tmp_path: Path) -> None:
     plain = read_town(written(tmp_path, text))
     packed = read_town(written(tmp_path, gzip.compress(text.encode()), "town.net.xml.gz"))
     for town in (plain, packed):
+        assert town is not None
         assert sorted(town.nodes) == ["C", "a", "b", "c"]
         assert [edge.id for edge in town.into["C"]] == ["aC", "bC", "cC"]
         assert town.into["C"][0].length == pytest.approx(92.8)
@@ -41,9 +42,14 @@ def test_only_lanes_for_cars_count(tmp_path: Path) -> None:
         "cC": ['disallow="all"', 'allow="bus passenger"', ""],
     }
     town = read_town(written(tmp_path, town_text(STAR, lanes=lanes)))
+    assert town is not None
     assert [(edge.id, edge.lanes) for edge in town.into["C"]] == [("aC", 1), ("cC", 2)]
     # The connections of lane 0, which is not for cars there.
     assert not {origin for origin, _ in town.turns}
+
+
+def test_an_extract_of_openstreetmap_is_no_network(tmp_path: Path) -> None:
+    assert read_town(written(tmp_path, "<osm><node id='1' lat='1' lon='2'/></osm>")) is None
 
 
 BOMB = '<!DOCTYPE n [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><net>&b;</net>'

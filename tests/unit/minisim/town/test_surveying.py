@@ -125,7 +125,7 @@ def test_a_node_is_found_or_near_ones_are_named(tmp_path: Path) -> None:
     assert survey_of(path).node.id == "C"  # the only one that can be read
     with pytest.raises(InputError, match=r"no node 'c' among the 5 of .*; did you mean|names them"):
         read_junction(path, "c")
-    with pytest.raises(InputError, match="side is only for an extract"):
+    with pytest.raises(InputError, match="side is for an extract"):
         read_junction(path, "C", side="left")
     path.write_text(town_text({"n": (0.0, 99.0), "s": (0.0, -99.0)}))
     with pytest.raises(InputError, match="has 0 of 3 nodes that can be read"):

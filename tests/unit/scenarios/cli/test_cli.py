@@ -98,7 +98,7 @@ def test_run_help_has_examples_that_work(capsys: Captured) -> None:
 
 def test_run_help_fits_on_two_screens() -> None:
     lines = shell("minisim run --help", COLUMNS="80", TERMINAL_WIDTH="80").stdout.splitlines()
-    assert len(lines) <= 2 * 25
+    assert len(lines) <= 2 * 30
     assert max(map(len, lines)) <= 80
 
 

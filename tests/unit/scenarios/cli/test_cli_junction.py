@@ -55,7 +55,7 @@ def test_all_nodes_are_listed_with_their_verdicts(
     [
         (["--node", "D"], "no node 'D' among the 4"),
         (["--node", "n"], "cannot be read: 1 arm for cars"),
-        (["--side", "left"], "side is only for an extract"),
+        (["--side", "left"], "side is for an extract"),
         (["--side", "up"], "unknown side 'up'"),
         (["--list", "--node", "C"], "leave out --node and --save"),
         (["--save", "junction.txt"], "junction.txt"),
