@@ -27,6 +27,7 @@ import pytest
 import minisim
 from baselines import Actuated, Adaptive, AllWayStop, FixedTime, all_way_stop
 from minisim.control import Controller, Site
+from minisim.fleet import Fleet
 from minisim.junction.conflicts import conflicts
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
@@ -166,8 +167,8 @@ def alike(ours: Means, theirs: Means) -> bool:
 def enter_as_sumo_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let vehicles in the junction no longer be in the way of those at the line."""
 
-    def at_entry(intersection: Intersection, vehicle: VehicleType) -> Floats:
-        crossing = conflicts(intersection, vehicle) & intersection.movements.apart
+    def at_entry(intersection: Intersection, _: VehicleType, others: Fleet) -> Floats:
+        crossing = conflicts(intersection, others) & intersection.movements.apart
         return np.where(crossing, 0.01, -np.inf)
 
     monkeypatch.setattr(all_way_stop, "clearing_distances", at_entry)

@@ -12,7 +12,7 @@ import pytest
 import minisim
 from baselines import AllWayStop, Reservation
 from dim import Dim
-from minisim.arrivals import Demand
+from minisim.demand import Demand
 from minisim.junction.roads import Road
 from minisim.sumo import simulate
 from minisim.sumo.host import sumo_home

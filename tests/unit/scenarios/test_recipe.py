@@ -70,7 +70,7 @@ def test_a_text_or_table_names_the_controller() -> None:
 
 def test_simulate_says_how_a_text_becomes_a_controller() -> None:
     named: Any = "dim:gate=harmonious"
-    with pytest.raises(InputError, match=r"make it by scenarios.controllers.controller_named"):
+    with pytest.raises(InputError, match=r"make it with scenarios.controllers.controller_named"):
         simulate(four_way(), named)
 
 
