@@ -16,10 +16,10 @@ settings.register_profile(
     "ci",
     derandomize=True,
     deadline=None,
-    max_examples=60,
+    max_examples=50,
     suppress_health_check=[HealthCheck.too_slow],
 )
-settings.register_profile("thorough", settings.get_profile("ci"), max_examples=600)
+settings.register_profile("thorough", settings.get_profile("ci"), max_examples=500)
 # For `make mutants`: no one reads a mutant's counterexample, so it is not shrunk.
 settings.register_profile(
     "mutants", settings.get_profile("ci"), max_examples=20, phases=[Phase.explicit, Phase.generate]

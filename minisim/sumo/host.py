@@ -148,12 +148,13 @@ def _replay(hosted: Hosted, options: _Options, time: float, seconds: float = 10.
 
 def sumo_home() -> Path:
     """SUMO's folder; raises `MissingExtraError` with the command that installs SUMO."""
-    for package in ("sumo", "libsumo"):
-        if importlib.util.find_spec(package) is None:
+    origin = None
+    for package in ("libsumo", "sumo"):
+        found = importlib.util.find_spec(package)
+        origin = found and found.origin
+        if origin is None:
             raise MissingExtraError(f"the host SUMO needs the package {package}: {INSTALL}")
-    import sumo
-
-    return Path(sumo.SUMO_HOME)
+    return Path(str(origin)).parent  # importing it would change the environment
 
 
 def _check_display() -> None:

@@ -67,7 +67,7 @@ def emptying(draw: st.DrawFn) -> Scenario:
 
 
 @pytest.mark.parametrize("name", RIVALS)
-@share(0.5)
+@share(0.3)
 @given(data=st.data())
 def test_no_vehicle_collides_and_each_is_served(name: str, data: st.DataObject) -> None:
     scenario, controller = data.draw(emptying()), data.draw(RIVALS[name])
@@ -107,7 +107,7 @@ def any_law(draw: st.DrawFn) -> VehicleType:
     )
 
 
-@share(0.3)
+@share(0.2)
 @given(
     name=st.sampled_from(SAFE),
     vehicle=any_law(),
@@ -177,7 +177,7 @@ def queueing_vehicles(draw: st.DrawFn) -> VehicleType:
 
 
 @pytest.mark.parametrize("name", SIGNALS)
-@share(0.3)
+@share(0.2)
 @given(vehicle=queueing_vehicles(), limit=floats(3.0, 20.0), shortest=floats(0.5, 10.0))
 def test_a_standing_queue_is_served_in_one_green(
     name: str, vehicle: VehicleType, limit: float, shortest: float

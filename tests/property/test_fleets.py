@@ -42,7 +42,7 @@ def served(scenario: Scenario, name: str, seed: int) -> Run:
     return run
 
 
-@share(0.3)
+@share(0.1)
 @given(mixed(), st.sampled_from(SAFE), seeds)
 def test_no_vehicles_collide_and_each_is_served(scenario: Scenario, name: str, seed: int) -> None:
     run = served(scenario, name, seed)
@@ -63,7 +63,7 @@ def test_the_matrix_for_cars_lets_buses_collide() -> None:
     assert minisim.simulate(scenario, wrong, on_collision="record").collisions
 
 
-@share(0.3)
+@share(0.1)
 @given(intersections(), st.data())
 def test_the_corridor_of_a_fleet_holds_those_of_its_types(
     intersection: minisim.Intersection, data: st.DataObject

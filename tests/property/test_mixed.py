@@ -57,7 +57,7 @@ def check(scenario: Scenario, mixed: Mixed, seed: int = 1) -> None:
     assert unserved == [], f"vehicles {unserved} under {mixed}"
 
 
-@share(0.5)
+@share(0.3)
 @given(traffic())
 def test_safe_and_alive(given_traffic: tuple[Scenario, Mixed]) -> None:
     check(*given_traffic)
