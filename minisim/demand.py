@@ -93,18 +93,18 @@ class ArrivalModel:
     @property
     def words(self) -> tuple[str, str]:
         """What rows say of the shares of the lanes and of the manoeuvres."""
-        raise NotImplementedError
+        raise NotImplementedError  # Demand and DemandProfile each know it
 
     def inflow(self, n: int, allowed: Bools | None = None) -> Inflow:
         """The inflow of n lanes, 0 where none of the manoeuvres is `allowed`, shape (n, n−1).
 
         Raises `InputError` if it does not fit the lanes, or is more than possible.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # Demand and DemandProfile each know it
 
     def turns_of_periods(self) -> dict[str, Any]:
         """What messages call the turns of each period -> the turns, as `read_turns` gives them."""
-        raise NotImplementedError
+        raise NotImplementedError  # Demand and DemandProfile each know it
 
     def turning(self, n: int, allowed: Bools | None = None) -> Floats:
         """Shares of the manoeuvres that are allowed, by period and lane, shape (p, n, n−1).

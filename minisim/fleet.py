@@ -24,7 +24,7 @@ ROUNDING = 1e-6
 
 #: Sizes of vehicles on Indian roads (Chandra, Kumar 2003, Journal of Transportation Engineering
 #: 129:155, table 1). What they can do is SUMO's default for the class (page "Vehicle Type Parameter
-#: Defaults"), with three exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
+#: Defaults"), with two exceptions. SUMO's motorcycle could never brake as hard as the IDM asks of
 #: a vehicle whose comfortable braking is 10 m/s², so it drives like a car. There is no class for
 #: auto-rickshaws: their acceleration is the least of the measured 1.88 … 2.08 m/s² (University of
 #: Moratuwa, handle 123/19055), their brakes are those of heavy vehicles.
@@ -72,7 +72,6 @@ _SUMO = (
 #: The ready types by name.
 TYPES: Mapping[str, VehicleType] = {it.name: it for it in (*_INDIAN, *_SUMO)}
 
-
 #: Fleets by name. `india` has the shares of the vehicles registered in India on 31 March 2009: 72 %
 #: two-wheelers, 13.3 % cars, jeeps and taxis, 5.5 % goods vehicles, 1.3 % buses (Ministry of Road
 #: Transport, Road Transport Year Book 2007–09). Goods vehicles are trucks here, and the 7.9 % of
@@ -115,8 +114,7 @@ def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
 class Fleet:
     """Which types of vehicles drive, and how many of each.
 
-    A vehicle's type is drawn by its lane and its place there, so it depends on nothing
-    else.
+    A vehicle's type is drawn by its lane and its place there, so it depends on nothing else.
     """
 
     types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(

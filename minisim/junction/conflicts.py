@@ -2,7 +2,7 @@
 
 A corridor is the area that a vehicle's body sweeps on its way through the junction. Two movements
 conflict when their corridors come closer than `CLEARANCE`. The corridor of a fleet is that of all
-its types together: a short body swings out less in a turn, but cuts the corner less, too.
+its types together: a short body swings out more in a turn than a long one, which cuts the corner.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def run(
     on_collision: Annotated[str, option("stop, record, or teleport (SUMO).", "DO")] = "stop",
     no_safety: Annotated[bool, option("Do not measure TTC and PET.", None, "--no-safety")] = False,
     metrics: Annotated[str | None, option("See minisim metrics; or mymodule:name.", "A,B")] = None,
-    by: Annotated[str, option("Table by lane, movement or kind.", "X")] = "lane",
+    by: Annotated[str, option("By lane, movement, kind or type.", "X")] = "lane",
     as_json: options.AsJson = False,
     arrivals: options.Arrivals = None,
     demand: options.DemandFile = None,
