@@ -73,6 +73,8 @@ class Law(NamedTuple):
 
     dt: float
     model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
+    quartic: bool  # all vehicles have the usual exponent δ = 4
+    mixed: bool  # vehicles' brakes differ
     semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
@@ -104,6 +106,8 @@ def build_law(
     law = Law(
         dt=site.dt,
         model=list(MODELS).index(vehicle.model),
+        quartic=all(it.exponent == 4.0 for it in site.types),
+        mixed=len({it.max_deceleration for it in site.types}) > 1,
         semi_implicit=MODELS[vehicle.model].stepwise,
         entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,

@@ -66,6 +66,10 @@ LANE = np.dtype(
         ("uncleared", np.int64),  # first row not yet clear of the junction
         ("open", np.int64),
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
+        ("tail", np.int64),  # its slot (`minisim.engine.packed`), or -1 once it has arrived
+        ("slot", np.int64),  # slot of its first vehicle on the road
+        ("driving", np.int64),  # how many it has there
+        ("entered", np.int64),  # how many of these have entered the junction
     ]
 )
 
@@ -199,5 +203,6 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
     for name in ("first", "next", "front", "uncleared"):
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
-    lanes["last"] = -1
+    for name in ("last", "tail"):
+        lanes[name] = -1
     return lanes

@@ -11,7 +11,7 @@ from minisim.carfollowing import braking_distance
 from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, Floats, Ints, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import allocating, njit, njit_inline
 from minisim.junction.meetings import Meeting
 from minisim.laws import KRAUSS, Law, krauss_stop
 from minisim.ticks import NEVER
@@ -35,7 +35,7 @@ class Ahead(NamedTuple):
     tail: float  # the last one on its exit
 
 
-@njit
+@allocating
 def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cruise) -> Ints:
     """The rows of the vehicles at least partly in the junction."""
     inside = np.empty(INSIDE, np.int64)
