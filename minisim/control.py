@@ -308,6 +308,10 @@ class Plan:
         "m", default=(), low=-1000,
     )  # fmt: skip
     wake_on_clear: Switch = switch("wake when a rear bumper leaves the junction", default=False)
+    wake_when_empty: Switch = switch(
+        "marks and vehicles that leave wake only while no vehicle is inside the junction",
+        default=False,
+    )  # fmt: skip
     period: float | None = real(
         "wake at this interval, at least the step", "s", default=None, above=0, optional=True
     )

@@ -86,6 +86,7 @@ class Law(NamedTuple):
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # highest at insertion
     wake_on_clear: bool
+    wake_when_empty: bool
     record_from: int  # ticks
     record_to: int
     record_start: float  # s where recording starts
@@ -119,6 +120,7 @@ def build_law(
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
+        wake_when_empty=plan.wake_when_empty,
         record_from=first_tick(record_window[0], site.dt) if record else NEVER,
         record_to=first_tick(record_window[1], site.dt) if record else NEVER,
         record_start=entry - RECORD_BEFORE if near else -math.inf,

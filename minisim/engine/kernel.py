@@ -112,12 +112,23 @@ def step(
             if vehicles[ints[ROW, i]]["status"] == ARRIVED:
                 dismiss(floats, ints, vehicles, lanes, i)
                 catch_up(vehicles, lanes)
+    if law.wake_when_empty and reasons & (MARKED | CLEAR) and occupied(floats, ints, lanes, law):
+        reasons &= ~(MARKED | CLEAR)
     if may_touch(floats, ints, lanes, road, law, bodies):
         reasons |= TOUCH
     done = True
     for lane in range(len(lanes)):
         done &= lanes[lane]["first"] == lanes[lane]["end"]
     return reasons | DONE if done else reasons
+
+
+@njit
+def occupied(floats: Floats, ints: Ints, lanes: Records, law: Law) -> bool:
+    """Whether any vehicle is inside the junction, at least partly."""
+    for i in range(count(lanes)):
+        if floats[S, i] > law.entry and ints[CLEARED, i] == 0:
+            return True
+    return False
 
 
 @njit
