@@ -145,7 +145,7 @@ def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.Arra
 def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour: str) -> None:
     """Draw a vehicle with its front bumper at `s` on its path."""
     x, y = path.position(s)
-    _, heading = path.pose(s, vehicle.length)
+    _, heading = path.pose(s, vehicle)
     angle = math.degrees(math.atan2(heading[0], heading[1]))
     body, glass = (place(shape, x, y, angle)[0] for shape in body_shape(vehicle))
     axes.add_patch(Polygon(body, facecolor=colour, edgecolor=style.PAINT, linewidth=1.0, zorder=6))

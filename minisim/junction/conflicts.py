@@ -99,7 +99,9 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     """Smallest distance [m] between a vehicle held at its entry and a corridor of another arm.
 
     0 means that the vehicle does not fit the lanes: when turning into an exit lane, it would touch
-    a vehicle waiting beside that lane.
+    a vehicle waiting beside that lane. A vehicle with a `rear_axle` must not touch those that leave
+    beside its own approach lane either: its overhang swings out. How far such a body stands off its
+    lane only falls beyond the exit, so farther out it touches none either.
     """
     entry, movements = intersection.approach_length, intersection.movements
     arms, allowed = intersection.approaches, intersection.allowed
@@ -108,7 +110,23 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     held = np.array([shapely.MultiPolygon([(c, ()) for c in four]) for four in bodies_held])
     distance = shapely.distance(corridors(intersection, vehicles)[:, None], held[None, :])
     others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
-    return float(distance[others].min(initial=math.inf))
+    room = float(distance[others].min(initial=math.inf))
+    if any(it.rear_axle is not None for it in vehicles.types):
+        room = min(room, *(_tail_room(intersection, vehicles, arm) for arm in arms))
+    return room
+
+
+def _tail_room(intersection: Intersection, vehicles: Vehicles, arm: int) -> float:
+    """Smallest distance [m] between corridors from an arm and bodies that leave by it."""
+    movements, allowed = intersection.movements, intersection.allowed
+    leaving = np.flatnonzero(allowed & (movements.exits == arm))
+    if not len(leaving):
+        return math.inf
+    path, far = intersection.paths[leaving[0]], 2.0 * max(it.length for it in vehicles.types)
+    lane = shapely.LineString([path.points[-1], path.points[-1] + far * path.heading_out])
+    strip = lane.buffer(max(it.width for it in vehicles.types) / 2.0, cap_style="flat")
+    own = corridors(intersection, vehicles)[allowed & (movements.origins == arm)]
+    return float(shapely.distance(own, strip).min())
 
 
 @lru_cache(maxsize=256)

@@ -100,7 +100,7 @@ def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
     vehicle = run.site.vehicle
     path = run.site.intersection.paths[2]
     for s in (path.entry - 3.0, path.entry + 4.0, path.exit + 9.0):
-        centre, heading = path.pose(s, vehicle.length)
+        centre, heading = path.pose(s, vehicle)
         front = centre + heading * vehicle.length / 2.0
         angle = math.degrees(math.atan2(heading[0], heading[1]))
         body, glass = drawing.body_shape(vehicle)
