@@ -212,7 +212,7 @@ class Fleet:
         most = ("length", "width", "headway", "min_gap", "speed_deviation")
         bound = {key: min(getattr(it, key) for it in self.types) for key in least}
         bound |= {key: max(getattr(it, key) for it in self.types) for key in most}
-        bound["rear_axle"] = max((it.rear_axle or 0.0 for it in self.types)) or None
+        bound["rear_axle"] = max(it.rear_axle or 0.0 for it in self.types) or None
         return replace(first, name="the worst of the fleet", **bound)
 
     def drawn(self, lane: Ints, rank: Ints, seed: int) -> Ints:

@@ -74,24 +74,28 @@ def corridors(intersection: Intersection, vehicles: Vehicles) -> Shapes:
 
 
 @lru_cache(maxsize=256)
-def separation(intersection: Intersection, vehicles: Vehicles) -> Floats:
+def separation(intersection: Intersection, vehicles: Vehicles, by_type: bool = False) -> Floats:
     """Distance [m] between the corridors of each pair of movements, shape (m, m).
 
-    0 where they overlap, and between movements from the same arm, which begin together.
+    0 where they overlap, and between movements from the same arm, which begin together. `by_type`
+    it is that of each pair of types and movements, shape (types·m, types·m), first type first.
     """
-    swept = corridors(intersection, vehicles)
-    i, j = np.triu_indices(len(swept), 1)
-    result = np.zeros(intersection.movements.apart.shape)
+    kinds: tuple[Vehicles, ...] = vehicles.types if by_type else (vehicles,)
+    swept = np.concatenate([corridors(intersection, it) for it in kinds])
+    apart = np.tile(intersection.movements.apart, (len(kinds), len(kinds)))
+    i, j = np.nonzero(np.triu(apart))
+    result = np.zeros(apart.shape)
     result[i, j] = result[j, i] = shapely.distance(swept[i], swept[j])
-    return _fixed(np.where(intersection.movements.apart, result, 0.0))
+    return _fixed(result)
 
 
 def conflicts(
-    intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE
-) -> Bools:
-    """Whether two movements come closer than `clearance` [m]; shape (m, m), symmetric."""
+    intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE,
+    by_type: bool = False,
+) -> Bools:  # fmt: skip
+    """Whether two movements come closer than `clearance` [m]; shapes as `separation`, symmetric."""
     number("clearance [m]", clearance, low=0, high=10)
-    return np.asarray(separation(intersection, vehicles) <= clearance)
+    return np.asarray(separation(intersection, vehicles, by_type) <= clearance)
 
 
 @lru_cache(maxsize=256)

@@ -22,7 +22,10 @@ FLEET = Fleet(
     ((0.25,),) * 4,
 )
 SITES = [
-    Site(Intersection(arms, side=side, lane_width=4.5, junction_radius=16.0), FLEET, 14.0, (1.0,) * len(arms))
+    Site(
+        Intersection(arms, side=side, lane_width=4.5, junction_radius=16.0),
+        FLEET, 14.0, (1.0,) * len(arms),
+    )
     for arms, side in (((0.0, 90.0, 180.0, 270.0), "left"), ((0.0, 110.0, 250.0), "right"))
 ]  # fmt: skip
 
