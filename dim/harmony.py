@@ -48,6 +48,7 @@ class HarmonyMatrix:
     def __post_init__(self) -> None:
         n = integer("number of arms", self.n, low=3, high=len(ARM_NAMES))
         object.__setattr__(self, "n", n)
+        object.__setattr__(self, "types", integer("number of types", self.types, low=1))
         values = _checked(self.values, self.movements)
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
@@ -128,14 +129,10 @@ class HarmonyMatrix:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, HarmonyMatrix):
             return NotImplemented
-        return (
-            self.n == other.n
-            and self.types == other.types
-            and bool(np.array_equal(self.values, other.values))
-        )
+        return self.n == other.n and bool(np.array_equal(self.values, other.values))
 
     def __hash__(self) -> int:
-        return hash((self.n, self.types, self.values.tobytes()))
+        return hash((self.n, self.values.tobytes()))
 
     def __reduce__(self) -> tuple[type[HarmonyMatrix], tuple[int, Bools, int]]:
         # An unpickled array would be writable: go through the constructor.

@@ -85,7 +85,8 @@ class Movements(tuple[Movement, ...]):
         except (KeyError, TypeError):
             raise InputError(
                 f"no movement {show(movement)} in an intersection of {self.n} arms: a lane a … "
-                f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.index_of.shape[1] - 1}, such as a1"
+                f"{ARM_NAMES[self.n - 1]} and a manoeuvre 1 … {self.types * (self.n - 1)}, "
+                "such as a1"
             ) from None
 
 

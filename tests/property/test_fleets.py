@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from dim import Dim, HarmonyMatrix
-from minisim.control import cover_of
+from dim import Dim, HarmonyMatrix, Mixed, NoisyPerception
+from minisim.control import Controller, cover_of
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import corridor
 from minisim.results.run import Run
@@ -34,12 +34,30 @@ def mixed(draw: st.DrawFn) -> Scenario:
     )  # fmt: skip
 
 
-def served(scenario: Scenario, name: str, seed: int) -> Run:
+def served(scenario: Scenario, controller: Controller | str, seed: int) -> Run:
     """Run to the last arrival; a collision raises."""
-    controller = controller_named(name, scenario.profile)
+    if isinstance(controller, str):
+        controller = controller_named(controller, scenario.profile)
     run = minisim.simulate(drained(scenario, seed, 3000.0), controller, seed, record="all")
     assert run.columns.arrived.all(), "a vehicle was never served"
     return run
+
+
+#: Harmony by the bodies that take part, alone, with wrong perception and among human drivers.
+OWN = (
+    Dim(bodies="own"),
+    Dim(bodies="own", gate="harmonious"),
+    Dim(bodies="own", gate="harmonious", perception=NoisyPerception(unsignalled=(0.3, 0.3))),
+    Mixed(Dim(bodies="own", gate="harmonious"), 0.4),
+)
+
+
+@share(0.1)
+@given(mixed(), st.sampled_from(OWN), seeds)
+def test_nor_do_they_where_harmony_is_by_the_bodies_that_take_part(
+    scenario: Scenario, controller: Controller, seed: int
+) -> None:
+    served(scenario, controller, seed)
 
 
 @share(0.1)
