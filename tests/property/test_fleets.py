@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from dim import Dim, HarmonyMatrix, Mixed, NoisyPerception
+from dim import Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception
 from minisim.control import Controller, cover_of
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import corridor
@@ -47,9 +47,12 @@ def served(scenario: Scenario, controller: Controller | str, seed: int) -> Run:
 OWN = (
     Dim(bodies="own"),
     Dim(bodies="own", gate="harmonious"),
-    Dim(bodies="own", gate="harmonious", perception=NoisyPerception(unsignalled=(0.3, 0.3))),
+    Dim(
+        bodies="own", gate="harmonious", monitor=Monitor(),
+        perception=NoisyPerception(intent_error=0.15, kind="symmetric", confidence=0.8),
+    ),
     Mixed(Dim(bodies="own", gate="harmonious"), 0.4),
-)
+)  # fmt: skip
 
 
 @share(0.1)
