@@ -9,15 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from dim import Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception
-from minisim.control import Controller, cover_of
+from dim import Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception, Zones
+from dim.agent import GATES
+from dim.controller import BODIES
+from minisim.control import COMMIT_MARGIN, Controller, cover_of
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import corridor
 from minisim.results.run import Run
 from scenarios import Scenario, four_way
 from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, PAPER
-from scenarios.strategies import demands, fleets, intersections
+from scenarios.strategies import demands, fleets, floats, intersections
 from tests.builders import drained, share
 
 seeds = st.integers(0, 2**32 - 1)
@@ -61,6 +63,21 @@ def test_nor_do_they_where_harmony_is_by_the_bodies_that_take_part(
     scenario: Scenario, controller: Controller, seed: int
 ) -> None:
     served(scenario, controller, seed)
+
+
+@share(0.1)
+@given(mixed(), st.sampled_from(GATES), st.sampled_from(BODIES), st.data(), seeds)
+def test_nor_do_they_where_the_zones_are_shorter_than_the_vehicles(
+    scenario: Scenario, gate: str, bodies: str, data: st.DataObject, seed: int
+) -> None:
+    longest = scenario.site().vehicle.length
+    green = data.draw(floats(COMMIT_MARGIN, longest / 2.0))
+    zones = Zones(
+        green=green, yellow=data.draw(floats(0.01, 0.99 * longest - green)),
+        red=data.draw(floats(0.0, longest)),
+    )  # fmt: skip
+    assert zones.yellow_start < longest
+    served(scenario, Dim(gate=gate, bodies=bodies, zones=zones), seed)
 
 
 @share(0.1)
