@@ -73,10 +73,10 @@ def test_nor_do_they_where_the_zones_are_shorter_than_the_vehicles(
     longest = scenario.site().vehicle.length
     green = data.draw(floats(COMMIT_MARGIN, longest / 2.0))
     zones = Zones(
-        green=green, yellow=data.draw(floats(0.01, 0.99 * longest - green)),
+        green=green, yellow=data.draw(floats(0.5, 0.99 * longest - green)),
         red=data.draw(floats(0.0, longest)),
     )  # fmt: skip
-    assert zones.yellow_start < longest
+    assert zones.yellow_start < longest, "it takes part while its rear is far behind the zones"
     served(scenario, Dim(gate=gate, bodies=bodies, zones=zones), seed)
 
 
