@@ -57,7 +57,7 @@ OWN = (
 )  # fmt: skip
 
 
-@share(0.1)
+@share(0.03)
 @given(mixed(), st.sampled_from(OWN), seeds)
 def test_nor_do_they_where_harmony_is_by_the_bodies_that_take_part(
     scenario: Scenario, controller: Controller, seed: int
@@ -65,7 +65,7 @@ def test_nor_do_they_where_harmony_is_by_the_bodies_that_take_part(
     served(scenario, controller, seed)
 
 
-@share(0.1)
+@share(0.03)
 @given(mixed(), st.sampled_from(GATES), st.sampled_from(BODIES), st.data(), seeds)
 def test_nor_do_they_where_the_zones_are_shorter_than_the_vehicles(
     scenario: Scenario, gate: str, bodies: str, data: st.DataObject, seed: int
