@@ -20,7 +20,7 @@ from scenarios import Scenario, four_way
 from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, PAPER
 from scenarios.strategies import demands, fleets, floats, intersections
-from tests.builders import drained, share
+from tests.builders import digest, drained, share
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -119,3 +119,12 @@ def test_every_safe_controller_covers_mixed_fleets(name: str) -> None:
     assert scenario.site().vehicle in cover_of(controller_named(name))
     run = served(scenario, name, 1)
     assert set(run.trips["type"]) == set(scenario.vehicles.names)
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_with_exact_perception_a_monitor_never_brakes_for_harmony_by_type(gate: str) -> None:
+    """It knows one matrix for all, but looks where the two bodies really come close."""
+    scenario = four_way(300, fleet="india", lane_width=3.5, profile="fair", horizon=600.0)
+    dim = Dim(gate=gate, bodies="own")
+    watched = minisim.simulate(scenario, replace(dim, monitor=Monitor()), seed=1, record="all")
+    assert digest(watched) == digest(minisim.simulate(scenario, dim, seed=1, record="all"))
