@@ -53,7 +53,7 @@ def test_wider_vehicles_only_remove_harmony(intersection: Intersection, extra: f
     assert not np.any(wide.values & ~narrow.values)
 
 
-@share(0.1)
+@share(0.03)
 @given(intersections(), st.data())
 def test_harmony_by_type_is_that_of_two_types_and_the_worst_is_all_of_it(
     junction: Intersection, data: st.DataObject
