@@ -7,14 +7,14 @@ import math
 from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
 from minisim.engine.state import Floats, Ints, Records, Road
 from minisim.jit import njit, njit_inline
-from minisim.junction.paths import locate
+from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
 
 #: Bodies this close may be touching, given rounding [m]; the exact check follows in pymunk.
 TOUCH_MARGIN = 0.02
 
-#: `locate`, compiled: where the front of a vehicle is.
-place = njit_inline(locate)
+#: `locate` and `dragged`, compiled: where the front of a vehicle is, and its heading.
+place, drag = njit_inline(locate), njit_inline(dragged)
 
 
 @njit
@@ -47,15 +47,20 @@ def may_touch(
                 return True
             past, crossing = s - law.entry, ends[p, 0] - law.entry
             x, y = place(shape[p], headings[p], crossing, past)
-            x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
-            along = math.hypot(x - x_rear, y - y_rear)
-            ux, uy = (x - x_rear) / along, (y - y_rear) / along
+            kind = ints[TYPE, i]
+            axle = road.types[kind].rear_axle
+            if axle > 0.0:
+                ux, uy = drag(shape[p], headings[p], crossing, past, road.trails[kind, p], axle)
+            else:
+                x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
+                along = math.hypot(x - x_rear, y - y_rear)
+                ux, uy = (x - x_rear) / along, (y - y_rear) / along
             bodies[found, 0] = x - ux * length / 2.0
             bodies[found, 1] = y - uy * length / 2.0
             bodies[found, 2] = ux
             bodies[found, 3] = uy
             bodies[found, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[found, 5] = road.types[ints[TYPE, i]].width / 2.0 + TOUCH_MARGIN
+            bodies[found, 5] = road.types[kind].width / 2.0 + TOUCH_MARGIN
             found += 1
     for i in range(found):
         for j in range(i):
