@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
-from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.engine.state import Floats, Ints, Records, Layout
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
@@ -19,7 +19,7 @@ place, drag = njit_inline(locate), njit_inline(dragged)
 
 @njit
 def may_touch(
-    floats: Floats, ints: Ints, lanes: Records, road: Road, law: Law, bodies: Floats
+    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, bodies: Floats
 ) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 

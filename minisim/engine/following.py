@@ -46,7 +46,7 @@ from minisim.engine.packed import (
     count,
     padded,
 )
-from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.engine.state import Floats, Ints, Records, Layout
 from minisim.jit import njit, njit_inline
 from minisim.laws import (
     IDM,
@@ -64,7 +64,7 @@ from minisim.laws import (
 
 @njit_inline
 def accelerate(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
     braking: bool,
 ) -> bool:  # fmt: skip
     """Choose every vehicle's acceleration; returns whether two overlap."""
@@ -95,7 +95,7 @@ def next_ahead(floats: Floats, n: int) -> None:
 
 @njit_inline
 def near_junction(
-    floats: Floats, ints: Ints, lanes: Records, road: Road, law: Law, lane: int
+    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, lane: int
 ) -> bool:
     """The leaders of the vehicles that have entered the junction, and of the first one that has not.
 
@@ -155,7 +155,7 @@ def near_junction(
 
 @njit
 def beyond(
-    floats: Floats, ints: Ints, road: Road, law: Law, first: int, stop: int, i: int
+    floats: Floats, ints: Ints, road: Layout, law: Law, first: int, stop: int, i: int
 ) -> float:
     """The least room behind the vehicles from slot `first` to before `stop` on i's path."""
     narrowest = math.inf
@@ -170,7 +170,7 @@ def beyond(
 
 
 @njit_inline
-def weigh(floats: Floats, ints: Ints, road: Road, law: Law, n: int) -> bool:
+def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
     """What the leaders ask for; returns whether two vehicles overlap."""
     v, gap, lead_v, lead_b = floats[V], floats[GAP], floats[LEAD_V], floats[LEAD_B]
     z, room, b_max = floats[CLOSENESS], floats[ROOM], floats[B_MAX]
@@ -205,7 +205,7 @@ def weigh(floats: Floats, ints: Ints, road: Road, law: Law, n: int) -> bool:
 
 @njit_inline
 def choose(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law, n: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int
 ) -> None:
     """The acceleration that the law, the limits and the hold line allow."""
     flag = floats[FLAG]
@@ -233,7 +233,7 @@ def choose(
 
 @njit_inline
 def careful(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law, i: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
 ) -> None:
     """`choose` for a vehicle that may have to slow down, or has an advised speed."""
     s, v, z, p = floats[S, i], floats[V, i], floats[CLOSENESS, i], ints[PATH, i]
@@ -262,7 +262,7 @@ def careful(
 
 
 @njit_inline
-def keep_rooms(floats: Floats, ints: Ints, road: Road, law: Law, n: int) -> None:
+def keep_rooms(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> None:
     """Brake harder where the room behind a leader asks for it."""
     v, acc, room, b_max, flag = floats[V], floats[ACC], floats[ROOM], floats[B_MAX], floats[FLAG]
     for i in range(padded(n)):

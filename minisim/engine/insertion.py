@@ -7,14 +7,14 @@ import math
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.packed import B_MAX, LENGTH, S, V, admit
-from minisim.engine.state import DRIVING, Floats, Ints, Records, Road
+from minisim.engine.state import DRIVING, Floats, Ints, Records, Layout
 from minisim.jit import njit
 from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 
 @njit
 def insert(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
     cruise: Cruise | None, tick: int,
 ) -> bool:  # fmt: skip
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.

@@ -28,7 +28,7 @@ from minisim.engine.packed import (
     heed,
     store,
 )
-from minisim.engine.state import ARRIVED, Floats, Ints, Records, Road
+from minisim.engine.state import ARRIVED, Floats, Ints, Records, Layout
 from minisim.jit import njit, njit_inline
 from minisim.laws import Law
 
@@ -42,7 +42,7 @@ def advance(
     ints: Ints,
     vehicles: Records,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     cruise: Cruise | None,
     trace: Records,
@@ -83,7 +83,7 @@ def step(
     ints: Ints,
     vehicles: Records,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     cruise: Cruise | None,
     bodies: Floats,
@@ -136,7 +136,7 @@ def record(
     floats: Floats,
     ints: Ints,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     trace: Records,
     traced: int,

@@ -30,7 +30,7 @@ from minisim.engine.packed import (
     expect,
     padded,
 )
-from minisim.engine.state import ARRIVED, Floats, Ints, Records, Road
+from minisim.engine.state import ARRIVED, Floats, Ints, Records, Layout
 from minisim.jit import njit, njit_inline
 from minisim.laws import Law
 
@@ -40,7 +40,7 @@ MARKED, CLEAR = 1, 2
 
 @njit_inline
 def move(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law, tick: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, tick: int
 ) -> int:
     """Move every vehicle by one step, add up waiting and loss; returns reasons to wake, as bits."""
     n = count(lanes)
@@ -61,7 +61,7 @@ def move(
 
 
 @njit_inline
-def enter_sections(floats: Floats, ints: Ints, vehicles: Records, road: Road, n: int) -> None:
+def enter_sections(floats: Floats, ints: Ints, vehicles: Records, road: Layout, n: int) -> None:
     """Note the limits of the sections that vehicles have entered."""
     for i in range(n):
         if floats[S, i] < floats[EVENT, i]:
@@ -89,7 +89,7 @@ def add_up(floats: Floats, n: int) -> None:
 
 @njit
 def happenings(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law, n: int,
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int,
     tick: int,
 ) -> int:  # fmt: skip
     """Carry out what happens to the vehicles that have reached their `EVENT`."""

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.engine.state import Floats, Ints, Records, Layout
 from minisim.jit import njit, njit_inline
 from minisim.laws import STOP_MARGIN, Law
 
@@ -43,7 +43,7 @@ ROW, LANE, PATH, TYPE, SECTION, MARK, AHEAD, CLEARED, RELEASED = range(9)
 INTS = 9
 
 
-def empty_pack(vehicles: Records, lanes: Records, road: Road) -> tuple[Floats, Ints]:
+def empty_pack(vehicles: Records, lanes: Records, road: Layout) -> tuple[Floats, Ints]:
     """Room for as many vehicles as fit on the roads, shapes (FLOATS, k) and (INTS, k)."""
     shortest = min((it.length for it in road.types), default=1.0)
     per_lane = int((road.ends[:, 1] - road.ends[:, 3]).max() / shortest) + 2
@@ -70,7 +70,7 @@ def padded(n: int) -> int:
 
 @njit
 def admit(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law, i: int
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
 ) -> None:
     """Give row i, which has just been inserted on its lane, a slot behind the others there."""
     lane = vehicles[i]["lane"]
@@ -161,7 +161,7 @@ def keep(floats: Floats, ints: Ints, vehicles: Records, i: int) -> None:
 
 @njit
 def heed(
-    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Road, law: Law
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law
 ) -> bool:
     """Take over what commands have changed; returns whether any vehicle is told to brake."""
     braking = False
@@ -178,7 +178,7 @@ def heed(
 
 
 @njit_inline
-def beware(floats: Floats, ints: Ints, vehicles: Records, road: Road, law: Law, i: int) -> None:
+def beware(floats: Floats, ints: Ints, vehicles: Records, road: Layout, law: Law, i: int) -> None:
     """Note the first `s` ahead that may call for braking; minus infinity if that is anywhere."""
     s = floats[S, i]
     care = road.section_start[ints[PATH, i], ints[SECTION, i] + 1]
@@ -189,7 +189,7 @@ def beware(floats: Floats, ints: Ints, vehicles: Records, road: Road, law: Law, 
 
 
 @njit
-def expect(floats: Floats, ints: Ints, road: Road, law: Law, i: int) -> None:
+def expect(floats: Floats, ints: Ints, road: Layout, law: Law, i: int) -> None:
     """Note the next `s` at which something happens."""
     p = ints[PATH, i]
     leave, length = floats[LEAVE, i], floats[LENGTH, i]
