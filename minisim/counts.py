@@ -66,7 +66,7 @@ class Count:
             rates = tuple((lanes.sum(1) * 3600.0 / (end - start)).tolist())
             turns = tuple(tuple(row) if sum(row) else None for row in lanes.tolist())
             periods.append(Period(start=start, end=end, rates=rates, turns=turns))
-        return DemandProfile(name=self.name, periods=tuple(periods))
+        return DemandProfile(name=self.name, periods=tuple(periods), fleet=self.fleet)
 
     @property
     def mix(self) -> str:

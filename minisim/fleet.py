@@ -200,9 +200,21 @@ class Fleet:
 
 #: What has `types`: a fleet, or the only type that drives.
 Vehicles = Fleet | VehicleType
+#: What `fleet_named` reads.
+FleetLike = Vehicles | Mapping[str, float | Sequence[float]] | str
 
 
-def fleet_named(value: Any, base: VehicleType) -> Fleet:
+def driven_like(fleet: Fleet, base: VehicleType) -> Fleet:
+    """The same fleet, whose vehicles follow others by the law of `base`.
+
+    Raises `InputError` if `base` is under cruise control or has SUMO's rules.
+    """
+    if base.sumo is not None:
+        raise InputError(f"the fleet {fleet} needs the profile paper or fair, not SUMO's vehicles")
+    return replace(fleet, types=tuple(replace(it, model=base.model) for it in fleet.types))
+
+
+def fleet_named(value: FleetLike, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
@@ -236,10 +248,8 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
             raise InputError(f"fleet names a vehicle type twice: {', '.join(p[0] for p in pairs)}")
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
-    if base.sumo is not None:
-        raise InputError("a fleet needs the profile paper or fair, not with SUMO's vehicles")
-    types = [TYPES[choice("vehicle type", name, TYPES)] for name in value]
-    return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
+    types = tuple(TYPES[choice("vehicle type", name, TYPES)] for name in value)
+    return driven_like(Fleet(types, tuple(value.values())), base)
 
 
 #: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from minisim.demand import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
+from minisim.shares import BALANCED, read_shares, shares_text
 from scenarios import paper
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance

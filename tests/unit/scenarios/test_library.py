@@ -93,7 +93,7 @@ def test_demand_by_time_of_day_replaces_the_constant_one_and_gives_the_horizon()
         three_way(demand=day, recorded=scenario.arrivals(1))
     with pytest.raises(InputError, match="'profile' has 3 lanes, the junction has 4"):
         four_way(demand=day)
-    with pytest.raises(InputError, match="ends 3600 s after the start, before the run of 3601 s"):
+    with pytest.raises(InputError, match="ends 3600 s after its start, before the run of 3601 s"):
         three_way(demand=day, horizon=3601)
     with pytest.raises(InputError, match="demand must be a DemandProfile"):
         three_way(demand="day.toml")
