@@ -103,4 +103,4 @@ def _toml(value: Any) -> str:
         return f"[{', '.join(map(_toml, value))}]"
     if value is None or isinstance(value, str):
         return json.dumps(value or UNIFORM, ensure_ascii=False)
-    return f"{value:.17g}".removesuffix(".0") if value != int(value) else str(int(value))
+    return repr(float(value)).removesuffix(".0")

@@ -6,7 +6,8 @@
     survey("town.net.xml")  # every node, and whether the simulator can say it
 
 Networks are read as they are; an extract of OpenStreetMap goes through netconvert first (extra
-`sumo`).
+`sumo`). Bearings are from true north, also where the network's y axis is the north of a UTM grid,
+which may be 3° off; other projections are taken as they are.
 """
 
 from __future__ import annotations

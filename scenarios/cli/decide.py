@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
+from minisim.errors import InputError
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, names
+from scenarios.cli.shared.proof import Plot, answer, closed, decision_text, junction, names
 
 
 @app.command(
@@ -27,6 +28,7 @@ def decide(
     order: options.Order = "size",
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     plot: Plot = None,
     as_json: options.AsJson = False,
@@ -34,7 +36,9 @@ def decide(
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, explain
 
-    what, matrix = junction(scenario, bearings, side, profile)
+    what, matrix = junction(scenario, bearings, side, node, profile)
+    if shut := [it for it in movements if it in closed(what)]:
+        raise InputError(f"no vehicle may take {shut[0]} at {what.name}")
     explanation = explain(movements, matrix, order)
     if plot is not None:
         from figures.junction.decision import decision_figure

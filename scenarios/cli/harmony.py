@@ -11,7 +11,7 @@ from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import answer, harmony_table, junction
+from scenarios.cli.shared.proof import answer, closed, harmony_table, junction
 
 
 @app.command(
@@ -22,6 +22,7 @@ def harmony(
     scenario: options.ScenarioName,
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     clearance: Annotated[
         float, typer.Option(metavar="M", help="Room between the paths of two bodies in metres.")
@@ -32,7 +33,7 @@ def harmony(
     """Print which movements can be driven together: the harmony matrix."""
     if csv and as_json:
         raise InputError("--csv and --json cannot be combined; give one")
-    what, matrix = junction(scenario, bearings, side, profile, clearance)
+    what, matrix = junction(scenario, bearings, side, node, profile, clearance)
     if csv:
         typer.echo(matrix.to_text(), nl=False)
         return
@@ -41,7 +42,10 @@ def harmony(
         "side": what.intersection.side,
         "clearance_m": clearance,
         "movements": list(matrix.movements.names),
+        "closed": closed(what),
         "harmony": matrix.values.astype(int).tolist(),
     }
     title = Text(f"{what.name}, {what.intersection.side}-hand traffic: ● harmony, · conflict")
+    if closed(what):
+        title.append(f"; no vehicle may take {', '.join(closed(what))}")
     answer(as_json, facts, title, harmony_table(matrix))

@@ -75,9 +75,16 @@ class Case:
         return self.scenario.density if self.published is None else self.published.density
 
     @property
+    def fleet(self) -> str:
+        """The fleet, such as "car:0.9,bus:0.1"; empty for the profile's vehicle alone."""
+        vehicles = self.scenario.vehicles
+        return "" if vehicles.types == (self.scenario.profile.vehicle,) else str(vehicles)
+
+    @property
     def name(self) -> str:
         """The cell's name, such as "four-way balanced 350 dim"."""
-        return f"{self.scenario.name} {self.split} {self.density:g} {self.controller}"
+        words = (self.scenario.name, self.split, f"{self.density:g}", self.fleet, self.controller)
+        return " ".join(filter(None, words))
 
     @property
     def same_law(self) -> bool:

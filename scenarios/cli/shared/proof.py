@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,14 +38,21 @@ Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", call
 
 
 def junction(
-    name: str, bearings: str | None, side: str | None, profile: str, clearance: float = CLEARANCE
-) -> tuple[Scenario, HarmonyMatrix]:
+    name: str, bearings: str | None, side: str | None, node: str | None, profile: str,
+    clearance: float = CLEARANCE,
+) -> tuple[Scenario, HarmonyMatrix]:  # fmt: skip
     """A scenario and the harmony matrix of its movements."""
     from dim import HarmonyMatrix
 
-    scenario = build_scenario(name, bearings, profile=profile, side=side)
+    scenario = build_scenario(name, bearings, profile=profile, side=side, node=node)
     vehicle = scenario.profile.vehicle
     return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicle, clearance)
+
+
+def closed(scenario: Scenario) -> list[str]:
+    """The movements of a junction that no vehicle may take."""
+    junction = scenario.intersection
+    return [str(it) for it in compress(junction.movements, ~junction.allowed)]
 
 
 def answer(
