@@ -210,7 +210,10 @@ def driven_like(fleet: Fleet, base: VehicleType) -> Fleet:
     Raises `InputError` if `base` is under cruise control or has SUMO's rules.
     """
     if base.sumo is not None:
-        raise InputError(f"the fleet {fleet} needs the profile paper or fair, not SUMO's vehicles")
+        raise InputError(
+            "a fleet, given or brought by a demand, needs the profile paper or fair, not one with "
+            "SUMO's vehicles"
+        )
     return replace(fleet, types=tuple(replace(it, model=base.model) for it in fleet.types))
 
 

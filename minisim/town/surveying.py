@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from minisim.control import Site
-from minisim.errors import InputError, instance, show
+from minisim.errors import FileError, InputError, instance, show
 from minisim.files import AnyPath
 from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
@@ -97,10 +97,9 @@ def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -
         every = list(_surveys(town))
         possible = [it for it in every if it.intersection is not None]
         if len(possible) != 1:
-            what = f"{len(possible)} of {len(every)} nodes" if every else "no node"
             raise InputError(
-                f"{path} has {what} that can be read; name one with node "
-                "(minisim junction --list names them)"
+                f"{path} has {len(possible)} of {len(every)} nodes that can be read; name one with "
+                "node (minisim junction --list names them)"
             )
         found = possible[0]
     if found.intersection is None:
@@ -121,6 +120,8 @@ def town_of(path: AnyPath, side: str | None = None) -> Town:
     """A network, or an extract that netconvert has turned into one."""
     town = read_town(path)
     if town is not None:
+        if not town.nodes:
+            raise FileError(f"{path} has no nodes")
         if side is not None:
             raise InputError("side is for an extract of OpenStreetMap: a network knows its own")
         return town

@@ -111,7 +111,7 @@ def test_a_demand_brings_its_fleet_and_one_given_beside_it_wins() -> None:
     assert not three_way(100, fleet="truck").replaced
     like = replace(FAIR, vehicle=replace(FAIR.vehicle, model="krauss"))
     assert {it.model for it in three_way(demand=day, profile=like).vehicles.types} == {"krauss"}
-    with pytest.raises(InputError, match=r"the fleet .* needs the profile paper or"):
+    with pytest.raises(InputError, match=r"a fleet, .*, needs the profile paper or"):
         three_way(demand=day, profile="as_run")
 
 
