@@ -20,8 +20,8 @@ LINEAR = 1.0
 
 NOTE = (
     "By the interval in which vehicles came, with the vehicles that had not arrived by the end. "
-    f"Times are on a logarithmic scale, linear below {LINEAR:g} s. A … E: where the levels of service "
-    "end at junctions without signals (Highway Capacity Manual, 6th ed.); beyond E is F."
+    f"Times are on a logarithmic scale, linear below {LINEAR:g} s. A … E: where the levels of "
+    "service end at junctions without signals (Highway Capacity Manual, 6th ed.); beyond E is F."
 )
 
 

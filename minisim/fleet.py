@@ -114,7 +114,7 @@ def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
 class Fleet:
     """Which types of vehicles drive, and how many of each.
 
-    A vehicle's type is drawn by its lane and its place there, so it depends on nothing else.
+    The type of a vehicle depends only on the seed, its lane and its rank there.
     """
 
     types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(
@@ -166,9 +166,9 @@ class Fleet:
 
     @cached_property
     def worst(self) -> VehicleType:
-        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
+        """A vehicle as bad as the worst of the types in every respect: length, brakes and so on.
 
-        With one type it is that type.
+        A fleet of one type has that type.
         """
         first, *others = self.types
         if not others:
@@ -180,7 +180,7 @@ class Fleet:
         return replace(first, name="the worst of the fleet", **bound)
 
     def drawn(self, lane: Ints, rank: Ints, seed: int) -> Ints:
-        """Index of the type of each vehicle, shape (k,), by its lane and its place there."""
+        """Index of the type of each vehicle, shape (k,), by its lane and its rank there."""
         if len(self.types) == 1:
             return np.zeros(len(lane), int)
         draws, types = Draws(seed, "types"), np.zeros(len(lane), int)
@@ -198,7 +198,7 @@ class Fleet:
         return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
 
 
-#: What has `types`: a fleet, or the only type that drives.
+#: What has `types`: a fleet, or the one type that drives.
 Vehicles = Fleet | VehicleType
 #: What `fleet_named` reads.
 FleetLike = Vehicles | Mapping[str, float | Sequence[float]] | str
@@ -273,7 +273,7 @@ PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
 }  # fmt: skip
 
-#: SUMO's classes count as the types that they stand for.
+#: SUMO's classes have the factors of these types.
 _ALIKE = {
     "sumo-passenger": "car", "sumo-delivery": "lcv", "sumo-bus": "bus", "sumo-coach": "bus",
     "sumo-truck": "truck", "sumo-trailer": "truck",
@@ -281,10 +281,11 @@ _ALIKE = {
 
 
 def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
-    """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
+    """Passenger car units of a vehicle of each type, by its mean share over `n` lanes.
 
-    Where a unit has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
-    interpolated. Raises `InputError` for an unknown unit, or a type without a factor.
+    If a unit has two factors, the first holds up to a share of 5 % and the second from 10 % on; in
+    between, the factor is interpolated. Raises `InputError` for an unknown unit, or a type without
+    a factor.
     """
     table = PCU[choice("passenger car unit", unit, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)

@@ -22,7 +22,7 @@ Turns = Shares | Sequence[Shares]
 
 
 def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | None:
-    """Shares given as numbers, or as text such as "4:3:2:1" or "(4, 3, 2, 1)".
+    """Shares from numbers, or from text such as "4:3:2:1" or "(4, 3, 2, 1)".
 
     None and the word `equal` mean equal shares, which are returned as None.
 
@@ -48,7 +48,7 @@ def read_shares(name: str, value: object, equal: str) -> tuple[float, ...] | Non
 def read_turns(name: str, value: object) -> Any:
     """Shares of the manoeuvres as for `read_shares`, or a row of them per lane.
 
-    As text, rows are apart by slashes: "1:2:1/uniform/0:1:1/1:2:1". Raises as `read_shares`.
+    As text, slashes separate the rows: "1:2:1/uniform/0:1:1/1:2:1". Raises as `read_shares`.
     """
     rows: Any = value.split("/") if isinstance(value, str) and "/" in value else value
     if isinstance(rows, list | tuple) and any(

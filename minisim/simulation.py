@@ -24,7 +24,7 @@ from minisim.control import (
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.cruise.law import build_cruise
-from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_road, build_vehicles
+from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_layout, build_vehicles
 from minisim.errors import InputError, number
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.laws import build_law
@@ -72,7 +72,7 @@ class Simulation:
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' needs a CruiseVehicle")
-        self._road = build_road(self.site, plan)
+        self._road = build_layout(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)

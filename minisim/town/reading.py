@@ -1,7 +1,7 @@
 """A SUMO network as plain data: its nodes, edges and connections for cars.
 
 The format: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html. A file may be hostile, so it
-is limited in size, and no document type is allowed, without which XML has no entities.
+is limited in size and may not declare a document type; without one, XML has no entities.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ LANE_WIDTH = 3.2
 #: SUMO's class of a car.
 CAR = "passenger"
 
-#: Edges that are no roads: inside junctions, and for pedestrians.
+#: Edges that are not roads: inside junctions, and for pedestrians.
 NO_ROADS = ("internal", "crossing", "walkingarea", "connector")
 
-#: What elements are and have.
+#: Called with the name of an element and its attributes.
 Element = Callable[[str, dict[str, str]], None]
 
 
@@ -82,7 +82,7 @@ class Town(NamedTuple):
 def read_town(path: AnyPath) -> Town | None:
     """Read a network (.net.xml, perhaps packed by gzip); None for an extract of OpenStreetMap.
 
-    Raises `FileError`: unreadable, too large, broken or hostile XML, or neither of the two.
+    Raises `FileError` if it is unreadable, too large, broken or hostile XML, or neither of the two.
     """
     made = _Maker(str(path))
     parse(path, made.element)

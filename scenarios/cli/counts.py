@@ -27,7 +27,7 @@ def counts(
     save: Annotated[Path | None, option("Write the demand and its fleet (.toml).", "FILE")] = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Read a count of turning movements: what was understood, and what was left out."""
+    """Read a count of turning movements; say what was understood and what was left out."""
     from minisim.counts import read_counts
     from minisim.demandfile import write_demand
     from minisim.files import check_apart, check_file
