@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import cycle
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,6 +14,7 @@ from figures import plots, style
 from minisim.clock import time_of_day
 from minisim.results.run import Run
 from minisim.results.service import LEVELS, service
+from scenarios.controllers import VARIANTS
 
 #: Columns of `service` -> titles of their panels; logarithmic, but linear below `LINEAR` [s].
 TIMES = {"waiting_time_s": "mean waiting [s]", "control_delay_s": "mean control delay [s]"}
@@ -62,10 +64,10 @@ def day_figure(runs: Mapping[str, Run], interval: float = 900.0) -> Figure:
 
 
 def _looks(names: Iterable[str]) -> list[style.Look]:
-    strokes = cycle((":", "-.", "--", "-"))
+    strokes: Iterator[Any] = cycle((":", "-.", "--", "-"))
     return [
         style.look(name)
-        if name in style.VARIANTS
+        if name in VARIANTS
         else style.look(name.partition(":")[0])._replace(label=name, dashes=next(strokes))
         for name in names
     ]
