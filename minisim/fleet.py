@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, choice, instance, number, numbers, show
+from minisim.errors import InputError, choice, instance, number, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
@@ -99,15 +98,15 @@ def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
     return types
 
 
-def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
+def _shares(_: str, value: Any) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list | tuple) else (value,)
-    kept = tuple(
-        numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
-        for i, row in enumerate(rows)
+    return tuple(
+        tuple(
+            number("share of a type", share, low=0, high=1)
+            for share in (row if isinstance(row, list | tuple) else (row,))
+        )
+        for row in rows
     )
-    for share in itertools.chain.from_iterable(kept):
-        number("share of a type", share, low=0, high=1)
-    return kept
 
 
 @declared

@@ -244,7 +244,9 @@ def _edges(records: Sequence[Record], given: Mapping[str, Any], place: str) -> t
     for start in starts:
         end = ends[start]
         if end is None and not step:
-            raise FileError(f"{place}: how long is the interval? a mapping can say interval = 15")
+            raise FileError(
+                f"{place}: the length of the interval is unknown; a mapping can say interval = 15"
+            )
         spans.append((start, start + step if end is None else end or 86_400))
         if spans[-1][1] <= start:
             raise FileError(f"{place}: the interval {_span(spans[-1])} must end after its start")

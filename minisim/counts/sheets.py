@@ -72,8 +72,9 @@ def number_of(cell: str, where: str, decimal: str) -> float:
     have decimal commas: it could be 1200 or 1.2.
     """
     if decimal == "," and re.fullmatch(r"\d{1,3}(\.\d{3})+", cell):
-        whole = cell.replace(".", "")
-        raise FileError(f"{where}: {show(cell)} may be {whole} or {float(cell[:5]):g}; write one")
+        whole, part = cell.replace(".", ""), f"{float(cell[: cell.index('.') + 4]):g}"
+        choice = f"write {whole} or {part.replace('.', decimal)}"
+        raise FileError(f"{where}: {show(cell)} may mean {whole} or {part}; {choice}")
     try:
         value = float(cell.replace(decimal, ".") or 0) if cell not in ("-", "–") else 0.0
     except ValueError:

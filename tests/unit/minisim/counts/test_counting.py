@@ -102,7 +102,7 @@ def test_a_sheet_is_of_one_day(tmp_path: Path) -> None:
 
 def test_a_number_that_may_be_thousands_is_refused(tmp_path: Path) -> None:
     """In a sheet of decimal commas."""
-    with pytest.raises(FileError, match=r"line 2: '1\.200' may be 1200 or 1\.2; write one"):
+    with pytest.raises(FileError, match=r"'1\.200' may mean 1200 or 1\.2; write 1200 or 1,2"):
         read(tmp_path, BRITISH.replace("12,5", "1.200"))
 
 
