@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from minisim.errors import InputError
+from minisim.errors import InputError, choice
+from minisim.fleet import TYPES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.proof import Plot, answer, closed, decision_text, junction, names
@@ -30,13 +31,23 @@ def decide(
     side: options.Side = None,
     node: options.Node = None,
     profile: options.ProfileName = "paper",
+    fleet: options.Fleet = None,
+    lane_width: options.LaneWidth = None,
     plot: Plot = None,
+    corridor: Annotated[
+        str | None, options.option("Show in it what bodies of this type sweep.", "TYPE")
+    ] = None,
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, explain
 
-    what, matrix = junction(scenario, bearings, side, node, profile)
+    if corridor is not None and plot is None:
+        raise InputError("--corridor needs --plot: it is drawn there")
+    what, matrix = junction(
+        scenario, bearings, side=side, node=node, profile=profile, fleet=fleet,
+        lane_width=lane_width,
+    )  # fmt: skip
     if shut := [it for it in movements if it in closed(what)]:
         raise InputError(f"no vehicle may take {shut[0]} at {what.name}")
     explanation = explain(movements, matrix, order)
@@ -45,7 +56,9 @@ def decide(
         from figures.style import save
 
         site = what.site()
-        save(decision_figure(explanation, site, Dim().start(site).plan), plot)
+        known = {**TYPES, **{it.name: it for it in site.types}}
+        body = None if corridor is None else known[choice("vehicle type", corridor, known)]
+        save(decision_figure(explanation, site, Dim().start(site).plan, body), plot)
     facts = {
         "scenario": what.name,
         "order": order,

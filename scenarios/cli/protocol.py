@@ -74,7 +74,7 @@ def protocol(
 
     if counterexample is not None:
         check_file(counterexample, ".csv")
-    what, matrix = junction(scenario, bearings, side, node, profile)
+    what, matrix = junction(scenario, bearings, side=side, node=node, profile=profile)
     if matrix.n > MAX_ARMS:
         only = "the protocol is searched for 3 and 4 arms"
         raise InputError(f"{only}; {what.name} has {matrix.n}, and too many states")

@@ -35,7 +35,7 @@ def verify(
     """Check the paper's claims one by one, in every case that can occur at a junction."""
     from dim.proofs.verification import analyse, most_cliques
 
-    what, matrix = junction(scenario, bearings, side, node, profile)
+    what, matrix = junction(scenario, bearings, side=side, node=node, profile=profile)
     with bar("trying all cases") as progress:
         analysis = analyse(matrix, order, closed=closed(what), progress=progress)
     if plot is not None:
