@@ -66,16 +66,15 @@ def direct(
     """
     if not COMPILED:
         return function
-    if (entry := _ENTRIES.get((function, kind))) is None:
+    if (function, kind) not in _ENTRIES:
         import numba
 
         compiled: Any = function
-        entry = compiled.compile(tuple(map(numba.typeof, arguments)))
-        _ENTRIES[function, kind] = entry
-    return entry
+        _ENTRIES[function, kind] = compiled.compile(tuple(map(numba.typeof, arguments)))
+    return _ENTRIES[function, kind]
 
 
-_ENTRIES: dict[tuple[object, Hashable], Any] = {}
+_ENTRIES: dict[tuple[object, Hashable], Callable[..., Any]] = {}
 
 
 def _compile(function: _F, inline: Literal["never", "always"], counting: bool = False) -> _F:
@@ -83,7 +82,8 @@ def _compile(function: _F, inline: Literal["never", "always"], counting: bool = 
         return function
     import numba
 
-    compiled: Any = numba.njit(error_model="numpy", inline=inline, _nrt=counting)(function)
+    options: dict[str, Any] = {"error_model": "numpy", "inline": inline, "_nrt": counting}
+    compiled: Any = numba.njit(**options)(function)
     compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
     return cast(_F, compiled)
 

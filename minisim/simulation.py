@@ -24,6 +24,7 @@ from minisim.control import (
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.cruise.law import build_cruise
+from minisim.engine.moving import CLEAR, MARKED
 from minisim.engine.packed import empty_pack, store
 from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_layout, build_vehicles
 from minisim.errors import InputError, number
@@ -74,12 +75,12 @@ class Simulation:
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' needs a CruiseVehicle")
-        self._road = build_layout(self.site, plan)
+        self._layout = build_layout(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
-        self._pack = empty_pack(self._vehicles, self._lanes, self._road)
+        self._pack = empty_pack(self._vehicles, self._lanes, self._layout)
         self._row = np.argsort(self._vehicles["id"]).tolist()
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
@@ -121,7 +122,7 @@ class Simulation:
         if not self._started:
             self._started = True
             self._decide()
-        world = *self._pack, self._vehicles, self._lanes, self._road, self._law, self._cruise
+        world = *self._pack, self._vehicles, self._lanes, self._layout, self._law, self._cruise
         scratch = self._trace, self._bodies, self._observed
         step = direct(
             kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
@@ -136,7 +137,7 @@ class Simulation:
             if reasons & (kernel.TOUCH | kernel.GAP):
                 self._check_collisions()
             self._done = bool(reasons & kernel.DONE)
-            if self.tick >= self._alarm.tick or reasons & (kernel.MARKED | kernel.CLEAR):
+            if self.tick >= self._alarm.tick or reasons & (MARKED | CLEAR):
                 self._decide()
 
     def run(self) -> Run:
@@ -183,7 +184,7 @@ class Simulation:
 
     def _check_collisions(self) -> None:
         store(*self._pack, self._vehicles, self._lanes)
-        now = collisions_now(self._vehicles, self._road, self.site, self.time)
+        now = collisions_now(self._vehicles, self._layout, self.site, self.time)
         new = {it.vehicles: it for it in now if it.vehicles not in self._collisions}
         self._collisions |= new
         if new and self._hosted.on_collision == "stop":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
-from minisim.engine.state import Floats, Ints, Records, Layout
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law

@@ -10,7 +10,7 @@ import numpy as np
 import pymunk
 
 from minisim.control import Site
-from minisim.engine.state import DRIVING, Records, Layout
+from minisim.engine.state import DRIVING, Layout, Records
 
 
 class Body(NamedTuple):

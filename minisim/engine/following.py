@@ -46,7 +46,7 @@ from minisim.engine.packed import (
     count,
     padded,
 )
-from minisim.engine.state import Floats, Ints, Records, Layout
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import (
     IDM,
@@ -97,7 +97,7 @@ def next_ahead(floats: Floats, n: int) -> None:
 def near_junction(
     floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, lane: int
 ) -> bool:
-    """The leaders of the vehicles that have entered the junction, and of the first one that has not.
+    """The leaders of the vehicles that have entered the junction, and of the first that has not.
 
     Returns whether two overlap.
     """

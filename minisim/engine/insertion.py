@@ -7,7 +7,7 @@ import math
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.packed import B_MAX, LENGTH, S, V, admit
-from minisim.engine.state import DRIVING, Floats, Ints, Records, Layout
+from minisim.engine.state import DRIVING, Floats, Ints, Layout, Records
 from minisim.jit import njit
 from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 

@@ -28,7 +28,7 @@ from minisim.engine.packed import (
     heed,
     store,
 )
-from minisim.engine.state import ARRIVED, Floats, Ints, Records, Layout
+from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import Law
 
@@ -125,10 +125,10 @@ def step(
 @njit
 def occupied(floats: Floats, ints: Ints, lanes: Records, law: Law) -> bool:
     """Whether any vehicle is inside the junction, at least partly."""
+    inside = False
     for i in range(count(lanes)):
-        if floats[S, i] > law.entry and ints[CLEARED, i] == 0:
-            return True
-    return False
+        inside |= floats[S, i] > law.entry and ints[CLEARED, i] == 0
+    return inside
 
 
 @njit

@@ -30,7 +30,7 @@ from minisim.engine.packed import (
     expect,
     padded,
 )
-from minisim.engine.state import ARRIVED, Floats, Ints, Records, Layout
+from minisim.engine.state import ARRIVED, Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import Law
 

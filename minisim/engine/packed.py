@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from minisim.engine.state import Floats, Ints, Records, Layout
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import STOP_MARGIN, Law
 

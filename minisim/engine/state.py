@@ -1,8 +1,8 @@
 """The arrays that a run consists of.
 
 Vehicles form one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-the row before. Lanes form another array. `Layout` and `Law` hold what never changes during a run. Few
-arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
+the row before. Lanes form another array. `Layout` and `Law` hold what never changes during a run.
+Few arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
 """
 
 from __future__ import annotations

@@ -144,7 +144,7 @@ class Worker:
         return car.go or self._open[car.lane]
 
     def _observe(self) -> bool:
-        """Read the new state; returns whether anything has happened for which to wake the session."""
+        """Read the new state; returns whether to wake the session."""
         sumo = self._libsumo
         if self._tick < self._job.horizon:
             for name in sumo.simulation.getDepartedIDList():

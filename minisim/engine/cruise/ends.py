@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from minisim.carfollowing import braking_distance
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import ARRIVED, DRIVING, Records, Layout
+from minisim.engine.state import ARRIVED, DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import PAST_THE_END, Law
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
-from minisim.engine.state import Floats, Ints, Records, Layout
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas

@@ -9,7 +9,7 @@ import numpy as np
 from minisim.carfollowing import STANDSTILL, cruise_control
 from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.state import DRIVING, Records, Layout
+from minisim.engine.state import DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import (
     KRAUSS,
