@@ -24,6 +24,8 @@ MEMORY = np.dtype(
         ("left", np.int64),  # its front has left the junction
         ("at_red", np.int64),  # it would have run a red light and stops dead
         ("stopping", np.int64),  # it was advised to stand still in the previous step
+        ("blocked", np.int64),  # inside the junction, behind another, and hardly moving
+        ("unseen", np.int64),  # it was so in the previous step
     ]
 )
 
@@ -39,6 +41,7 @@ class Cruise(NamedTuple):
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
         yields: (p, p): whether the first way must give way to the second.
         turns_back: (n,): whether the road of an arm leads back at its far end.
+        straightest: (p,): whether a way is the straightest one onto its exit.
         memory: (k,) of `MEMORY`.
         type: the only type of the vehicles.
         last: (n,): last row that entered the exit lane of each arm, or -1.
@@ -62,6 +65,7 @@ class Cruise(NamedTuple):
     waits: Floats
     yields: Bools
     turns_back: Bools
+    straightest: Bools
     memory: Records
     type: Traits
     last: Ints
@@ -95,6 +99,7 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         waits=np.stack([waits, sagittas(intersection, site.vehicle.length)], axis=-1),
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
+        straightest=_straightest(intersection),
         memory=np.zeros(count, MEMORY),
         type=traits_of(site.vehicle),
         last=np.full(intersection.n, -1),
@@ -112,6 +117,13 @@ def _turns_back(intersection: Intersection) -> Bools:
     ways = zip(intersection.paths, intersection.ways or (), strict=False)
     arms = {path.exit_arm for path, way in ways if way.turns_back}
     return np.array([arm in arms for arm in range(intersection.n)])
+
+
+def _straightest(intersection: Intersection) -> Bools:
+    """Whether a way bends least of those onto its exit (`MSLane::getLogicalPredecessorLane`)."""
+    bends = np.array([abs(path.turn) for path in intersection.paths])
+    exits = intersection.movements.exits
+    return np.array([bends[exits == exits[p]].min() == bends[p] for p in range(len(bends))])
 
 
 @njit_inline
