@@ -59,9 +59,18 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cr
 
 @njit
 def meet(
-    vehicles: Records, ends: Floats, law: Law, cruise: Cruise, inside: Ints, i: int, ahead: Ahead
+    vehicles: Records,
+    ends: Floats,
+    law: Law,
+    cruise: Cruise,
+    inside: Ints,
+    i: int,
+    ahead: Ahead,
+    most: float,
 ) -> float:
     """Acceleration that vehicles inside the junction on other ways ask of vehicle i [m/s²].
+
+    Without them it would take `most`.
 
     A vehicle that has yet to enter may drive up to the junction (`MSVehicle::checkLinkLeader`), so
     only its radar counts. Inside it follows those that meet the part of the way that it is on; it
@@ -101,7 +110,7 @@ def meet(
                 faster = max(v, 2.0 * (to_crossing - cruise.type.min_gap) / time - v)
                 a = max(a, min((faster - v) / time, crossing))
             u = min(u, a)
-            if v + u * law.dt < HALTING and yields(vehicles, cruise, i, j, kind):
+            if v + min(u, most) * law.dt < HALTING and yields(vehicles, cruise, i, j, kind):
                 cruise.memory[i]["blocked"] = 1
     return u
 

@@ -98,7 +98,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
             if len(inside) and near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
-                asked = meet(vehicles, ends, law, cruise, inside, i, foes)
+                asked = meet(vehicles, ends, law, cruise, inside, i, foes, u)
                 if law.model == KRAUSS and s < law.entry:
                     asked = max(asked, stop_at_line(v, law.entry - s, mine, law))
                 u = min(u, asked)
