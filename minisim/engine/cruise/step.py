@@ -54,6 +54,9 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             nearest = own = tail = math.inf
             part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
+            held = not is_open and me["go"] == 0 and s < law.entry
+            # To what is beyond a red light (`MSVehicle::planMoveInternal`), all but the radar.
+            blind = held and (law.model == KRAUSS or cruise.obeys)
             if s < leave:
                 if law.model != KRAUSS:
                     u = min(u, (cruise.max_speed - v) / law.dt)
@@ -67,7 +70,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
                         asked = follow(v, rear - s - mine.min_gap, ahead["v"], law, cruise)
-                        u = min(u, asked)
+                        u = min(u, asked) if on_lane or not blind else u
                         nearest = min(nearest, rear - s)
                         if part == 2:
                             own = asked
@@ -77,26 +80,24 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 j = cruise.last[int(ends[p, 2])]
             else:
                 j = me["ahead"]
-            held = not is_open and me["go"] == 0 and s < law.entry
-            blind = held and law.model == KRAUSS  # to what is beyond a red light
-            if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
+            if j >= 0 and vehicles[j]["status"] == DRIVING:
                 ahead = vehicles[j]
                 rear = ahead["s"] - mine.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
                 # A vehicle beside it on another way is left to the radar, or waited for before the
                 # junction (`adaptToLeader`).
                 beside = s < leave and gap < mine.min_gap and rear < 0.0 and ahead["path"] != p
-                if beside and law.model == KRAUSS:
+                if beside and law.model == KRAUSS and not blind:
                     u = min(u, krauss_stop(v, law.entry - s - POSITION_EPS, mine, law))
                 elif not beside:
                     tail = follow(v, gap - mine.min_gap, ahead["v"], law, cruise)
-                    u = min(u, tail)
+                    u = u if blind else min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
-            near = law.entry - s <= cruise.radar and s < leave and not blind
+            near = law.entry - s <= cruise.radar and s < leave and (len(inside) > 0 or blind)
             if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
-                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
-            if len(inside) and near and (part >= 0 or s >= law.entry):
+                near = near and not blind and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
+            if near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
                 asked = meet(vehicles, ends, law, cruise, inside, i, foes, u)
                 if law.model == KRAUSS and s < law.entry:
