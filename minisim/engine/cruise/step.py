@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from minisim.carfollowing import STANDSTILL, cruise_control
+from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
 from minisim.engine.cruise.law import Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.state import DRIVING, Records, Road
+from minisim.engine.state import AMBER, DRIVING, Records, Road
 from minisim.jit import njit
 from minisim.laws import (
     KRAUSS,
@@ -55,8 +55,11 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
             held = not is_open and me["go"] == 0 and s < law.entry
-            # To what is beyond a red light (`MSVehicle::planMoveInternal`), all but the radar.
+            # Where it can stop at a red or amber light, all but the radar is blind to what is beyond
+            # (`MSVehicle::planMoveInternal`).
             blind = held and (law.model == KRAUSS or cruise.obeys)
+            if cruise.obeys and lanes[lane]["open"] == AMBER and s < law.entry:
+                blind = braking_distance(v, mine.b_max, law.dt) <= law.entry - s
             if s < leave:
                 if law.model != KRAUSS:
                     u = min(u, (cruise.max_speed - v) / law.dt)
