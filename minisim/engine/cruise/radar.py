@@ -214,7 +214,7 @@ def room(
     )
     if to_crossing < -law.margin and not in_the_way:
         return math.inf, 0.0, False
-    unseen = cruise.memory[j]["unseen"] != 0 and driven < end and (kind == JOIN or kind == CROSS)
+    unseen = cruise.memory[j]["unseen"] != 0 and driven < end and kind in (JOIN, CROSS)
     if unseen and not in_the_way:
         return math.inf, 0.0, False
     if kind == PART and s >= law.entry and driven < s - law.entry - cruise.type.length:

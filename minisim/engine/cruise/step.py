@@ -55,8 +55,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
             held = not is_open and me["go"] == 0 and s < law.entry
-            # Where it can stop at a red or amber light, all but the radar is blind to what is beyond
-            # (`MSVehicle::planMoveInternal`).
+            # Where it can stop at a light, only the radar sees beyond (`planMoveInternal`).
             blind = held and (law.model == KRAUSS or cruise.obeys)
             if cruise.obeys and lanes[lane]["open"] == AMBER and s < law.entry:
                 blind = braking_distance(v, mine.b_max, law.dt) <= law.entry - s
@@ -99,7 +98,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     nearest = min(nearest, gap)
             near = law.entry - s <= cruise.radar and s < leave and (len(inside) > 0 or blind)
             if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
-                near = near and not blind and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
+                stops = braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
+                near = near and stops and not blind
             if near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
                 asked = meet(vehicles, ends, law, cruise, inside, i, foes, u)
