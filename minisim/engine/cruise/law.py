@@ -23,11 +23,18 @@ MEMORY = np.dtype(
         ("merged", np.int64),  # tick of passing the waiting position, if there is one
         ("left", np.int64),  # its front has left the junction
         ("at_red", np.int64),  # it would have run a red light and stops dead
-        ("stopping", np.int64),  # it was advised to stand still in the previous step
+        ("fastest", np.float64),  # its top speed as set in the previous step, see `FASTEST` [m/s]
         ("blocked", np.int64),  # inside the junction, behind another, and hardly moving
         ("unseen", np.int64),  # it was so in the previous step
     ]
 )
+
+
+#: SUMO's default `desiredMaxSpeed` (`SUMOVTypeParameter`), 10000 km/h [m/s]. CC's desired speed sets
+#: the factor on the limit (`MSCFModel_CC::finalizeSpeed`), and from the next step on this speed times
+#: the factor is the top speed (`MSBaseVehicle::getDesiredMaxSpeed`). So at a desired speed near 0 a
+#: vehicle has to slow down to it at once.
+FASTEST = 10000.0 / 3.6
 
 
 class Cruise(NamedTuple):
@@ -80,6 +87,8 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
     if not isinstance(vehicle, CruiseVehicle):
         vehicle = CruiseVehicle()  # without effect under any other law
     waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
+    memory = np.zeros(count, MEMORY)
+    memory["fastest"] = FASTEST
     return Cruise(
         cruise_speed=vehicle.cruise_speed,
         cruise_gain=vehicle.cruise_gain,
@@ -100,7 +109,7 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
         straightest=_straightest(intersection),
-        memory=np.zeros(count, MEMORY),
+        memory=memory,
         type=traits_of(site.vehicle),
         last=np.full(intersection.n, -1),
     )
@@ -157,11 +166,8 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
 
 
 @njit_inline
-def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
-    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
-
-    From one step after a desired speed of 0, SUMO asks for standstill within one step.
-    """
-    u = -v / law.dt if stopping else max(u, -v / law.dt)
+def realise(v: float, a: float, u: float, law: Law, cruise: Cruise) -> float:
+    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero."""
+    u = max(u, -v / law.dt)
     a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -cruise.type.b_max)
     return -v / law.dt if v + a * law.dt < STANDSTILL * law.dt else a

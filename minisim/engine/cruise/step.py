@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
-from minisim.engine.cruise.law import Cruise, allowed, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
 from minisim.engine.state import AMBER, DRIVING, Records, Road
 from minisim.jit import njit
@@ -110,8 +110,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             if law.model == KRAUSS:
                 a = max(u, -mine.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
             else:
-                stopping = cruise.memory[i]["stopping"] != 0
-                a = realise(v, me["a"], u, stopping, law, cruise)
+                u = min(u, (cruise.memory[i]["fastest"] - v) / law.dt)
+                a = realise(v, me["a"], u, law, cruise)
                 to_wait = law.entry + cruise.waits[p, 0] - s
                 if cruise.obeys and not is_open and 0.0 < to_wait <= cruise.waits[p, 0]:
                     # Past a light that is red now, it is quick to pass its waiting position: SUMO
@@ -119,7 +119,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     least = min(v + u * law.dt, (to_wait + POSITION_EPS) / law.dt)
                     a = max(a, (least - v) / law.dt)
             a = min(a, max(me["brake"], -v / law.dt))
-            cruise.memory[i]["stopping"] = v0 == 0.0
+            cruise.memory[i]["fastest"] = FASTEST * v0 / road.section_speed[p, me["section"]]
             if held and cruise.obeys:
                 if s + (v + a * law.dt) * law.dt >= law.entry:
                     a = -v / law.dt
