@@ -30,10 +30,10 @@ MEMORY = np.dtype(
 )
 
 
-#: SUMO's default `desiredMaxSpeed` (`SUMOVTypeParameter`), 10000 km/h [m/s]. CC's desired speed sets
-#: the factor on the limit (`MSCFModel_CC::finalizeSpeed`), and from the next step on this speed times
-#: the factor is the top speed (`MSBaseVehicle::getDesiredMaxSpeed`). So at a desired speed near 0 a
-#: vehicle has to slow down to it at once.
+#: SUMO's default `desiredMaxSpeed` (`SUMOVTypeParameter`), 10000 km/h [m/s]. CC makes its desired
+#: speed a factor on the limit (`MSCFModel_CC::finalizeSpeed`); from the next step on this speed
+#: times that factor is the top speed (`MSBaseVehicle::getDesiredMaxSpeed`). So one that desires
+#: nearly 0 must slow down at once.
 FASTEST = 10000.0 / 3.6
 
 

@@ -19,7 +19,7 @@ from minisim.carfollowing import (
 )
 from minisim.control import Advise, Plan, Unregulated
 from minisim.engine.cruise.ends import look
-from minisim.engine.cruise.law import build_cruise
+from minisim.engine.cruise.law import FASTEST, build_cruise
 from minisim.engine.cruise.step import accelerate
 from minisim.engine.state import AMBER, DRIVING, Records, build_lanes, build_road, build_vehicles
 from minisim.errors import InputError
@@ -129,6 +129,25 @@ def test_advice_of_zero_stops_within_a_metre_one_step_later() -> None:
     assert v[-1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("v", "a", "wanted", "acceleration"),
+    [
+        (14.733474, -0.5484, 0.070323, -2.0682),
+        (14.712792, -2.0682, 0.029533, -19.3866),
+        (14.518926, -19.3866, 0.006979, -44.7599),
+        (14.071327, -44.7599, 0.161047, -43.9116),  # this one asks for no more than 1.5 m/s²
+    ],
+)
+def test_a_desired_speed_near_0_lowers_the_top_speed_from_the_next_step_on(
+    v: float, a: float, wanted: float, acceleration: float
+) -> None:
+    """SUMO 1.18, V2I-C, 4:1:4:1 at 250 veh/h, vehicle 80 from 280.79 s on.
+
+    10000 km/h times `wanted` over the limit of 14 m/s is all that it may drive.
+    """
+    assert chosen((0, 2, 325.0, v, a, 0), wanted=wanted)[0] == pytest.approx(acceleration, abs=0.02)
+
+
 def test_closed_lanes_hold_it() -> None:
     never = Fixed(Plan(hold_distance=2.0))
     frame = trace((0.0, 0, 2), until=80.0, controller=never).trajectories
@@ -179,12 +198,13 @@ def chosen(
     within: Scenario | None = None,
     light: int = 1,
     steps: int = 1,
+    wanted: float = 14.0,
 ) -> list[float]:
     """Accelerations [m/s²] of cars alone on the published 4-arm junction, one step on.
 
     Each is (lane, manoeuvre, s, v, a, tick of entering the junction); all want 10 m/s inside and
-    14 m/s before it. `light` is what all lanes show; in the last of `steps`, all that they remember
-    is of this scene.
+    14 m/s before it. `light` is what all lanes show; `wanted` is what they desired in the step
+    before, and in the last of `steps` all that they remember is of this scene.
     """
     profile = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, sumo=sumo))
     what = within or replace(MAKERS[arms](profile="as_run"), profile=profile)
@@ -201,6 +221,7 @@ def chosen(
     lanes["open"] = light
     cruise = build_cruise(site, len(vehicles))
     assert cruise is not None
+    cruise.memory["fastest"] = FASTEST * wanted / 14.0
     rows = []
     for lane, _, s, v, a, entered in cars:
         row = int(lanes[lane]["next"])
