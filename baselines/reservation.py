@@ -139,7 +139,7 @@ class Manager:
             for zones in tables
         ]
         entry = site.intersection.approach_length
-        self._branch = branch(site.intersection, site.vehicle) - entry
+        self._branch = branch(site.intersection, site.fleet) - entry
         self._rows = site.intersection.movements.rows
         self._buffer = math.ceil(buffer / site.dt - 1e-6)
 

@@ -44,6 +44,9 @@ from minisim.parameters import Spelled, Takes, checked, declared, part, real, re
 
 _Word: TypeAlias = Literal["inflow", "rotating", "waiting"]
 
+#: Whose bodies the harmony of movements is about, see `Dim.bodies`.
+BODIES = ("worst", "own")
+
 SIGHT_MARGIN = 0.5  #: how far views reach beyond the start of the yellow zone [m]
 
 
@@ -94,6 +97,11 @@ class Dim:
         kinds={"paper": HarmonyMatrix.paper, "file": HarmonyMatrix.from_csv},
         optional=True, default=None,
     )  # fmt: skip
+    bodies: str = word(
+        "whose bodies harmony is about: the worst of the fleet, which all know beforehand, or the "
+        "types that take part, which all see",
+        BODIES, default="worst",
+    )  # fmt: skip
     perception: Spelled[Perception] = part(
         "what vehicles see of each other",
         Perception,
@@ -119,6 +127,8 @@ class Dim:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
+        if self.matrix is not None:
+            refuse_idle(self, "matrix=none", "bodies")
         if self.priorities not in CHANGING:
             refuse_idle(self, "priorities=rotating or waiting", "turn_time")
         if self.priorities != "waiting":
@@ -145,6 +155,8 @@ class Dim:
             return HarmonyMatrix.from_geometry(site.intersection, site.fleet)
         if self.matrix.n != n:
             raise InputError(f"the matrix is for {self.matrix.n} arms, the intersection has {n}")
+        if self.matrix.types > 1:
+            raise InputError("a matrix for several types is not given but made: say bodies=own")
         return self.matrix
 
 
@@ -165,10 +177,14 @@ class DimSession:
         zones = dim.zones
         zones.check(site)
         matrix = dim.harmony(site)
-        table = decision_table(matrix, dim.order, dim.ranks(site))
+        typed = dim.bodies == "own" and len(site.types) > 1
+        rules = matrix
+        if typed:
+            rules = HarmonyMatrix.from_geometry(site.intersection, site.fleet, by_type=True)
+        table = decision_table(rules, dim.order, dim.ranks(site))
         self.rules = Rules(table, dim.gate, dim.commit)
         brakes = tuple(it.deceleration for it in site.types)
-        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit)
+        self.reader = Reader(site.intersection.n, zones, brakes, dim.commit, rules.types)
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
         entry = (0.0,) if dim.gate == "harmonious" else ()
         looks = dim.perception.period

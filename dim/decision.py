@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
 from itertools import combinations, pairwise, product
-from operator import and_, mul
+from operator import and_
 
 import networkx as nx
 
@@ -100,6 +100,7 @@ class DecisionTable:
     A case is what the front vehicle of each lane wants, 0 for none, written as the integer
     Σ manoeuvre·n^lane. So every integer 1 … n^n − 1 is a case, and 0 is the empty junction. An
     entry is computed when first asked for, and kept. Bit i of a right of way is set for lane i.
+    A matrix that tells types apart has c manoeuvres per lane, and c + 1 takes the place of n.
 
     Attributes:
         matrix, order, priorities: what the table was made from, as in `decide`.
@@ -108,8 +109,8 @@ class DecisionTable:
             movement in `crossing` (bit k for the k-th). Movements of one lane follow each other
             and are not in conflict.
         surely: (case, unknown, crossing) -> of the lanes that `crossing` admits, those that have
-            the right of way whatever the participants on the lanes in `unknown` (bit i for lane i)
-            do; the case leaves these participants out.
+            the right of way whatever the participants on the lanes in `unknown` do (bit i for lane
+            i; with types, Σ (1 + type)·(1 + types)^lane); the case leaves these participants out.
 
     Raises `InputError`: unknown order, or priorities that are not a permutation of the lanes.
     """
@@ -118,7 +119,7 @@ class DecisionTable:
         self, matrix: HarmonyMatrix, order: str = "size", priorities: Sequence[int] | None = None
     ) -> None:
         instance("matrix", matrix, HarmonyMatrix)
-        self.matrix = matrix
+        self.matrix, self.base = matrix, matrix.choices + 1
         self.order = choice("order", order, ORDERS)
         self.priorities = lane_ranks(priorities, matrix.n)
         self.lanes = cache(self._solve)
@@ -128,13 +129,13 @@ class DecisionTable:
     def case(self, movements: Iterable[Movement | str]) -> int:
         """The case of these participants; raises `InputError` as `decide` does."""
         participants = _participants(movements, self.matrix)
-        return sum(m.manoeuvre * self.matrix.n**m.origin for m in participants)
+        return sum(m.manoeuvre * self.base**m.origin for m in participants)
 
     def participants(self, case: int) -> Movements:
         """The movements of a case, by lane; raises `InputError` for any other integer."""
-        n = self.matrix.n
+        base = self.base
         case = integer("case", case, low=0, high=len(self))
-        digits = ((lane, case // n**lane % n) for lane in range(n))
+        digits = ((lane, case // base**lane % base) for lane in range(self.matrix.n))
         return tuple(Movement(lane, manoeuvre) for lane, manoeuvre in digits if manoeuvre)
 
     def decide(self, movements: Iterable[Movement | str]) -> Movements:
@@ -144,8 +145,8 @@ class DecisionTable:
         return tuple(m for m in self.participants(case) if lanes >> m.origin & 1)
 
     def __len__(self) -> int:
-        """Number of cases with at least one participant, n^n − 1."""
-        return int(self.matrix.n**self.matrix.n) - 1
+        """Number of cases with at least one participant, n^n − 1 without types."""
+        return int(self.base**self.matrix.n) - 1
 
     def __iter__(self) -> Iterator[Movements]:
         """The participants of every case, from case 1 on."""
@@ -175,12 +176,13 @@ class DecisionTable:
         )
 
     def _agree(self, case: int, unknown: int, crossing: int) -> int:
-        n = self.matrix.n
-        digits = [n**lane for lane in range(n) if unknown >> lane & 1]
-        possible = (
-            case + sum(map(mul, manoeuvres, digits))
-            for manoeuvres in product(range(1, n), repeat=len(digits))
-        )
+        turns, base = self.matrix.n - 1, self.matrix.types + 1
+        kinds = ((lane, unknown // base**lane % base) for lane in range(self.matrix.n))
+        options = [
+            [manoeuvre * self.base**lane for manoeuvre in range((k - 1) * turns + 1, k * turns + 1)]
+            for lane, k in kinds if k
+        ]  # fmt: skip
+        possible = (case + sum(several) for several in product(*options))
         return reduce(and_, (self.lanes(self.admitted(c, crossing)) for c in possible))
 
 

@@ -34,17 +34,22 @@ PAPER_ARMS = (3, 4, 5)  #: arm counts for which the authors published a matrix
 class HarmonyMatrix:
     """Harmony between all n(n−1) movements of a junction of n arms.
 
+    It may tell types of vehicles apart, since all can see whether a vehicle is a bus.
+
     Raises `InputError`, with the entry, unless it is symmetric and all 0 or 1 (0 within a lane).
     """
 
     n: int  #: number of arms, 3 … 12
-    #: Shape (m, m), m = n(n−1), read-only, in the order a1, a2, …, b1, …; True is harmony.
+    #: Shape (m, m), m = n(n−1), read-only, in the order a1, a2, …, b1, …; True is harmony. With
+    #: types, (types·m, types·m), see `Movements`.
     values: Bools
+    types: int = 1  #: number of types that it tells apart
 
     def __post_init__(self) -> None:
         n = integer("number of arms", self.n, low=3, high=len(ARM_NAMES))
         object.__setattr__(self, "n", n)
-        values = _checked(self.values, movements_of(n))
+        object.__setattr__(self, "types", integer("number of types", self.types, low=1))
+        values = _checked(self.values, self.movements)
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
 
@@ -54,13 +59,18 @@ class HarmonyMatrix:
         intersection: Intersection,
         vehicles: Vehicles | None = None,
         clearance: float = CLEARANCE,
+        by_type: bool = False,
     ) -> HarmonyMatrix:
-        """Harmony if the corridors that vehicles sweep stay over `clearance` (0 … 10 m) apart."""
+        """Harmony if the corridors that vehicles sweep stay over `clearance` (0 … 10 m) apart.
+
+        A corridor is that of all types together, or `by_type` of each.
+        """
         instance("intersection", intersection, Intersection)
         vehicles = VehicleType() if vehicles is None else vehicles
         instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        return cls(intersection.n, ~conflicts(intersection, vehicles, clearance))
+        types = len(vehicles.types) if by_type else 1
+        return cls(intersection.n, ~conflicts(intersection, vehicles, clearance, by_type), types)
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
@@ -92,8 +102,13 @@ class HarmonyMatrix:
 
     @property
     def movements(self) -> Movements:
-        """All n(n−1) movements, in the order of rows and columns."""
-        return movements_of(self.n)
+        """All n(n−1) movements of each type, in the order of rows and columns."""
+        return movements_of(self.n, self.types)
+
+    @property
+    def choices(self) -> int:
+        """How many different participants a lane can have."""
+        return self.types * (self.n - 1)
 
     def index(self, movement: Movement | str) -> int:
         """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError` if unknown."""
@@ -119,9 +134,9 @@ class HarmonyMatrix:
     def __hash__(self) -> int:
         return hash((self.n, self.values.tobytes()))
 
-    def __reduce__(self) -> tuple[type[HarmonyMatrix], tuple[int, Bools]]:
+    def __reduce__(self) -> tuple[type[HarmonyMatrix], tuple[int, Bools, int]]:
         # An unpickled array would be writable: go through the constructor.
-        return HarmonyMatrix, (self.n, self.values)
+        return HarmonyMatrix, (self.n, self.values, self.types)
 
     @property
     def spelling(self) -> str:

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from dim.zones import Zones
 from minisim.control import Observed, Site, View, can_stop
-from minisim.junction.movements import movements_of
+from minisim.junction.movements import Movement, movements_of
 from minisim.parameters import declared
 
 #: When a vehicle before the junction is committed. "stoppable": when comfortable braking can no
@@ -68,7 +68,9 @@ class Percept(NamedTuple):
     case: int  #: the participants' movements as an integer, see `DecisionTable`
     #: The crossing vehicles' movements, bit k for the k-th; all of the lane's if `UNKNOWN`.
     occupied: int
-    unknown: int = 0  #: lanes of participants with `UNKNOWN` intent, bit i for lane i; not in case
+    #: Lanes of participants with `UNKNOWN` intent, which are not in the case; bit i for lane i, or
+    #: as `DecisionTable.surely` has it.
+    unknown: int = 0
 
 
 class Reader(NamedTuple):
@@ -78,6 +80,7 @@ class Reader(NamedTuple):
     zones: Zones
     decelerations: tuple[float, ...]  # comfortable braking of each type [m/s²]
     commit: str
+    types: int = 1  # those that the harmony matrix tells apart
 
     def committed(self, vehicle: Observed) -> bool:
         """Whether others must treat a vehicle before the junction as crossing.
@@ -88,10 +91,16 @@ class Reader(NamedTuple):
             return vehicle.distance < self.zones.green / 2.0
         return not can_stop(vehicle, self.decelerations[vehicle.type])
 
+    def typed(self, vehicle: Observed) -> Movement:
+        """Its movement as the matrix counts it (`minisim.junction.movements.Movements`)."""
+        kind = vehicle.type if self.types > 1 else 0
+        return Movement(vehicle.lane, kind * (self.n - 1) + vehicle.manoeuvre)
+
     def read(self, view: View) -> Percept:
         """Participants and crossing vehicles of a view, ordered by lane and front to back."""
-        n, start = self.n, self.zones.yellow_start + ROUNDING
-        bits = movements_of(n).bits
+        n, types, start = self.n, self.types, self.zones.yellow_start + ROUNDING
+        movements, base = movements_of(n), types * (n - 1) + 1
+        bits, kind = movements.bits, 0
         participants, crossing = [], []
         case = occupied = unknown = 0
         lane_served = -1
@@ -100,13 +109,17 @@ class Reader(NamedTuple):
                 continue
             _, lane, manoeuvre, distance, *_ = vehicle
             front = distance >= 0.0 and lane != lane_served
+            if types > 1:
+                kind = vehicle.type
             if front:
                 lane_served = lane
             if distance < 0.0 or self.committed(vehicle):
                 crossing.append(vehicle.id)
-                occupied |= bits[lane][manoeuvre]
+                occupied |= bits[lane][manoeuvre] << kind * len(movements)
             elif front:
                 participants.append(vehicle.id)
-                case += manoeuvre * n**lane
-                unknown |= (manoeuvre == UNKNOWN) << lane
+                if manoeuvre == UNKNOWN:
+                    unknown += (kind + 1) * (types + 1) ** lane
+                else:
+                    case += (kind * (n - 1) + manoeuvre) * base**lane
         return Percept(tuple(participants), tuple(crossing), case, occupied, unknown)

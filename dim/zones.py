@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from minisim.control import COMMIT_MARGIN, Marking, Site, stopping_distance
 from minisim.errors import InputError
+from minisim.laws import STOP_LINE_GAP
 from minisim.parameters import declared, real
 
 KMH = 1.0 / 3.6
@@ -19,7 +20,9 @@ class Zones:
     """
 
     red: float = real("length", "m", default=30.0, low=0, high=1000, label="red zone")
-    yellow: float = real("length", "m", default=6.0, above=0, high=1000, label="yellow zone")
+    # A held vehicle stops up to 0.3 m before its hold line (`minisim.laws.STOP_MARGIN`), and would
+    # never take part if it did not stand in the yellow zone then.
+    yellow: float = real("length", "m", default=6.0, low=0.5, high=1000, label="yellow zone")
     # A vehicle that brakes for the hold line must never look unable to stop: others would wait.
     green: float = real(
         "length", "m", default=2.0, low=COMMIT_MARGIN, high=1000, label="green zone"
@@ -60,7 +63,13 @@ class Zones:
         return tuple(Marking(*stretch) for stretch in stretches if stretch[1] > stretch[2])
 
     def check(self, site: Site) -> None:
-        """Raise `InputError` if a vehicle could be inserted past the start of the zones."""
+        """Raise `InputError` if vehicles could be inserted past the start, or stop before it."""
+        it = site.vehicle
+        if it.sumo is not None and it.model == "krauss" and self.yellow <= STOP_LINE_GAP:
+            raise InputError(
+                f"yellow zone [m] must be more than {STOP_LINE_GAP:g} with SUMO's vehicles, which "
+                f"stop that far before a line, got {self.yellow:g}"
+            )
         room = site.intersection.shortest_approach - site.vehicle.length
         if self.red_start > room:
             raise InputError(

@@ -86,7 +86,7 @@ def number(
     """
     # The usual case first, since every command is checked and `isinstance` with Real is slow.
     if type(value) is float and low <= value <= high and above < value < below:
-        return value
+        return value or 0.0  # not -0.0, which would be spelt in another way
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{name} must be a number, got {show(value)}")
     try:
@@ -99,7 +99,7 @@ def number(
         words = ("at least", "at most", "above", "below")
         allowed = " and ".join(limits(low, high, above, below, words))
         raise InputError(f"{name} must be {allowed}, got {show(value)}")
-    return result
+    return result or 0.0
 
 
 def limits(

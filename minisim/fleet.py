@@ -69,18 +69,53 @@ _SUMO = (
     ),
 )  # fmt: skip
 
+#: SUMO's classes count as the types that they stand for.
+_ALIKE = {
+    "sumo-passenger": "car", "sumo-delivery": "lcv", "sumo-bus": "bus", "sumo-coach": "bus",
+    "sumo-truck": "truck", "sumo-trailer": "truck",
+}  # fmt: skip
+
+#: Where the rear axle is, as a share of the length from the front bumper: (front overhang +
+#: wheelbase) / length of the design vehicles P, SU and CITY-BUS, in feet (AASHTO, A Policy on
+#: Geometric Design of Highways and Streets, 2004, exhibit 2-1). Motorcycles and auto-rickshaws are
+#: too short to leave their path by a decimetre, and a trailer has a joint.
+_REAR_AXLES = {
+    "car": (3 + 11) / 19, "lcv": (3 + 11) / 19, "truck": (4 + 20) / 30, "bus": (7 + 25) / 40,
+}  # fmt: skip
+
+#: Ends the names of types and mixes whose bodies drag their rear axles.
+OFFTRACKING = "-offtracking"
+
+
+def _offtracking(it: VehicleType) -> VehicleType:
+    axle = _REAR_AXLES[_ALIKE.get(it.name, it.name)] * it.length
+    return replace(it, name=it.name + OFFTRACKING, rear_axle=round(axle, 2))
+
+
+_RIGID = tuple(
+    it for it in (*_INDIAN, *_SUMO)
+    if _ALIKE.get(it.name, it.name) in _REAR_AXLES and it.name != "sumo-trailer"
+)  # fmt: skip
+
 #: The ready types by name.
-TYPES: Mapping[str, VehicleType] = {it.name: it for it in (*_INDIAN, *_SUMO)}
+TYPES: Mapping[str, VehicleType] = {
+    it.name: it for it in (*_INDIAN, *_SUMO, *map(_offtracking, _RIGID))
+}
+
+_INDIA = {
+    "motorcycle": 0.72, "auto-rickshaw": 0.079, "car": 0.133, "truck": 0.055, "bus": 0.013,
+}  # fmt: skip
 
 #: Fleets by name. `india` has the shares of the vehicles registered in India on 31 March 2009: 72 %
 #: two-wheelers, 13.3 % cars, jeeps and taxis, 5.5 % goods vehicles, 1.3 % buses (Ministry of Road
 #: Transport, Road Transport Year Book 2007–09). Goods vehicles are trucks here, and the 7.9 % of
 #: other vehicles are auto-rickshaws.
 MIXES: Mapping[str, Mapping[str, float]] = {
-    "india": {
-        "motorcycle": 0.72, "auto-rickshaw": 0.079, "car": 0.133, "truck": 0.055, "bus": 0.013,
+    "india": _INDIA,
+    "india" + OFFTRACKING: {
+        name + OFFTRACKING * (name in _REAR_AXLES): share for name, share in _INDIA.items()
     },
-}  # fmt: skip
+}
 
 
 def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
@@ -177,6 +212,7 @@ class Fleet:
         most = ("length", "width", "headway", "min_gap", "speed_deviation")
         bound = {key: min(getattr(it, key) for it in self.types) for key in least}
         bound |= {key: max(getattr(it, key) for it in self.types) for key in most}
+        bound["rear_axle"] = max(it.rear_axle or 0.0 for it in self.types) or None
         return replace(first, name="the worst of the fleet", **bound)
 
     def drawn(self, lane: Ints, rank: Ints, seed: int) -> Ints:
@@ -260,12 +296,6 @@ PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "pcu-hcm": {"car": (1.0, 1.0), "lcv": (1.0, 1.0), "bus": (2.0, 2.0), "truck": (2.0, 2.0)},
 }  # fmt: skip
 
-#: SUMO's classes count as the types that they stand for.
-_ALIKE = {
-    "sumo-passenger": "car", "sumo-delivery": "lcv", "sumo-bus": "bus", "sumo-coach": "bus",
-    "sumo-truck": "truck", "sumo-trailer": "truck",
-}  # fmt: skip
-
 
 def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
@@ -277,7 +307,8 @@ def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)
     if len(fleet.types) == 1:  # the unit is defined by cars alone
         return (1.0,)
-    kinds = [_ALIKE.get(name, name) for name in fleet.names]
+    plain = [name.removesuffix(OFFTRACKING) for name in fleet.names]
+    kinds = [_ALIKE.get(name, name) for name in plain]
     rows = [table[choice(f"vehicle type in {unit}", kind, table)] for kind in kinds]
     return tuple(
         float(np.interp(share, (0.05, 0.10), row)) for share, row in zip(shares, rows, strict=True)

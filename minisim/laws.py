@@ -57,6 +57,7 @@ class Traits(NamedTuple):
     delta: float
     length: float
     width: float
+    rear_axle: float  # 0 if the body is a chord of its path
 
 
 def traits_of(vehicle: VehicleType) -> Traits:
@@ -64,7 +65,7 @@ def traits_of(vehicle: VehicleType) -> Traits:
     it = vehicle
     return Traits(*map(float, (
         it.acceleration, it.deceleration, it.max_deceleration, it.headway, it.min_gap, it.exponent,
-        it.length, it.width,
+        it.length, it.width, it.rear_axle or 0.0,
     )))  # fmt: skip
 
 
@@ -109,7 +110,7 @@ def build_law(
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
         longest=vehicle.length,
-        room=turning_room(site.intersection, vehicle),
+        room=turning_room(site.intersection, site.fleet),
         margin=vehicle.margin,
         sumo=vehicle.sumo is not None,
         sight=plan.sight,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from minisim.errors import InputError
+from minisim.errors import InputError, number
 from minisim.parameters import Switch, declared, real, switch, text, word
 
 #: SUMO's `POSITION_EPS` [m].
@@ -70,6 +70,11 @@ class VehicleType:
         "bumper to bumper", "m", default=5.0, low=0.5, high=30, label="vehicle length"
     )
     width: float = real("of the body", "m", default=1.8, low=0.3, high=4, label="vehicle width")
+    rear_axle: float | None = real(
+        "from the front bumper to the rear axle, which is dragged through turns (a bicycle model); "
+        "none means that the rear bumper follows the path, as in SUMO",
+        "m", default=None, above=0, high=30, optional=True,
+    )  # fmt: skip
     acceleration: float = real(
         "the IDM's a, Krauß's acceleration", "m/s²", default=2.6, above=0, high=100
     )
@@ -110,6 +115,10 @@ class VehicleType:
             raise InputError(
                 f"sumo={self.sumo!r} needs the car-following model 'krauss', not {self.model!r}"
             )
+        if self.rear_axle is not None:
+            number("rear_axle [m]", self.rear_axle, above=0, high=self.length)
+            if self.sumo is not None:
+                raise InputError("a vehicle with SUMO's rules (sumo=…) has no rear_axle")
         if self.max_deceleration < self.needed_braking:
             raise InputError(
                 f"max_deceleration must be at least {self.needed_braking:.2f} m/s², got "

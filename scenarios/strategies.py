@@ -122,7 +122,12 @@ def vehicles(draw: st.DrawFn) -> VehicleType:
 def fleets(draw: st.DrawFn, intersection: Intersection) -> Fleet:
     """One to five of the ready types and of random ones that fit a junction, with any shares."""
     others = [draw(vehicles()) for _ in range(draw(st.integers(0, 2)))]
-    own = [replace(it, name=f"own {k}", model="idm") for k, it in enumerate(others)]
+    axles = st.none() | floats(0.5, 1.0)  # as shares of the length
+    own = [
+        replace(it, name=f"own {k}", model="idm", rear_axle=share and share * it.length)
+        for k, it in enumerate(others)
+        for share in [draw(axles)]
+    ]
     fitting = [it for it in (*TYPES.values(), *own) if entry_room(intersection, it) > 0.0]
     some = st.lists(st.sampled_from(fitting), min_size=1, max_size=5, unique_by=lambda it: it.name)
     types = draw(some)

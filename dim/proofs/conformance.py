@@ -48,7 +48,7 @@ class CheckedSession:
     def __init__(self, dim: Dim, site: Site) -> None:
         self._session = DimSession(dim, site)
         self.plan: Plan = self._session.plan
-        self.protocol = Protocol(dim.harmony(site), dim.order, dim.gate, dim.commit)
+        self.protocol = Protocol(self._session.rules.table.matrix, dim.order, dim.gate, dim.commit)
         self.state: State = self.protocol.start
         self.steps = 0
         self._start = dim.zones.yellow_start + ROUNDING
@@ -69,7 +69,8 @@ class CheckedSession:
         """Take the model from the last view to this one: vehicles move on, leave and arrive."""
         near = [v for v in view.vehicles if v.distance <= self._start]
         fronts = {v.lane: v for v in reversed(near) if v.distance >= 0.0}
-        inside = {v.id: 1 << self.protocol.matrix.index(v.movement) for v in near if v.distance < 0}
+        index, typed = self.protocol.matrix.index, self._session.reader.typed
+        inside = {v.id: 1 << index(typed(v)) for v in near if v.distance < 0}
         for lane, vehicle in self._fronts.items():
             now = fronts.get(lane)
             if now is not None and now.id == vehicle:
@@ -84,7 +85,7 @@ class CheckedSession:
         for vehicle in inside.keys() - self._inside.keys():
             raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle} entered unseen")
         for lane in sorted(fronts.keys() - {k for k, f in enumerate(self.state.fronts) if f}):
-            self._take(view, Event("arrive", lane, fronts[lane].manoeuvre))
+            self._take(view, Event("arrive", *typed(fronts[lane])))
         self._fronts = {lane: v.id for lane, v in fronts.items()}
 
     def _move(self, view: View, vehicle: Observed) -> None:
@@ -92,7 +93,8 @@ class CheckedSession:
         front = self.state.fronts[vehicle.lane]
         if front is None:
             raise ConformanceError(f"at {view.time:.1f} s vehicle {vehicle.id} arrived unseen")
-        lane, manoeuvre, paper = vehicle.lane, vehicle.manoeuvre, self.protocol.commit == "paper"
+        lane, manoeuvre = self._session.reader.typed(vehicle)
+        paper = self.protocol.commit == "paper"
         if paper and front.phase == WAITING and front.goes:
             self._take(view, Event("roll", lane, manoeuvre))
         committed = self._session.reader.committed(vehicle)

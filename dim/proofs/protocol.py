@@ -20,7 +20,7 @@ from dim.agent import GATES
 from dim.decision import ORDERS, DecisionTable, decision_table
 from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS
-from minisim.junction.movements import Movement
+from minisim.junction.movements import Movement, Movements
 from minisim.parameters import declared, part, word
 
 #: Which lane comes first if cliques tie. "fixed": the lanes' own order. "rotating": the lane
@@ -102,7 +102,7 @@ class Protocol:
         for lane, front in enumerate(state.fronts):
             if front is None:
                 came = (*state.came, lane) if self.priorities == "waiting" else ()
-                for manoeuvre in range(1, self.matrix.n):
+                for manoeuvre in range(1, self.matrix.choices + 1):
                     after = self._put(state, lane, Front(manoeuvre, WAITING, False))
                     yield Event("arrive", lane, manoeuvre), after._replace(came=came)
 
@@ -135,7 +135,7 @@ class Protocol:
         A committed vehicle goes. While vehicles cross, the gate "clear" leaves the rest as they
         are, and "harmonious" keeps out those in conflict. Of the others, the best clique goes.
         """
-        n, rows, bits = self.matrix.n, self.matrix.movements.rows, self.matrix.movements.bits
+        base, rows, bits = self.matrix.choices + 1, self._movements.rows, self._movements.bits
         there = [(lane, front) for lane, front in enumerate(state.fronts) if front is not None]
         occupied = state.inside
         for lane, front in there:
@@ -146,7 +146,7 @@ class Protocol:
         for lane, front in there:
             foes = self._foes[rows[lane][front.manoeuvre]]
             if front.phase != COMMITTED and not foes & occupied:
-                case += front.manoeuvre * n**lane
+                case += front.manoeuvre * base**lane
         table = _table(self.matrix, self.order, self.priorities, state.turn, state.came)
         chosen = 0 if frozen else table.lanes(case)
         fronts = list(state.fronts)
@@ -168,12 +168,16 @@ class Protocol:
     def _enter(self, state: State, lane: int, manoeuvre: int) -> State:
         after = self._put(state, lane, None)
         return after._replace(
-            inside=state.inside | self.matrix.movements.bits[lane][manoeuvre],
+            inside=state.inside | self._movements.bits[lane][manoeuvre],
             came=tuple(other for other in state.came if other != lane),
         )
 
     def _put(self, state: State, lane: int, front: Front | None) -> State:
         return state._replace(fronts=(*state.fronts[:lane], front, *state.fronts[lane + 1 :]))
+
+    @cached_property
+    def _movements(self) -> Movements:
+        return self.matrix.movements
 
     @cached_property
     def _foes(self) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from minisim.control import Observed, Site
-from minisim.junction.paths import locate
+from minisim.junction.paths import dragged, locate, trail_of
 
 Point = tuple[float, float]
 
@@ -36,17 +36,26 @@ class Bodies:
              path.crossing)
             for path in site.intersection.paths
         ]  # fmt: skip
-        self._halves = [(it.length / 2.0, it.width / 2.0) for it in site.types]
+        self._types = site.types
+        self._trails = [
+            [trail_of(path, it.rear_axle).halves.tolist() for path in site.intersection.paths]
+            if it.rear_axle else []
+            for it in site.types
+        ]  # fmt: skip
 
     def body(self, vehicle: Observed) -> Body:
-        """A vehicle's body: the chord of its path between its bumpers (like `Path.pose`)."""
-        way = self._ways[self._rows[vehicle.lane][vehicle.manoeuvre]]
+        """A vehicle's body, as `Path.pose` has it."""
+        index, it = self._rows[vehicle.lane][vehicle.manoeuvre], self._types[vehicle.type]
+        way, half = self._ways[index], it.length / 2.0
         x, y = locate(*way, -vehicle.distance)
-        half, wide = self._halves[vehicle.type]
-        rear_x, rear_y = locate(*way, -vehicle.distance - 2.0 * half)
-        norm = math.hypot(x - rear_x, y - rear_y)
-        ux, uy = (x - rear_x) / norm, (y - rear_y) / norm
-        return Body(x - ux * half, y - uy * half, ux, uy, half, wide)
+        if it.rear_axle is not None:
+            halves = self._trails[vehicle.type][index]
+            ux, uy = dragged(*way, -vehicle.distance, halves, it.rear_axle)
+        else:
+            rear_x, rear_y = locate(*way, -vehicle.distance - it.length)
+            norm = math.hypot(x - rear_x, y - rear_y)
+            ux, uy = (x - rear_x) / norm, (y - rear_y) / norm
+        return Body(x - ux * half, y - uy * half, ux, uy, half, it.width / 2.0)
 
     def hidden(self, eye: Body, target: Body, others: Iterable[Body]) -> bool:
         """Whether bodies block all lines from the eye's centre to a body's centre and corners."""

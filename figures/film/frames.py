@@ -141,10 +141,10 @@ class Frames:
             if not 0.0 <= time - collision.time <= COLLISION_SHOWN:
                 continue
             movements = map(site.intersection.parse, collision.movements)
-            lengths = [site.types[self.run.columns.type[id]].length for id in collision.vehicles]
+            types = [site.types[self.run.columns.type[id]] for id in collision.vehicles]
             centres = [
-                site.intersection.path(movement).pose(s, length)[0]
-                for movement, s, length in zip(movements, collision.positions, lengths, strict=True)
+                site.intersection.path(movement).pose(s, it)[0]
+                for movement, s, it in zip(movements, collision.positions, types, strict=True)
             ]
             rings.append(ring + np.mean(centres, axis=0))
         return rings

@@ -17,17 +17,23 @@ from figures.junction import drawing
 from minisim.control import Plan, Site
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats
+from minisim.vehicle import VehicleType
 
 #: Metres of approach lane shown before the junction.
 APPROACH = 17.0
 
 
-def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
-    """Draw which vehicles may cross, and why; the plan gives the markings and hold line."""
+def decision_figure(
+    explanation: Explanation, site: Site, plan: Plan, body: VehicleType | None = None
+) -> Figure:
+    """Draw which vehicles may cross, and why; the plan gives the markings and hold line.
+
+    With a `body`, all vehicles are of its type, and their corridors are shown.
+    """
     figure = style.new_figure(10.0, 6.0)
     left = figure.add_axes((0.02, 0.13, 0.462, 0.77))
     right = figure.add_axes((0.518, 0.13, 0.462, 0.77))
-    _draw_scene(left, explanation, site, plan)
+    _draw_scene(left, explanation, site, plan, body)
     _draw_graph(right, explanation, site.intersection)
     for x, letter, title in (
         (0.02, "A", "Movements, and where they conflict (×)"),
@@ -35,6 +41,9 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
     ):
         style.write(figure, x, 0.945, letter, 15, bold=True)
         style.write(figure, x + 0.028, 0.945, title, 12)
+    if body is not None:
+        size = f"{body.length:g} × {body.width:g} m"
+        style.write(figure, 0.02, 0.113, f"Shaded: what the bodies sweep ({body.name}, {size}).", 9)
     words = f"Right of way: {', '.join(map(str, explanation.right_of_way))}"
     style.write(figure, 0.02, 0.08, words, 12.5, bold=True, colour=style.RIGHT_OF_WAY)
     style.write(figure, 0.02, 0.035, explanation.reason, 10)
@@ -47,8 +56,10 @@ def decision_figure(explanation: Explanation, site: Site, plan: Plan) -> Figure:
     return figure
 
 
-def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) -> None:
-    intersection, vehicle = site.intersection, site.vehicle
+def _draw_scene(
+    axes: Axes, explanation: Explanation, site: Site, plan: Plan, body: VehicleType | None
+) -> None:
+    intersection, vehicle = site.intersection, body or site.vehicle
     reach = intersection.junction_radius + APPROACH
     drawing.draw_junction(axes, intersection, plan, reach)
     drawing.draw_hold_lines(axes, intersection, plan)
@@ -58,6 +69,8 @@ def _draw_scene(axes: Axes, explanation: Explanation, site: Site, plan: Plan) ->
         colour = style.RIGHT_OF_WAY if goes else style.WAITING
         front = path.entry - plan.hold_distance
         end = path.exit + (3.0 if goes else 5.5)  # keep arrowheads in one exit lane apart
+        if body is not None:
+            drawing.draw_corridor(axes, path, body, colour)
         drawing.draw_way(axes, path, front, end, colour, bold=goes)
         drawing.draw_vehicle(axes, path, front - 0.15, vehicle, colour)
         middle = plan.hold_distance + vehicle.length / 2.0

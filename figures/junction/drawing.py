@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from figures import style
 from minisim.control import Marking, Plan
+from minisim.junction.conflicts import corridor
 from minisim.junction.curves import join
 from minisim.junction.geometry import Arm, Intersection
 from minisim.junction.paths import Floats, Path
@@ -145,11 +147,18 @@ def place(shape: Floats, x: npt.ArrayLike, y: npt.ArrayLike, angle_deg: npt.Arra
 def draw_vehicle(axes: Axes, path: Path, s: float, vehicle: VehicleType, colour: str) -> None:
     """Draw a vehicle with its front bumper at `s` on its path."""
     x, y = path.position(s)
-    _, heading = path.pose(s, vehicle.length)
+    _, heading = path.pose(s, vehicle)
     angle = math.degrees(math.atan2(heading[0], heading[1]))
     body, glass = (place(shape, x, y, angle)[0] for shape in body_shape(vehicle))
     axes.add_patch(Polygon(body, facecolor=colour, edgecolor=style.PAINT, linewidth=1.0, zorder=6))
     axes.add_patch(Polygon(glass, facecolor=style.PAINT, alpha=0.75, linewidth=0, zorder=7))
+
+
+def draw_corridor(axes: Axes, path: Path, vehicle: VehicleType, colour: str) -> None:
+    """Shade the area that a vehicle's body sweeps on its way through the junction."""
+    edge = shapely.get_coordinates(shapely.get_exterior_ring(corridor(path, vehicle)))
+    axes.add_patch(Polygon(edge, facecolor=colour, alpha=0.16, linewidth=0, zorder=4.5))
+    axes.add_patch(Polygon(edge, fill=False, edgecolor=colour, linewidth=0.9, zorder=4.6))
 
 
 def draw_way(axes: Axes, path: Path, start: float, end: float, colour: str, *, bold: bool) -> None:

@@ -6,14 +6,14 @@ import math
 
 from minisim.engine.state import DRIVING, Floats, Records, Road
 from minisim.jit import njit, njit_inline
-from minisim.junction.paths import locate
+from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
 
 #: Bodies this close may be touching, given rounding [m]; the exact check follows in pymunk.
 TOUCH_MARGIN = 0.02
 
-#: `locate`, compiled: where the front of a vehicle is.
-place = njit_inline(locate)
+#: `locate` and `dragged`, compiled: where the front of a vehicle is, and its heading.
+place, drag = njit_inline(locate), njit_inline(dragged)
 
 
 @njit
@@ -39,15 +39,20 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
             inside |= s >= law.entry
             past, crossing = s - law.entry, ends[p, 0] - law.entry
             x, y = place(shape[p], headings[p], crossing, past)
-            x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
-            along = math.hypot(x - x_rear, y - y_rear)
-            ux, uy = (x - x_rear) / along, (y - y_rear) / along
+            kind = vehicles[i]["type"]
+            axle = road.types[kind].rear_axle
+            if axle > 0.0:
+                ux, uy = drag(shape[p], headings[p], crossing, past, road.trails[kind, p], axle)
+            else:
+                x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
+                along = math.hypot(x - x_rear, y - y_rear)
+                ux, uy = (x - x_rear) / along, (y - y_rear) / along
             bodies[count, 0] = x - ux * length / 2.0
             bodies[count, 1] = y - uy * length / 2.0
             bodies[count, 2] = ux
             bodies[count, 3] = uy
             bodies[count, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[count, 5] = road.types[vehicles[i]["type"]].width / 2.0 + TOUCH_MARGIN
+            bodies[count, 5] = road.types[kind].width / 2.0 + TOUCH_MARGIN
             count += 1
     if not inside:
         return False

@@ -61,12 +61,12 @@ def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
     rows, bodies = [], []
     for i in np.flatnonzero(vehicles["status"] == DRIVING).tolist():
         path, s = paths[vehicles["path"][i]], float(vehicles["s"][i])
-        length, width = float(vehicles["length"][i]), site.types[vehicles["type"][i]].width
-        if path.entry - longest <= s <= path.exit + 2 * length:
-            centre, heading = path.pose(s, length)
+        it = site.types[vehicles["type"][i]]
+        if path.entry - longest <= s <= path.exit + 2 * it.length:
+            centre, heading = path.pose(s, it)
             rows.append(i)
             (x, y), (ux, uy) = centre.tolist(), heading.tolist()
-            bodies.append(Body(x, y, ux, uy, length, width))
+            bodies.append(Body(x, y, ux, uy, it.length, it.width))
     return rows, bodies
 
 

@@ -16,7 +16,7 @@ from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
 from minisim.control import LATERAL_ACCELERATION, Observed, Plan, Site
 from minisim.jit import COMPILED
 from minisim.junction.partings import branch
-from minisim.junction.paths import Path
+from minisim.junction.paths import Path, trail_of
 from minisim.laws import Traits, traits_of
 from minisim.streams import Draws
 
@@ -99,6 +99,7 @@ class Road(NamedTuple):
     section_speed: Floats  #: (p, k): limit from there on [m/s]
     branch: Floats  #: (p, p) [m], see `minisim.junction.partings.branch`
     marks: Floats  #: (j,): `s` of the wake-up marks, ascending, the last one infinite [m]
+    trails: Floats  #: (types, p, ARC_SEGMENTS + 1): `minisim.junction.paths.Trail.halves`
     types: Any  #: `Traits` of each type of vehicle, as records where the kernel is compiled
 
 
@@ -119,10 +120,21 @@ def build_road(site: Site, plan: Plan) -> Road:
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
         section_speed=speed,
-        branch=np.array(branch(site.intersection, site.vehicle)),
+        branch=np.array(branch(site.intersection, site.fleet)),
+        trails=_trails(site),
         marks=np.array([*marks, np.inf]),
         types=_types(site),
     )
+
+
+def _trails(site: Site) -> Floats:
+    """The trails of each type on each path, shape (types, p, points); 0 for chords."""
+    paths = site.intersection.paths
+    return np.array([
+        [trail_of(path, it.rear_axle).halves if it.rear_axle else np.zeros(len(path.points))
+         for path in paths]
+        for it in site.types
+    ])  # fmt: skip
 
 
 def _types(site: Site) -> Any:

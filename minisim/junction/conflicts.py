@@ -74,24 +74,28 @@ def corridors(intersection: Intersection, vehicles: Vehicles) -> Shapes:
 
 
 @lru_cache(maxsize=256)
-def separation(intersection: Intersection, vehicles: Vehicles) -> Floats:
+def separation(intersection: Intersection, vehicles: Vehicles, by_type: bool = False) -> Floats:
     """Distance [m] between the corridors of each pair of movements, shape (m, m).
 
-    0 where they overlap, and between movements from the same arm, which begin together.
+    0 where they overlap, and between movements from the same arm, which begin together. `by_type`
+    it is that of each pair of types and movements, shape (types·m, types·m), first type first.
     """
-    swept = corridors(intersection, vehicles)
-    i, j = np.triu_indices(len(swept), 1)
-    result = np.zeros(intersection.movements.apart.shape)
+    kinds: tuple[Vehicles, ...] = vehicles.types if by_type else (vehicles,)
+    swept = np.concatenate([corridors(intersection, it) for it in kinds])
+    apart = np.tile(intersection.movements.apart, (len(kinds), len(kinds)))
+    i, j = np.nonzero(np.triu(apart))
+    result = np.zeros(apart.shape)
     result[i, j] = result[j, i] = shapely.distance(swept[i], swept[j])
-    return _fixed(np.where(intersection.movements.apart, result, 0.0))
+    return _fixed(result)
 
 
 def conflicts(
-    intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE
-) -> Bools:
-    """Whether two movements come closer than `clearance` [m]; shape (m, m), symmetric."""
+    intersection: Intersection, vehicles: Vehicles, clearance: float = CLEARANCE,
+    by_type: bool = False,
+) -> Bools:  # fmt: skip
+    """Whether two movements come closer than `clearance` [m]; shapes as `separation`, symmetric."""
     number("clearance [m]", clearance, low=0, high=10)
-    return np.asarray(separation(intersection, vehicles) <= clearance)
+    return np.asarray(separation(intersection, vehicles, by_type) <= clearance)
 
 
 @lru_cache(maxsize=256)
@@ -99,7 +103,9 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     """Smallest distance [m] between a vehicle held at its entry and a corridor of another arm.
 
     0 means that the vehicle does not fit the lanes: when turning into an exit lane, it would touch
-    a vehicle waiting beside that lane.
+    a vehicle waiting beside that lane. A vehicle with a `rear_axle` must not touch those that leave
+    beside its own approach lane either: its overhang swings out. How far such a body stands off its
+    lane only falls beyond the exit, so farther out it touches none either.
     """
     entry, movements = intersection.approach_length, intersection.movements
     arms, allowed = intersection.approaches, intersection.allowed
@@ -108,7 +114,23 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     held = np.array([shapely.MultiPolygon([(c, ()) for c in four]) for four in bodies_held])
     distance = shapely.distance(corridors(intersection, vehicles)[:, None], held[None, :])
     others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
-    return float(distance[others].min(initial=math.inf))
+    room = float(distance[others].min(initial=math.inf))
+    if any(it.rear_axle is not None for it in vehicles.types):
+        room = min(room, *(_tail_room(intersection, vehicles, arm) for arm in arms))
+    return room
+
+
+def _tail_room(intersection: Intersection, vehicles: Vehicles, arm: int) -> float:
+    """Smallest distance [m] between corridors from an arm and bodies that leave by it."""
+    movements, allowed = intersection.movements, intersection.allowed
+    leaving = np.flatnonzero(allowed & (movements.exits == arm))
+    if not len(leaving):
+        return math.inf
+    path, far = intersection.paths[leaving[0]], 2.0 * max(it.length for it in vehicles.types)
+    lane = shapely.LineString([path.points[-1], path.points[-1] + far * path.heading_out])
+    strip = lane.buffer(max(it.width for it in vehicles.types) / 2.0, cap_style="flat")
+    own = corridors(intersection, vehicles)[allowed & (movements.origins == arm)]
+    return float(shapely.distance(own, strip).min())
 
 
 @lru_cache(maxsize=256)

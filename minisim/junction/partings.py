@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from minisim.fleet import Fleet, Vehicles
 from minisim.junction.geometry import Intersection
 from minisim.junction.paths import Floats, Path
 from minisim.vehicle import VehicleType
@@ -19,38 +20,44 @@ BRANCH_ROOM = 0.5
 
 
 @lru_cache(maxsize=256)
-def branch(intersection: Intersection, vehicle: VehicleType) -> Floats:
+def branch(intersection: Intersection, vehicles: Vehicles) -> Floats:
     """Where movements of a lane part, shape (m, m) [m].
 
     `[p, q]` is the smallest `s` on path p at which a rear bumper no longer obstructs path q.
     It is infinite for the same path, and 0 between lanes.
     """
+    room = max(it.width for it in vehicles.types) + BRANCH_ROOM
+    dragging = [it for it in vehicles.types if it.rear_axle is not None]
 
     def last_near(path: Path, other: Path) -> float:
         s = np.arange(path.entry, path.exit + 60.0, 0.25)
-        gaps = shapely.distance(shapely.points(path.position(s)), other.line)
-        return float(s[np.flatnonzero(gaps < vehicle.width + BRANCH_ROOM)[-1]]) + 0.25
+        rears = [path.position(s)]  # on the path, or beside it where the rear axle is dragged
+        for it in dragging:
+            centre, heading = path.pose(s + it.length, it)
+            rears.append(centre - heading * (it.length / 2.0))
+        gaps = shapely.distance(shapely.points(np.array(rears)), other.line).min(axis=0)
+        return float(s[np.flatnonzero(gaps < room)[-1]]) + 0.25
 
     return _by_lane(intersection, 0.0, last_near)
 
 
 @lru_cache(maxsize=256)
-def turning_room(intersection: Intersection, vehicle: VehicleType) -> float:
-    """The largest gap at which a vehicle still touches the one ahead in its lane [m].
+def turning_room(intersection: Intersection, fleet: Fleet) -> float:
+    """The largest gap at which the worst vehicle still touches one ahead of it like itself [m].
 
-    On a straight road that is 0. In a turn the two bodies, chords of their paths, stand at an
-    angle, and their corners touch while the middles of the bumpers are apart: by up to
-    w·tan(arcsin(l/2r)) on one arc of radius r.
+    On a straight road that is 0. In a turn the two bodies stand at an angle, and their corners
+    touch while the middles of the bumpers are apart: chords of one arc of radius r by up to
+    w·tan(arcsin(l/2r)).
     """
+    vehicle, reach = fleet.worst, branch(intersection, fleet)
     gaps = np.arange(0.0, 3.0, 0.1) * vehicle.width
-    reach = branch(intersection, vehicle)
     paths, least = intersection.paths, 0.0
     allowed = intersection.allowed
     for p, q in np.argwhere((reach > 0.0) & allowed & allowed[:, None]).tolist():
         path = paths[p]
         rear = np.arange(path.entry, min(float(reach[p, q]), path.exit + vehicle.length), 0.3)
-        first = path.pose(rear + vehicle.length, vehicle.length)
-        second = paths[q].pose(np.subtract.outer(gaps, rear) * -1.0, vehicle.length)
+        first = path.pose(rear + vehicle.length, vehicle)
+        second = paths[q].pose(np.subtract.outer(gaps, rear) * -1.0, vehicle)
         touching = gaps[_overlap(first, second, vehicle).any(axis=-1)]
         least = max(least, *touching) if len(touching) else least
     return float(least) + 0.1 * vehicle.width

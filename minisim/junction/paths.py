@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -89,20 +90,34 @@ class Path:
         after = np.maximum(s - self.exit, 0.0)[..., None] * self.heading_out
         return np.asarray(inside + before + after)
 
-    def pose(self, s: npt.ArrayLike, length: float) -> tuple[Floats, Floats]:
+    def pose(self, s: npt.ArrayLike, vehicle: VehicleType) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
-        Both bumpers' middles lie on the path, so the body is the chord between them.
+        The middle of the front bumper lies on the path. Without a `rear_axle`, that of the rear
+        bumper does too, so the body is the chord between them; otherwise see `Trail`.
         """
         front = self.position(s)
-        rear = self.position(np.asarray(s, dtype=float) - length)
-        along = front - rear
-        heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
-        return front - heading * (length / 2.0), heading
+        if vehicle.rear_axle is not None:
+            heading = self._dragged(s, vehicle.rear_axle)
+        else:
+            along = front - self.position(np.asarray(s, dtype=float) - vehicle.length)
+            heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
+        return front - heading * (vehicle.length / 2.0), heading
+
+    def _dragged(self, s: npt.ArrayLike, axle: float) -> Floats:
+        """Unit heading (..., 2) of a body that drags a rear axle, with its front bumper at `s`."""
+        trail, s = trail_of(self, axle), np.asarray(s, dtype=float)
+        t = np.clip((s - self.entry) / self.crossing * ARC_SEGMENTS, 0.0, ARC_SEGMENTS)
+        k = t.astype(int)
+        driven = (t - k) * trail.lengths[k] + np.maximum(s - self.exit, 0.0)
+        half = trail.halves[k] * np.exp(-driven / axle)
+        (x, y), norm = np.moveaxis(trail.along[k], -1, 0), 1.0 + half * half
+        cos, sin = (1.0 - half * half) / norm, 2.0 * half / norm
+        return np.stack([x * cos - y * sin, x * sin + y * cos], axis=-1)
 
     def bodies(self, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
         """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
-        centre, heading = self.pose(s, vehicle.length)
+        centre, heading = self.pose(s, vehicle)
         along = heading * (vehicle.length / 2.0)
         across = np.stack([-heading[..., 1], heading[..., 0]], axis=-1) * (vehicle.width / 2.0)
         corners = [along + across, along - across, -along - across, -along + across]
@@ -113,6 +128,58 @@ class Path:
         """The centre line as a shapely polyline, from road entry to road end."""
         ends = self.position([self.start, self.length])
         return shapely.LineString(np.vstack([ends[:1], self.points, ends[1:]]))
+
+
+class Trail(NamedTuple):
+    """How a body that drags its rear axle stands where its front bumper passes a path's points.
+
+    This is the bicycle model without slip: the rear axle, at the distance ℓ from the front bumper,
+    only rolls along the body. So θ' = sin(ψ − θ)/ℓ per metre that the front bumper drives, where θ
+    is the heading of the body and ψ that of the path (the tractrix; Sayers 1991, Vehicle System
+    Dynamics 20:297). On a straight piece of the path, tan((θ − ψ)/2) falls as exp(−distance/ℓ), so
+    the heading is exact between the points, too. Shapes (points, …); the last row is the exit lane.
+    """
+
+    along: Floats  #: unit vector from each point to the next, (points, 2)
+    lengths: Floats  #: distance to the next [m]; 0 for the last
+    halves: Floats  #: tan((θ − ψ)/2) at each point, ψ being the heading of the piece that follows
+
+
+@lru_cache(maxsize=1024)
+def trail_of(path: Path, axle: float) -> Trail:
+    """The trail of a body with its rear axle `axle` behind the front bumper [m]."""
+    pieces = np.diff(path.points, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    along = np.vstack([pieces / lengths[:, None], path.heading_out])
+    ways = np.arctan2(along[:, 1], along[:, 0]).tolist()
+    theta, halves = math.atan2(path.heading_in[1], path.heading_in[0]), []
+    for way, length in zip(ways, [*lengths.tolist(), 0.0], strict=True):
+        halves.append(math.tan(math.remainder(theta - way, math.tau) / 2.0))
+        theta = way + 2.0 * math.atan(halves[-1] * math.exp(-length / axle))
+    return Trail(along, np.append(lengths, 0.0), np.array(halves))
+
+
+def dragged(
+    points: Sequence[Sequence[float]], headings: Sequence[float], crossing: float, past: float,
+    halves: Sequence[float], axle: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Unit heading of `Path.pose` with a rear axle, as `locate` gives the position.
+
+    `halves` are those of the `Trail`, and `axle` is where the rear axle is [m].
+    """
+    last = len(points) - 1
+    if past >= crossing:
+        k, driven, x, y = last, past - crossing, headings[2], headings[3]
+    else:
+        t = max(past, 0.0) / crossing * last
+        k = min(int(t), last - 1)
+        x, y = points[k + 1][0] - points[k][0], points[k + 1][1] - points[k][1]
+        length = math.hypot(x, y)
+        driven, x, y = (t - k) * length, x / length, y / length
+    half = halves[k] * math.exp(-driven / axle)
+    norm = 1.0 + half * half
+    cos, sin = (1.0 - half * half) / norm, 2.0 * half / norm
+    return x * cos - y * sin, x * sin + y * cos
 
 
 def locate(

@@ -186,7 +186,7 @@ class Run:
         for p, kind in np.unique(rows[["path", "type"]]).tolist():
             here = (path_of == p) & (rows["type"] == kind)
             front[here] = intersection.paths[p].position(trace["s"][here])
-            heading[here] = intersection.paths[p].pose(trace["s"][here], types[kind].length)[1]
+            heading[here] = intersection.paths[p].pose(trace["s"][here], types[kind])[1]
         lanes = pd.Index(list(ARM_NAMES[: intersection.n]))
         columns = (
             np.round(trace["tick"] * self.site.dt, 6), rows["id"],

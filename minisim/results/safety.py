@@ -193,7 +193,7 @@ def _rows(frame: pd.DataFrame | Rows, site: Site) -> Rows:
 
 def _leaders_in_lane(rows: Rows, site: Site) -> tuple[Ints, Ints, Floats]:
     """Rows of followers and of the next vehicles in their lane and way, and the gaps [m]."""
-    parts = branch(site.intersection, site.vehicle)
+    parts = branch(site.intersection, site.fleet)
     lane = site.intersection.movements.origins[rows.movement]
     order = np.lexsort((-rows.s, lane, rows.step))
     group = (rows.step * site.intersection.n + lane)[order]

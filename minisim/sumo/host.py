@@ -198,6 +198,12 @@ def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
             f"vehicles with sumo={site.vehicle.sumo!r} give way to those crossing inside the "
             "junction; hosted in SUMO, the controller does that, so leave out sumo"
         )
+    for it in site.types:
+        if it.rear_axle is not None:
+            raise InputError(
+                f"SUMO's bodies drag no rear axle, but {it.name} has one at {it.rear_axle:g} m: "
+                "leave out rear_axle"
+            )
     model = _model(options.model, site.vehicle)
     depart_speed = hosted.scenario.depart_speed
     vehicles = build_vehicles(site, hosted.arrivals)

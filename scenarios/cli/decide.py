@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from minisim.errors import InputError, choice
+from minisim.fleet import TYPES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
 from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, names
@@ -28,20 +30,31 @@ def decide(
     bearings: options.Bearings = None,
     side: options.Side = None,
     profile: options.ProfileName = "paper",
+    fleet: options.Fleet = None,
+    lane_width: options.LaneWidth = None,
     plot: Plot = None,
+    corridor: Annotated[
+        str | None, options.option("Show in it what bodies of this type sweep.", "TYPE")
+    ] = None,
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
     """Show how DIM decides: graph, cliques, right of way, and why."""
     from dim import Dim, explain
 
-    what, matrix = junction(scenario, bearings, side, profile)
+    if corridor is not None and plot is None:
+        raise InputError("--corridor needs --plot: it is drawn there")
+    what, matrix = junction(
+        scenario, bearings, side=side, profile=profile, fleet=fleet, lane_width=lane_width
+    )
     explanation = explain(movements, matrix, order)
     if plot is not None:
         from figures.junction.decision import decision_figure
         from figures.style import save
 
         site = what.site()
-        save(decision_figure(explanation, site, Dim().start(site).plan), plot)
+        known = {**TYPES, **{it.name: it for it in site.types}}
+        body = None if corridor is None else known[choice("vehicle type", corridor, known)]
+        save(decision_figure(explanation, site, Dim().start(site).plan, body), plot)
     facts = {
         "scenario": what.name,
         "order": order,

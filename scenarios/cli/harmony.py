@@ -23,6 +23,8 @@ def harmony(
     bearings: options.Bearings = None,
     side: options.Side = None,
     profile: options.ProfileName = "paper",
+    fleet: options.Fleet = None,
+    lane_width: options.LaneWidth = None,
     clearance: Annotated[
         float, typer.Option(metavar="M", help="Room between the paths of two bodies in metres.")
     ] = CLEARANCE,
@@ -32,13 +34,17 @@ def harmony(
     """Print which movements can be driven together: the harmony matrix."""
     if csv and as_json:
         raise InputError("--csv and --json cannot be combined; give one")
-    what, matrix = junction(scenario, bearings, side, profile, clearance)
+    what, matrix = junction(
+        scenario, bearings, clearance, side=side, profile=profile, fleet=fleet,
+        lane_width=lane_width,
+    )  # fmt: skip
     if csv:
         typer.echo(matrix.to_text(), nl=False)
         return
     facts = {
         "scenario": what.name,
         "side": what.intersection.side,
+        "fleet": str(what.vehicles),
         "clearance_m": clearance,
         "movements": list(matrix.movements.names),
         "harmony": matrix.values.astype(int).tolist(),

@@ -73,7 +73,7 @@ def protocol(
 
     if counterexample is not None:
         check_file(counterexample, ".csv")
-    what, matrix = junction(scenario, bearings, side, profile)
+    what, matrix = junction(scenario, bearings, side=side, profile=profile)
     if matrix.n > MAX_ARMS:
         only = "the protocol is searched for 3 and 4 arms"
         raise InputError(f"{only}; {what.name} has {matrix.n}, and too many states")

@@ -26,7 +26,7 @@ def verify(
     """Check the paper's claims one by one, in every case that can occur at a junction."""
     from dim.proofs.verification import analyse, most_cliques
 
-    what, matrix = junction(scenario, bearings, side, profile)
+    what, matrix = junction(scenario, bearings, side=side, profile=profile)
     with bar("trying all cases") as progress:
         analysis = analyse(matrix, order, progress=progress)
     if plot is not None:

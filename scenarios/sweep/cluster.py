@@ -5,8 +5,9 @@ from __future__ import annotations
 import importlib
 import logging
 import re
-from collections.abc import Iterator
-from concurrent.futures import Executor
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -49,7 +50,43 @@ def cluster(address: str, patience: float = PATIENCE) -> Iterator[Executor]:
         raise InputError(f"no Dask scheduler at {address!r}: {reason}") from error
     with client:
         _check_workers(client, address, patience)
-        yield client.get_executor()
+        with Watched(client.get_executor(), lambda: client.status == "running", patience) as runs:
+            yield runs
+
+
+class Watched(Executor):
+    """An executor that gives all runs up once its scheduler has been lost for `patience` seconds.
+
+    Dask does so itself, but for results that were just on their way: these it would await for ever.
+    """
+
+    def __init__(self, executor: Executor, alive: Callable[[], bool], patience: float) -> None:
+        self._executor, self._alive, self._patience = executor, alive, patience
+        self._futures: list[Future[Any]] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        """As of the executor."""
+        future = self._executor.submit(function, *args, **options)
+        self._futures.append(future)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
+        """Stop watching; the cluster itself goes on."""
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        lost = 0.0
+        pause = min(0.5, self._patience / 4.0)
+        while lost < self._patience:
+            if self._over.wait(pause):
+                return
+            lost = 0.0 if self._alive() else lost + pause
+        for future in [*self._futures]:
+            future.cancel()
 
 
 def _check_workers(client: Any, address: str, patience: float) -> None:

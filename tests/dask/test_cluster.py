@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from minisim.errors import ExecutorError, InputError
 from scenarios import four_way
 from scenarios.recipe import Recipe
 from scenarios.sweep import sweep
-from scenarios.sweep.cluster import cluster
+from scenarios.sweep.cluster import Watched, cluster
 from scenarios.sweep.store import Store
 from tests import ROOT
 from tests.builders import repeatable
@@ -158,3 +159,25 @@ def test_a_lost_scheduler_leaves_what_was_done(tmp_path: Path) -> None:
             sweep(todo, executor, kill, store=store)
         assert 2 <= len(store) < len(todo)
         assert store.frame()["error"].isna().all()
+
+
+class Silent(Executor):
+    """It takes runs and never answers, as Dask does for results that were on their way."""
+
+    def submit(self, function: object, /, *args: object, **options: object) -> Future[object]:
+        return Future()
+
+
+def test_runs_that_a_lost_scheduler_never_answers_are_given_up(tmp_path: Path) -> None:
+    alive = [True]
+    with (
+        Store(tmp_path / "s.db") as store,
+        Watched(Silent(), lambda: alive[0], patience=0.2) as executor,
+    ):
+        futures = [executor.submit(print) for _ in range(3)]
+        time.sleep(0.4)
+        assert not any(future.done() for future in futures)
+        alive[0] = False
+        with pytest.raises(ExecutorError, match="gave up 3 of 3 runs"):
+            sweep(recipes(3), executor, store=store)
+        assert all(future.cancelled() for future in futures)

@@ -12,7 +12,8 @@ from dim import HarmonyMatrix
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
-from scenarios.strategies import intersections, vehicles
+from scenarios.strategies import fleets, intersections, vehicles
+from tests.builders import share
 
 
 def mirrored(intersection: Intersection) -> tuple[Intersection, list[Movement]]:
@@ -50,3 +51,23 @@ def test_wider_vehicles_only_remove_harmony(intersection: Intersection, extra: f
     narrow = HarmonyMatrix.from_geometry(intersection, VehicleType(width=1.6))
     wide = HarmonyMatrix.from_geometry(intersection, VehicleType(width=1.6 + extra))
     assert not np.any(wide.values & ~narrow.values)
+
+
+@share(0.03)
+@given(intersections(), st.data())
+def test_harmony_by_type_is_that_of_two_types_and_the_worst_is_all_of_it(
+    junction: Intersection, data: st.DataObject
+) -> None:
+    fleet = data.draw(fleets(junction))
+    types, m = len(fleet.types), len(junction.movements)
+    matrix = HarmonyMatrix.from_geometry(junction, fleet, by_type=True)
+    assert matrix.types == types
+    blocks = matrix.values.reshape(types, m, types, m)
+    worst = HarmonyMatrix.from_geometry(junction, fleet).values
+    np.testing.assert_array_equal(blocks.all(axis=(0, 2)), worst)
+    for k, it in enumerate(fleet.types):
+        own = HarmonyMatrix.from_geometry(junction, it).values
+        np.testing.assert_array_equal(blocks[k, :, k], own)
+        for movement in junction.movements:
+            typed = Movement(movement.origin, k * (junction.n - 1) + movement.manoeuvre)
+            assert matrix.index(typed) == k * m + junction.index(movement)

@@ -9,16 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import minisim
-from dim import Dim, HarmonyMatrix
-from minisim.control import cover_of
+from dim import Dim, HarmonyMatrix, Mixed, Monitor, NoisyPerception, Zones
+from dim.agent import GATES
+from dim.controller import BODIES
+from minisim.control import COMMIT_MARGIN, Controller, cover_of
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.conflicts import corridor
 from minisim.results.run import Run
 from scenarios import Scenario, four_way
 from scenarios.controllers import SAFE, controller_named
 from scenarios.profiles import FAIR, PAPER
-from scenarios.strategies import demands, fleets, intersections
-from tests.builders import drained, share
+from scenarios.strategies import demands, fleets, floats, intersections
+from tests.builders import digest, drained, share
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -34,12 +36,48 @@ def mixed(draw: st.DrawFn) -> Scenario:
     )  # fmt: skip
 
 
-def served(scenario: Scenario, name: str, seed: int) -> Run:
+def served(scenario: Scenario, controller: Controller | str, seed: int) -> Run:
     """Run to the last arrival; a collision raises."""
-    controller = controller_named(name, scenario.profile)
+    if isinstance(controller, str):
+        controller = controller_named(controller, scenario.profile)
     run = minisim.simulate(drained(scenario, seed, 3000.0), controller, seed, record="all")
     assert run.columns.arrived.all(), "a vehicle was never served"
     return run
+
+
+#: Harmony by the bodies that take part, alone, with wrong perception and among human drivers.
+OWN = (
+    Dim(bodies="own"),
+    Dim(bodies="own", gate="harmonious"),
+    Dim(
+        bodies="own", gate="harmonious", monitor=Monitor(),
+        perception=NoisyPerception(intent_error=0.15, kind="symmetric", confidence=0.8),
+    ),
+    Mixed(Dim(bodies="own", gate="harmonious"), 0.4),
+)  # fmt: skip
+
+
+@share(0.03)
+@given(mixed(), st.sampled_from(OWN), seeds)
+def test_nor_do_they_where_harmony_is_by_the_bodies_that_take_part(
+    scenario: Scenario, controller: Controller, seed: int
+) -> None:
+    served(scenario, controller, seed)
+
+
+@share(0.03)
+@given(mixed(), st.sampled_from(GATES), st.sampled_from(BODIES), st.data(), seeds)
+def test_nor_do_they_where_the_zones_are_shorter_than_the_vehicles(
+    scenario: Scenario, gate: str, bodies: str, data: st.DataObject, seed: int
+) -> None:
+    longest = scenario.site().vehicle.length
+    green = data.draw(floats(COMMIT_MARGIN, longest / 2.0))
+    zones = Zones(
+        green=green, yellow=data.draw(floats(0.5, 0.99 * longest - green)),
+        red=data.draw(floats(0.0, longest)),
+    )  # fmt: skip
+    assert zones.yellow_start < longest, "it takes part while its rear is far behind the zones"
+    served(scenario, Dim(gate=gate, bodies=bodies, zones=zones), seed)
 
 
 @share(0.1)
@@ -81,3 +119,12 @@ def test_every_safe_controller_covers_mixed_fleets(name: str) -> None:
     assert scenario.site().vehicle in cover_of(controller_named(name))
     run = served(scenario, name, 1)
     assert set(run.trips["type"]) == set(scenario.vehicles.names)
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_with_exact_perception_a_monitor_never_brakes_for_harmony_by_type(gate: str) -> None:
+    """It knows one matrix for all, but looks where the two bodies really come close."""
+    scenario = four_way(300, fleet="india", lane_width=3.5, profile="fair", horizon=600.0)
+    dim = Dim(gate=gate, bodies="own")
+    watched = minisim.simulate(scenario, replace(dim, monitor=Monitor()), seed=1, record="all")
+    assert digest(watched) == digest(minisim.simulate(scenario, dim, seed=1, record="all"))

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from minisim.control import Site
 from minisim.errors import InputError
-from minisim.junction.conflicts import conflicts, corridor, entry_room
+from minisim.junction.conflicts import SWEEP_STEP, conflicts, corridor, entry_room
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.junction.partings import branch
+from minisim.junction.paths import ARC_SEGMENTS
 from minisim.junction.tracing import MIN_PATH_RADIUS
 from minisim.vehicle import VehicleType
 from scenarios.strategies import bearings, floats, intersections, vehicles
@@ -42,18 +43,24 @@ def test_paths_are_smooth_and_drivable(intersection: Intersection) -> None:
         directions = np.vstack([path.heading_in, pieces / lengths[:, None], path.heading_out])
         turns = np.linalg.norm(np.diff(directions, axis=0), axis=1)
         # 150° at most, spread evenly over 32 pieces: no kink, at the seams half a piece's turn.
-        assert turns.max() <= math.radians(150.0) / 32.0 + 1e-6
+        assert turns.max() <= math.radians(150.0) / ARC_SEGMENTS + 1e-6
 
 
 @given(intersections(), vehicles(), st.data())
 def test_corridor_contains_every_body(
     intersection: Intersection, vehicle: VehicleType, data: st.DataObject
 ) -> None:
-    """Between two samples of the sweep a corner leaves their hull by d²/8r: 8 mm at most."""
+    """Between two samples of the sweep, a corner leaves their hull where its bumper turns.
+
+    A bumper that turns by α halfway is d/2·sin(α/2) off the line between its places at the samples,
+    d apart; a corner is further out by the body's turn.
+    """
     path = data.draw(st.sampled_from(intersection.paths))
     s = data.draw(floats(path.entry, path.exit + vehicle.length))
     body = shapely.polygons(path.bodies(s, vehicle))
-    assert shapely.contains(shapely.buffer(corridor(path, vehicle), 0.008), body)
+    turn = max(SWEEP_STEP / path.radius, math.radians(150.0) / ARC_SEGMENTS)
+    off = SWEEP_STEP / 2.0 * math.sin(turn / 2.0) * (1.0 + vehicle.width / vehicle.length)
+    assert shapely.contains(shapely.buffer(corridor(path, vehicle), off), body)
 
 
 @share(0.5)

@@ -460,6 +460,13 @@ def test_sumo_has_no_improved_idm() -> None:
     assert simulate(scenario, Unregulated(), model="Krauss").columns.arrived.all()
 
 
+def test_sumos_bodies_drag_no_rear_axle() -> None:
+    profile = replace(FAIR, vehicle=VehicleType(rear_axle=3.7))
+    scenario = single(scenario=replace(FAIR_FOUR, profile=profile), horizon=90.0)
+    with pytest.raises(InputError, match=r"but car has one at 3\.7 m: leave out rear_axle"):
+        simulate(scenario, Unregulated())
+
+
 def test_sumo_steps_in_whole_milliseconds() -> None:
     with pytest.raises(InputError, match=r"SUMO counts in milliseconds; it cannot step 0\.0333"):
         simulate(small_scenario(dt=0.0333), Unregulated())

@@ -58,6 +58,15 @@ def test_every_claim_holds_in_every_case(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", [3, 4])
+def test_every_claim_holds_with_types_told_apart(n: int) -> None:
+    site = regular(n, fleet="car:0.5,bus:0.5", lane_width=3.5).site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.fleet, by_type=True)
+    analysis = analyse(matrix)
+    assert analysis.cases == (2 * (n - 1) + 1) ** n - 1
+    assert analysis.holds, [claim for claim in analysis.claims if not claim.holds]
+
+
+@pytest.mark.parametrize("n", [3, 4])
 def test_lanes_first_is_not_always_the_largest(n: int) -> None:
     analysis = analyse(HarmonyMatrix.paper(n), "lanes")
     false = {claim.name: claim.failures for claim in analysis.claims if not claim.holds}

@@ -194,6 +194,18 @@ def test_every_lane_can_starve(gate: str, order: str, priorities: str) -> None:
             assert "turn" in {event.what for event in lasso.cycle}
 
 
+@pytest.mark.parametrize(
+    ("gate", "states"),
+    [("clear", 9379), pytest.param("harmonious", 83736, marks=pytest.mark.slow)],
+)
+def test_with_types_told_apart_it_is_safe_and_never_stuck(gate: str, states: int) -> None:
+    site = three_way(fleet="car:0.5,bus:0.5", lane_width=3.5).site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.fleet, by_type=True)
+    search = explore(Protocol(matrix, gate=gate))
+    assert (search.complete, search.unsafe, search.stuck) == (True, (), None)
+    assert search.states == states
+
+
 @pytest.mark.parametrize("priorities", ["rotating", "waiting"])
 def test_lanes_first_with_changing_priorities_starves_no_lane(priorities: str) -> None:
     assert starvation(Protocol(paper(3), "lanes", priorities=priorities)) == (None,) * 3
@@ -213,6 +225,14 @@ def test_every_run_is_a_path_of_the_model(scenario: Scenario, seed: int, dim: Di
     checked = minisim.simulate(scenario, Checked(dim), seed=seed, on_collision="record")
     plain = minisim.simulate(scenario, dim, seed=seed, on_collision="record")
     assert digest(checked) == digest(plain)
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_every_run_that_tells_types_apart_is_one(gate: str) -> None:
+    scenario = four_way(300, fleet="india", lane_width=3.5, profile="fair", horizon=300.0)
+    dim = Dim(gate=gate, bodies="own")
+    checked = minisim.simulate(scenario, Checked(dim), seed=3)
+    assert digest(checked) == digest(minisim.simulate(scenario, dim, seed=3))
 
 
 def test_a_run_that_leaves_the_model_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

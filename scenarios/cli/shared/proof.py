@@ -37,14 +37,14 @@ Plot = Annotated[Path | None, option("Draw it (.png, .pdf, .svg).", "FILE", call
 
 
 def junction(
-    name: str, bearings: str | None, side: str | None, profile: str, clearance: float = CLEARANCE
+    name: str, bearings: str | None, clearance: float = CLEARANCE, **more: Any
 ) -> tuple[Scenario, HarmonyMatrix]:
-    """A scenario and the harmony matrix of its movements."""
+    """A scenario and the harmony matrix of its movements; `more` as in `build_scenario`."""
     from dim import HarmonyMatrix
 
-    scenario = build_scenario(name, bearings, profile=profile, side=side)
-    vehicle = scenario.profile.vehicle
-    return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicle, clearance)
+    scenario = build_scenario(name, bearings, **more)
+    vehicles = scenario.vehicles
+    return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicles, clearance)
 
 
 def answer(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from dim import Dim, HarmonyMatrix, Zones
 from dim.agent import GATES
 from dim.perception import COMMITS, See
-from minisim.control import Observed, Site, View
+from minisim.control import Go, Observed, Site, View
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from scenarios import five_way, four_way, three_way
@@ -182,3 +183,29 @@ def test_sites_that_it_cannot_serve() -> None:
 def test_priorities_are_checked(priorities: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         Dim(priorities=priorities)  # type: ignore[arg-type]
+
+
+def test_harmony_by_the_bodies_that_take_part() -> None:
+    """Two turns that buses cannot take together, but motorcycles can."""
+    site = four_way(fleet="motorcycle:0.5,bus:0.5", lane_width=3.5).site()
+    worst, own = (Dim(bodies=bodies).start(site) for bodies in ("worst", "own"))
+    small = worst.rules.table.matrix
+    pairs = np.argwhere(own.rules.table.matrix.values[:12, :12] & ~small.values).tolist()
+    first, second = (small.movements[k] for k in pairs[0])
+    for kind, several in ((0, True), (1, False)):
+        both = [car(k, str(m), 8.0)._replace(type=kind) for k, m in enumerate((first, second))]
+        going = [c for c in Dim(bodies="own").start(site).decide(view(*both)) if isinstance(c, Go)]
+        assert len(going) == 1 + several
+        going = [c for c in Dim().start(site).decide(view(*both)) if isinstance(c, Go)]
+        assert len(going) == 1
+
+
+def test_one_type_needs_no_matrix_by_type_and_a_given_one_is_for_no_types() -> None:
+    site = four_way().site()
+    assert Dim(bodies="own").start(site).rules.table is Dim().start(site).rules.table
+    with pytest.raises(InputError, match="bodies has an effect only with matrix=none"):
+        Dim(matrix=HarmonyMatrix.paper(4), bodies="own")
+    fleet = four_way(fleet="car:0.5,bus:0.5", lane_width=3.5).site()
+    typed = HarmonyMatrix.from_geometry(fleet.intersection, fleet.fleet, by_type=True)
+    with pytest.raises(InputError, match="say bodies=own"):
+        Dim(matrix=typed).start(fleet)

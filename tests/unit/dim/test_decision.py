@@ -12,6 +12,7 @@ from dim import DecisionTable, HarmonyMatrix, decide, explain
 from dim.decision import ORDERS, decision_table
 from minisim.errors import InputError
 from minisim.junction.movements import Movement
+from scenarios import three_way
 from tests.builders import python
 
 
@@ -182,3 +183,14 @@ def test_other_arguments_are_checked() -> None:
 def test_priorities_are_a_permutation_of_the_lanes(priorities: object, message: str) -> None:
     with pytest.raises(InputError, match=f"^{message}"):
         decide(["a1"], HarmonyMatrix.paper(4), "size", priorities)  # type: ignore[arg-type]
+
+
+def test_an_unknown_intent_of_a_known_type() -> None:
+    """The bus on lane a may want anything, but stays a bus."""
+    site = three_way(fleet="car:0.5,bus:0.5", lane_width=3.5).site()
+    matrix = HarmonyMatrix.from_geometry(site.intersection, site.fleet, by_type=True)
+    table = DecisionTable(matrix)
+    others = [Movement(1, 2), Movement(2, 3)]  # a car and a bus
+    unknown = 2 * 3**0
+    every = [table.lanes(table.case([Movement(0, j), *others])) for j in (3, 4)]
+    assert table.surely(table.case(others), unknown, 0) == every[0] & every[1]

@@ -27,6 +27,18 @@ def test_a_vehicle_of_unknown_intent_may_take_any_manoeuvre() -> None:
     assert percept == ((2, 3), (1,), 3 * 4**3, occupied("b1", "b2", "b3"), 1 << 2)
 
 
+def test_with_types_told_apart_a_vehicle_counts_as_one_of_its_type() -> None:
+    reader, m = STOPPABLE._replace(types=2, decelerations=(2.0, 2.0)), 12
+    bus, lost = (car(k, of, 4.0)._replace(type=1) for k, of in ((1, "a2"), (2, "c1")))
+    crossing = car(3, "b2", -3.0)._replace(type=1)
+    percept = reader.read(view(bus, crossing, lost._replace(manoeuvre=UNKNOWN), car(4, "d3", 5.0)))
+    assert percept == (
+        (1, 2, 4), (3,), (3 + 2) + 3 * 7**3, occupied("b2") << m, 2 * 3**2,
+    )  # fmt: skip
+    assert reader.typed(bus) == (0, 5)
+    assert STOPPABLE.typed(bus) == (0, 2)
+
+
 def test_front_vehicles_between_yellow_start_and_junction_take_part() -> None:
     percept = STOPPABLE.read(
         view(

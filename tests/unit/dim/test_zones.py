@@ -64,3 +64,13 @@ def test_roads_must_hold_the_zones_before_an_inserted_vehicle() -> None:
     Zones(red=480.7).check(place)
     with pytest.raises(InputError, match=r"leave only 488.8 m .* increase arm_length"):
         Zones(red=481).check(place)
+
+
+def test_a_held_vehicle_must_stand_in_the_yellow_zone() -> None:
+    """It stops up to 0.3 m before the hold line; before the zone, it would wait for ever."""
+    with pytest.raises(InputError, match=r"yellow zone \[m\] must be .*0\.5.*got 0\.3"):
+        Zones(yellow=0.3)
+    signals = four_way(profile="as_run_signals").site()
+    Zones(yellow=1.1).check(signals)
+    with pytest.raises(InputError, match=r"must be more than 1 with SUMO's vehicles.*got 0\.9"):
+        Zones(yellow=0.9).check(signals)

@@ -29,6 +29,7 @@ from figures.film.frames import RELEASED, Frames
 from figures.junction import drawing
 from minisim.control import Plan, Unregulated
 from minisim.errors import InputError
+from minisim.fleet import TYPES
 from minisim.junction.conflicts import corridor
 from minisim.junction.geometry import Intersection
 from minisim.results.run import Run
@@ -100,7 +101,7 @@ def test_bodies_are_drawn_where_the_model_has_them(run: Run) -> None:
     vehicle = run.site.vehicle
     path = run.site.intersection.paths[2]
     for s in (path.entry - 3.0, path.entry + 4.0, path.exit + 9.0):
-        centre, heading = path.pose(s, vehicle.length)
+        centre, heading = path.pose(s, vehicle)
         front = centre + heading * vehicle.length / 2.0
         angle = math.degrees(math.atan2(heading[0], heading[1]))
         body, glass = drawing.body_shape(vehicle)
@@ -413,11 +414,14 @@ def test_animation_is_written_whole_or_not(run: Run, tmp_path: Path) -> None:
     assert file.read_bytes() == first
 
 
-def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap() -> None:
+@pytest.mark.parametrize("body", [None, TYPES["bus-offtracking"]])
+def test_decision_figure_names_every_vehicle_and_its_texts_do_not_overlap(
+    body: VehicleType | None,
+) -> None:
     site = four_way().site()
     matrix = HarmonyMatrix.from_geometry(site.intersection, site.vehicle)
     explanation = explain(["a1", "b2", "c2", "d2"], matrix)
-    figure = decision_figure(explanation, site, Dim().start(site).plan)
+    figure = decision_figure(explanation, site, Dim().start(site).plan, body)
     scene, graph = figure.axes
     assert {t.get_text() for t in scene.texts} >= {"a1", "b2", "c2", "d2", "a", "b", "c", "d"}
     assert {t.get_text() for t in graph.texts} >= {"a1", "b2", "c2", "d2"}
@@ -456,3 +460,15 @@ def test_performance_figure_draws_means_and_intervals() -> None:
             upper = chosen[column] + chosen[f"{column}_ci95"]
             np.testing.assert_allclose(np.array(line.get_ydata(), float), chosen[column])
             np.testing.assert_allclose(np.array(caps[1].get_ydata(), float), upper)
+
+
+def test_a_corridor_is_drawn_where_the_bodies_go() -> None:
+    path, it = four_way().intersection.paths[2], TYPES["bus-offtracking"]
+    axes = style.new_figure(3.0, 3.0).add_axes((0, 0, 1, 1))
+    drawing.draw_corridor(axes, path, it, style.BLUE)
+    shades = [shapely.Polygon(patch.get_xy()).buffer(1e-6) for patch in axes.patches]
+    bodies = shapely.polygons(path.bodies(np.linspace(path.entry, path.exit + it.length, 30), it))
+    for shade in shades:
+        assert shapely.covers(shade.buffer(0.02), bodies).all()
+        assert shade.area < 1.05 * shapely.union_all(bodies).area
+    assert len(shades) == 2, "its shade and its outline"

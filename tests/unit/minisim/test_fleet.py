@@ -122,3 +122,26 @@ def test_a_density_in_passenger_car_units_becomes_vehicles() -> None:
     assert by_lane.demand.rates(4) == pytest.approx((200.0, 100.0, 200.0, 100.0))
     with pytest.raises(InputError, match="unit 'pcu' needs a fleet"):
         four_way(200, unit="pcu")
+
+
+def test_ready_types_that_off_track_are_the_same_vehicles_with_a_rear_axle() -> None:
+    """AASHTO's design vehicles P, SU and CITY-BUS: 14 of 19, 24 of 30 and 32 of 40 feet."""
+    for name, share in (("car", 14 / 19), ("truck", 0.8), ("bus", 0.8), ("sumo-bus", 0.8)):
+        plain, dragging = TYPES[name], TYPES[f"{name}-offtracking"]
+        assert dragging == replace(plain, name=dragging.name, rear_axle=dragging.rear_axle)
+        assert dragging.rear_axle == pytest.approx(share * plain.length, abs=0.005)
+    assert not {f"{name}-offtracking" for name in ("motorcycle", "sumo-trailer")} & set(TYPES)
+    plain, dragging = (fleet_named(name, CAR) for name in ("india", "india-offtracking"))
+    assert plain.shares == dragging.shares
+    assert pcu_factors(dragging, "pcu", 4) == pcu_factors(plain, "pcu", 4)
+    assert plain.worst.rear_axle is None
+    assert dragging.worst.rear_axle == TYPES["bus-offtracking"].rear_axle
+
+
+def test_a_bus_that_off_tracks_needs_a_larger_junction() -> None:
+    four_way(fleet="bus", lane_width=3.5).site()
+    with pytest.raises(InputError, match=r"\(bus-offtracking\) do not fit lanes of 3.5 m"):
+        four_way(fleet="bus-offtracking", lane_width=3.5).site()
+    arms = four_way().intersection
+    wide = replace(arms, lane_width=3.5, junction_radius=22.0)
+    replace(four_way(fleet="bus-offtracking"), intersection=wide).site()

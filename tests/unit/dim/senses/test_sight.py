@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import given
 
 from dim.senses.sight import Bodies, Body
 from minisim.control import Site
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.testing import small_scenario
 from minisim.vehicle import VehicleType
@@ -39,13 +41,13 @@ def outline(body: Body) -> shapely.Polygon:
 @given(intersections(), floats(-20.0, 30.0))
 def test_a_body_is_where_its_path_has_it(junction: Intersection, distance: float) -> None:
     """On every way: before the junction, with one bumper in it or both, and beyond it."""
-    bodies = Bodies(Site(junction, VehicleType(), 14.0, (100.0,) * junction.n))
-    length = VehicleType().length
-    for path in junction.paths:
+    types = VehicleType(), VehicleType(name="dragging", rear_axle=3.5)
+    bodies = Bodies(Site(junction, Fleet(types, ((0.5,), (0.5,))), 14.0, (100.0,) * junction.n))
+    for path, (k, it) in itertools.product(junction.paths, enumerate(types)):
         through = path.exit - path.entry
         for past in (-distance, 0.0, 2.0, through / 2, through - 0.1, through + 1.0, through + 9.0):
-            centre, heading = path.pose(path.entry + past, length)
-            body = bodies.body(seen(0, *path.movement, -past))
+            centre, heading = path.pose(path.entry + past, it)
+            body = bodies.body(seen(0, *path.movement, -past)._replace(type=k))
             assert body[:4] == pytest.approx((*centre, *heading), abs=1e-9), (path.movement, past)
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
+from hypothesis import assume, given
 
 from minisim.junction.conflicts import (
     AREA_STEP,
     CLEARANCE,
+    bodies,
     clearing_distances,
     conflict_areas,
     conflict_zones,
@@ -21,6 +25,8 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 from scenarios import four_way
+from scenarios.strategies import floats, intersections
+from tests.builders import share
 
 CAR = VehicleType()
 SQUARE = (0.0, 90.0, 180.0, 270.0)
@@ -133,3 +139,26 @@ def test_movements_that_never_meet_have_no_conflict_area() -> None:
     assert (inside == inside.T).all()
     assert (inside == np.isfinite(leave)).all()
     assert (leave[inside] > enter[inside]).all()
+
+
+@share(0.3)
+@given(intersections(), floats(2.0, 12.0), floats(0.4, 1.0))
+def test_a_body_that_fits_stays_beside_its_neighbours_beyond_the_exit(
+    junction: Intersection, length: float, axle: float
+) -> None:
+    """`entry_room` looks at a vehicle that waits at the line; farther out there may be others."""
+    it = VehicleType(length=length, width=2.0, rear_axle=axle * length)
+    assume(entry_room(junction, it) > 0.0)
+    for path, movement in zip(junction.paths, junction.movements, strict=True):
+        waits = junction.paths[junction.movements.rows[path.exit_arm][1]]
+        queue = bodies(waits, waits.entry - np.arange(0.0, 60.0, it.length / 3.0), it)
+        leaving = bodies(path, path.exit + np.arange(0.0, 50.0, 0.5), it)
+        assert not shapely.intersects(leaving[:, None], queue).any(), movement
+
+
+def test_a_long_overhang_that_swings_into_the_next_lane_does_not_fit() -> None:
+    wide = Intersection((0, 90, 180, 270), lane_width=3.0, junction_radius=20.0)
+    bus = VehicleType(length=12.0, width=2.5)
+    assert entry_room(wide, replace(bus, rear_axle=11.0)) == 0.0, "its rear cuts the corner"
+    assert entry_room(wide, replace(bus, length=9.0, rear_axle=2.0)) == 0.0, "its tail swings out"
+    assert entry_room(wide, replace(bus, length=9.0)) > 0.0

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
 from minisim.junction.partings import branch, parting, showing, turning_room
@@ -78,5 +79,5 @@ def test_corners_need_room_in_a_turn_as_on_one_arc() -> None:
     """The tightest turn of four arms has a radius of 5.6 m; the search is in steps of w/10."""
     for length, width in ((5.0, 1.8), (4.0, 2.0)):
         arc = width * math.tan(math.asin(length / (2.0 * 5.6)))
-        room = turning_room(FOUR, VehicleType(length=length, width=width))
+        room = turning_room(FOUR, Fleet((VehicleType(length=length, width=width),)))
         assert arc <= room <= arc + 0.2 * width

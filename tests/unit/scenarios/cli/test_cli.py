@@ -326,6 +326,23 @@ def test_clearance_only_removes_harmony(capsys: Captured) -> None:
     assert none >= usual > wide
 
 
+def test_longer_bodies_only_remove_harmony(capsys: Captured) -> None:
+    wide = ("harmony", "four-way", "--lane-width", "3.5", "--fleet")
+    cars, mixed = (answer(capsys, *wide, fleet) for fleet in ("car", "car:0.9,bus:0.1"))
+    assert sum(map(sum, cars["harmony"])) > sum(map(sum, mixed["harmony"]))
+    assert mixed["fleet"] == "car:0.9,bus:0.1"
+
+
+def test_a_decision_is_drawn_with_what_a_type_sweeps(capsys: Captured, tmp_path: Path) -> None:
+    decide, file = ("decide", "four-way", "a1", "b2", "--corridor"), tmp_path / "corridor.svg"
+    ok(capsys, *decide, "bus-offtracking", "--plot", str(file))
+    with_corridors = file.read_bytes()
+    ok(capsys, *decide[:-1], "--plot", str(file))
+    assert file.read_bytes() != with_corridors
+    assert "needs --plot" in fails(capsys, *decide, "bus")
+    assert "did you mean 'bus'" in fails(capsys, *decide, "buss", "--plot", str(file))
+
+
 def test_decide_answers_as_the_paper(capsys: Captured) -> None:
     arguments = ("decide", "four-way", "a1", "b2", "c2", "d2")
     printed = answer(capsys, *arguments)
