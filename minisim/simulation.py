@@ -30,7 +30,7 @@ from minisim.engine.state import (
     TRACE,
     Records,
     build_lanes,
-    build_road,
+    build_layout,
     build_vehicles,
 )
 from minisim.errors import InputError, number
@@ -80,7 +80,7 @@ class Simulation:
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' needs a CruiseVehicle")
-        self._road = build_road(self.site, plan)
+        self._road = build_layout(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from minisim.engine.state import DRIVING, Floats, Records, Road
+from minisim.engine.state import DRIVING, Floats, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
@@ -17,7 +17,7 @@ place, drag = njit_inline(locate), njit_inline(dragged)
 
 
 @njit
-def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
+def may_touch(vehicles: Records, lanes: Records, road: Layout, law: Law, bodies: Floats) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
     The separating-axis test is exact, and the rectangles are a little larger than the bodies, so

@@ -6,14 +6,14 @@ import math
 
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import DRIVING, Records, Road
+from minisim.engine.state import DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 
 @njit
 def insert(
-    vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise | None, tick: int
+    vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise | None, tick: int
 ) -> bool:
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 

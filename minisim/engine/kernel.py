@@ -16,7 +16,7 @@ from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import Cruise
 from minisim.engine.cruise.step import accelerate as accelerate_cruising
 from minisim.engine.insertion import insert
-from minisim.engine.state import ARRIVED, DRIVING, Floats, Records, Road
+from minisim.engine.state import ARRIVED, DRIVING, Floats, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import (
     Law,
@@ -38,7 +38,7 @@ MARK, CLEAR, TOUCH, GAP, TRACE_FULL, DONE = 1, 2, 4, 8, 16, 32
 def advance(
     vehicles: Records,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     cruise: Cruise | None,
     trace: Records,
@@ -75,7 +75,7 @@ def advance(
 def step(
     vehicles: Records,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     cruise: Cruise | None,
     bodies: Floats,
@@ -100,7 +100,7 @@ def step(
 
 
 @njit_inline
-def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
+def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
     Helpers get rows and numbers, never arrays: counting references to arrays would take longer than
@@ -183,7 +183,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law) -> bool:
 
 
 @njit_inline
-def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> int:
+def move(vehicles: Records, lanes: Records, road: Layout, law: Law, tick: int) -> int:
     """Move every vehicle by one step, add up waiting and loss, and collect reasons to return."""
     reasons = 0
     done = True
@@ -250,7 +250,7 @@ def move(vehicles: Records, lanes: Records, road: Road, law: Law, tick: int) -> 
 def record(
     vehicles: Records,
     lanes: Records,
-    road: Road,
+    road: Layout,
     law: Law,
     trace: Records,
     traced: int,

@@ -1,8 +1,8 @@
 """The arrays that a run consists of.
 
 Vehicles form one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-the row before. Lanes form another array. `Road` and `Law` hold what never changes during a run. Few
-arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
+the row before. Lanes form another array. `Layout` and `Law` hold what never changes during a run.
+Few arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ VEHICLE = np.dtype(
         ("rank", np.int64),  # its place among the vehicles of its lane
         ("manoeuvre", np.int64),
         ("path", np.int64),  # index of the movement
-        ("type", np.int64),  # index into `Road.types`
+        ("type", np.int64),  # index into `Layout.types`
         ("demand_tick", np.int64),
         ("length", np.float64),  # of its type [m]
         ("b_max", np.float64),  # the most that its brakes can do [m/s²]
@@ -87,7 +87,7 @@ _TYPES = {int: np.int64, float: np.float64}
 OBSERVED = np.dtype([(name, _TYPES[kind]) for name, kind in get_type_hints(Observed).items()])
 
 
-class Road(NamedTuple):
+class Layout(NamedTuple):
     """The paths as arrays; p counts movements, k sections of the speed profile."""
 
     #: (p, 4): `s` of the junction exit and of the road's end [m], index of exit arm, `s` of the
@@ -103,7 +103,7 @@ class Road(NamedTuple):
     types: Any  #: `Traits` of each type of vehicle, as records where the kernel is compiled
 
 
-def build_road(site: Site, plan: Plan) -> Road:
+def build_layout(site: Site, plan: Plan) -> Layout:
     """Lay out the paths with the speed profile of the site and the plan's markings."""
     paths = site.intersection.paths
     profiles = [_speed_profile(path, site, plan) for path in paths]
@@ -114,7 +114,7 @@ def build_road(site: Site, plan: Plan) -> Road:
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
     marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
-    return Road(
+    return Layout(
         ends=np.array([(p.exit, p.length, float(p.exit_arm), p.start) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),

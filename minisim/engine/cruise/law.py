@@ -9,7 +9,7 @@ import numpy as np
 
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
-from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
@@ -149,7 +149,7 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
 
 
 @njit
-def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise: Cruise) -> float:
+def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruise: Cruise) -> float:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit

@@ -9,7 +9,7 @@ import numpy as np
 from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
 from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.state import AMBER, DRIVING, Records, Road
+from minisim.engine.state import AMBER, DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import (
     KRAUSS,
@@ -28,7 +28,7 @@ from minisim.vehicle import POSITION_EPS
 
 
 @njit
-def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise) -> bool:
+def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
     All in one function for the reason given in `minisim.engine.kernel.accelerate`.
@@ -131,7 +131,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
 
 
 @njit
-def free(me: np.void, road: Road, law: Law, cruise: Cruise) -> float:
+def free(me: np.void, road: Layout, law: Law, cruise: Cruise) -> float:
     """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
     start, speed = road.section_start, road.section_speed

@@ -9,7 +9,7 @@ from minisim.arrivals import Arrivals
 from minisim.control import Plan, Site
 from minisim.engine.broad_phase import may_touch
 from minisim.engine.collision import near_bodies, touching
-from minisim.engine.state import DRIVING, build_lanes, build_road, build_vehicles
+from minisim.engine.state import DRIVING, build_lanes, build_layout, build_vehicles
 from minisim.fleet import TYPES, Fleet
 from minisim.junction.geometry import Intersection
 from minisim.laws import build_law
@@ -26,7 +26,7 @@ FLEET = Fleet(
 def test_it_misses_no_touch_and_asks_for_no_others(arms: tuple[float, ...], side: str) -> None:
     junction, n = Intersection(arms, side=side, lane_width=4.5, junction_radius=16.0), len(arms)
     site, random = Site(junction, FLEET, 14.0, (1.0,) * n), np.random.default_rng(n)
-    road, law, entry = build_road(site, Plan()), build_law(site, Plan()), junction.approach_length
+    road, law, entry = build_layout(site, Plan()), build_law(site, Plan()), junction.approach_length
     touches = 0
     for _ in range(40):
         manoeuvres, kinds = random.integers(1, n, n), random.choice(FLEET.names, n)

@@ -21,7 +21,7 @@ from minisim.control import Advise, Plan, Unregulated
 from minisim.engine.cruise.ends import look
 from minisim.engine.cruise.law import FASTEST, build_cruise
 from minisim.engine.cruise.step import accelerate
-from minisim.engine.state import AMBER, DRIVING, Records, build_lanes, build_road, build_vehicles
+from minisim.engine.state import AMBER, DRIVING, Records, build_lanes, build_layout, build_vehicles
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.laws import build_law
@@ -214,7 +214,7 @@ def chosen(
     what = replayed(what, *demanded, horizon=200.0)
     site = what.site(0)
     plan = Unregulated().start(site).plan
-    road = build_road(site, plan)
+    road = build_layout(site, plan)
     law = build_law(
         site, plan, depart_speed=what.depart_speed, record=None, record_window=(0.0, math.inf)
     )
@@ -450,7 +450,7 @@ def obeying(
     car = (0.0, lane, manoeuvre)
     what = replayed(MAKERS[4](profile="as_run_obeying"), car, horizon=200.0)
     site = what.site(0)
-    road = build_road(site, FixedTime().start(site).plan)
+    road = build_layout(site, FixedTime().start(site).plan)
     law = build_law(
         site, FixedTime().start(site).plan, depart_speed=0.0, record=None,
         record_window=(0.0, math.inf),
