@@ -226,9 +226,13 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """Give a whole lane the right of way (a green signal)."""
+    """Give a whole lane the right of way (a green signal).
+
+    `amber` says that it is about to end. Only a `CruiseVehicle` that `obeys` heeds it.
+    """
 
     lane: int
+    amber: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,15 @@ from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.cruise.law import build_cruise
 from minisim.engine.moving import CLEAR, MARKED
 from minisim.engine.packed import empty_pack, store
-from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_layout, build_vehicles
+from minisim.engine.state import (
+    AMBER,
+    OBSERVED,
+    TRACE,
+    Records,
+    build_lanes,
+    build_layout,
+    build_vehicles,
+)
 from minisim.errors import InputError, number
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
 from minisim.jit import direct
@@ -177,8 +185,10 @@ class Simulation:
                 self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
-            case Open(lane) | Close(lane):
-                self._lanes["open"][lane] = isinstance(command, Open)
+            case Open(lane, amber):
+                self._lanes["open"][lane] = AMBER if amber else 1
+            case Close(lane):
+                self._lanes["open"][lane] = 0
             case Wake():
                 self._alarm.set(command)
 

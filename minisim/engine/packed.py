@@ -93,9 +93,8 @@ def admit(
     floats[REACH, at] = (mine.a + 2.0 * mine.b) * law.dt
     floats[LEAVE, at] = road.ends[p, 0]
     floats[AWAY, at] = road.ends[p, 0] + 2.0 * me["length"]
-    ints[RELEASED, at], floats[BRAKE, at] = lanes[lane]["open"], me["brake"]
-    if me["go"] != 0:
-        ints[RELEASED, at] = 1
+    ints[RELEASED, at] = lanes[lane]["open"] != 0 or me["go"] != 0
+    floats[BRAKE, at] = me["brake"]
     beware(floats, ints, vehicles, road, law, at)
     expect(floats, ints, road, law, at)
 

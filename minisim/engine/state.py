@@ -57,6 +57,9 @@ VEHICLE = np.dtype(
     ]
 )
 
+#: The right of way of an open lane is about to end (`minisim.control.Open`).
+AMBER = 2
+
 LANE = np.dtype(
     [
         ("end", np.int64),  # one past its last row
@@ -64,7 +67,7 @@ LANE = np.dtype(
         ("next", np.int64),  # next row to be inserted
         ("front", np.int64),  # first row whose front has not entered the junction
         ("uncleared", np.int64),  # first row not yet clear of the junction
-        ("open", np.int64),
+        ("open", np.int64),  # 0, 1 or `AMBER`
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
         ("tail", np.int64),  # its slot (`minisim.engine.packed`), or -1 once it has arrived
         ("slot", np.int64),  # slot of its first vehicle on the road
