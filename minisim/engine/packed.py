@@ -46,8 +46,8 @@ INTS = 9
 def empty_pack(vehicles: Records, lanes: Records, road: Layout) -> tuple[Floats, Ints]:
     """Room for as many vehicles as fit on the roads, shapes (FLOATS, k) and (INTS, k)."""
     shortest = min((it.length for it in road.types), default=1.0)
-    per_lane = int((road.ends[:, 1] - road.ends[:, 3]).max() / shortest) + 2
-    most = min(len(vehicles), len(lanes) * per_lane)
+    longest_queue = int((road.ends[:, 1] - road.ends[:, 3]).max() / shortest) + 2
+    most = min(len(vehicles), len(lanes) * longest_queue)
     width = (most + 7) // 8 * 8 + 8
     return np.ones((FLOATS, width)), np.zeros((INTS, width), np.int64)
 
