@@ -73,6 +73,7 @@ def crossval(
     horizon: Annotated[float | None, option("Of each run; 3600, or 300 with --quick.", "S")] = None,
     fleet: options.Fleet = None,
     unit: options.Unit = None,
+    lane_width: options.LaneWidth = None,
     demand: options.DemandFile = None,
     start: options.Start = None,
     replay: Annotated[
@@ -112,12 +113,17 @@ def crossval(
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
         if node is not None:
             raise InputError("--node does not go with --replay: published junctions have no nodes")
-        if fleet is not None or unit is not None:
-            what = "--fleet" if unit is None else "--unit"
-            raise InputError(f"{what} does not go with --replay: published runs are of cars")
+        ours = {"--fleet": fleet, "--unit": unit, "--lane-width": lane_width}
+        for what in (name for name, value in ours.items() if value is not None):
+            raise InputError(
+                f"{what} does not go with --replay: published runs are of cars on lanes of 3.2 m"
+            )
         cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon or 0.0)
     else:
-        chosen = {"horizon": horizon, "fleet": fleet, "unit": unit, "node": node}
+        chosen = {
+            "horizon": horizon, "fleet": fleet, "unit": unit, "lane_width": lane_width,
+            "node": node,
+        }  # fmt: skip
         more: dict[str, Any] = {key: value for key, value in chosen.items() if value is not None}
         more["profile"] = profile or "fair"
         make: Callable[..., Scenario] = partial(scenario_named, **more)
