@@ -50,6 +50,7 @@ from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.laws import (
     IDM,
+    IIDM,
     KRAUSS,
     Law,
     braking_begins,
@@ -179,19 +180,19 @@ def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
     m = padded(n)
     for i in range(n):
         overlap |= gap[i] <= 0.0
-    if law.model == KRAUSS:
-        for i in range(n):
-            z[i] = closest[i]
-            if gap[i] < math.inf:
-                mine = road.types[ints[TYPE, i]]
-                z[i] = max(z[i], closeness(v[i], gap[i], lead_v[i], mine, law))
-    else:  # `gap_ratio`, in two loops
+    if law.model == IDM or law.model == IIDM:  # `gap_ratio`, in two loops
         headway, root, min_gap = floats[HEADWAY], floats[ROOT], floats[MIN_GAP]
         for i in range(m):
             z[i] = v[i] * headway[i] + v[i] * (v[i] - lead_v[i]) / root[i]
         for i in range(m):
             wanted = (min_gap[i] + (z[i] if z[i] > 0.0 else 0.0)) / gap[i]
             z[i] = max(wanted if gap[i] > 0.0 else math.inf, closest[i])
+    else:
+        for i in range(n):
+            z[i] = closest[i]
+            if gap[i] < math.inf:
+                mine = road.types[ints[TYPE, i]]
+                z[i] = max(z[i], closeness(v[i], gap[i], lead_v[i], mine, law))
     if law.semi_implicit or law.mixed:
         for i in range(n):
             room[i] = room_behind(gap[i], lead_v[i], lead_b[i], road.types[ints[TYPE, i]], law)
