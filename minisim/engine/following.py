@@ -140,7 +140,7 @@ def near_junction(
             other = rear - (s[i] - leave[i])
             if rear >= 0.0 and lead == i:
                 gap, lead = other, k
-            elif rear >= 0.0 and lead == k and law.model != KRAUSS:
+            elif rear >= 0.0 and lead == k and (law.model == IDM or law.model == IIDM):
                 gap = min(gap, other)  # the same vehicle: the smaller gap decides everything
             else:
                 mine = road.types[ints[TYPE, i]]
