@@ -15,7 +15,7 @@ import os
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 _F = TypeVar("_F", bound=Callable[..., object])
 
@@ -40,20 +40,21 @@ def njit(function: _F) -> _F:
     Compiled code must not allocate: it does not count references to arrays, which would take longer
     than the arithmetic.
     """
-    return _compile(function, inline="never")
+    return _compile(function)
 
 
 def njit_inline(function: _F) -> _F:
-    """The same for a helper in the inner loop, which is pasted into its compiled callers.
+    """The same for a helper in the inner loop, which becomes part of its compiled callers.
 
-    LLVM does not do so, and a call that passes `Law` field by field costs more than the arithmetic.
+    LLVM does not choose to do so, and a call that passes `Law` field by field costs more than the
+    arithmetic.
     """
-    return _compile(function, inline="always")
+    return _compile(function, forceinline=True)
 
 
 def allocating(function: _F) -> _F:
     """`njit` for a function that makes arrays."""
-    return _compile(function, inline="never", counting=True)
+    return _compile(function, _nrt=True)
 
 
 def direct(
@@ -77,13 +78,13 @@ def direct(
 _ENTRIES: dict[tuple[object, Hashable], Callable[..., Any]] = {}
 
 
-def _compile(function: _F, inline: Literal["never", "always"], counting: bool = False) -> _F:
+def _compile(function: _F, **options: bool) -> _F:
     if not COMPILED:
         return function
     import numba
 
-    options: dict[str, Any] = {"error_model": "numpy", "inline": inline, "_nrt": counting}
-    compiled: Any = numba.njit(**options)(function)
+    chosen: dict[str, Any] = {"error_model": "numpy", "_nrt": False, **options}
+    compiled: Any = numba.njit(**chosen)(function)
     compiled._cache = _cache_class()(function)  # what `cache=True` does, with our class
     return cast(_F, compiled)
 

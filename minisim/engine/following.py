@@ -51,7 +51,6 @@ from minisim.jit import njit, njit_inline
 from minisim.laws import (
     IDM,
     IIDM,
-    KRAUSS,
     Law,
     braking_begins,
     closeness,
