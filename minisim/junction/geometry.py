@@ -21,7 +21,7 @@ import numpy as np
 from minisim.errors import InputError, instance, items, number, numbers
 from minisim.fields import Takes
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
-from minisim.junction.paths import Path, Way
+from minisim.junction.paths import Bundle, Path, Way
 from minisim.junction.roads import Road
 from minisim.junction.tracing import MIN_PATH_RADIUS, build_path, smallest_radius
 from minisim.parameters import Reals, checked, declared, part, real, word
@@ -247,6 +247,11 @@ class Intersection:
     def paths(self) -> tuple[Path, ...]:
         """One path per movement, in the order of `movements`."""
         return tuple(build_path(self, m) for m in self.movements)
+
+    @cached_property
+    def bundle(self) -> Bundle:
+        """The same paths, for places on many of them at once."""
+        return Bundle(self.paths)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
         """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²].
