@@ -29,6 +29,9 @@ SWEEP_STEP = 0.5
 #: How far the coarse lines of paths may be off [m].
 COARSE = 0.05
 
+#: How many hulls in a row are compared at once.
+BLOCK = 8
+
 #: Distances are right to this [m], far more than rounding takes.
 ROUNDING = 1e-9
 
@@ -96,13 +99,15 @@ def meeting(
     then for the second. Not certain are distances that differ from `clearance` by rounding alone.
     """
     lines, rooms = zip(*(_trace(intersection, kind) for kind in kinds), strict=True)
-    line, room = np.concatenate(lines), np.concatenate(rooms)
-    shapely.prepare(line)
-    i, j = pairs.T
-    near = shapely.dwithin(line[i], line[j], max(clearance - ROUNDING, 0.0))
-    sure, open_ = np.ones(len(pairs), bool), np.flatnonzero(~near)
+    line, room, far = np.concatenate(lines), np.concatenate(rooms), clearance - 2.0 * COARSE
     coarse = shapely.simplify(line, COARSE)
     shapely.prepare(coarse)
+    i, j = pairs.T
+    if far > 0.0:
+        near = shapely.dwithin(coarse[i], coarse[j], far)
+    else:
+        near = shapely.intersects(line[i], line[j])
+    sure, open_ = np.ones(len(pairs), bool), np.flatnonzero(~near)
     i, j = pairs[open_].T
     reach = clearance + room[i] + room[j] + 2.0 * COARSE + ROUNDING
     open_ = open_[shapely.dwithin(coarse[i], coarse[j], reach)]
@@ -121,23 +126,57 @@ def _gaps(
     for one, other in ((a, b) for a in range(len(kinds)) for b in range(len(kinds))):
         mine = np.flatnonzero((pairs[:, 0] // m == one) & (pairs[:, 1] // m == other))
         for a, b in ((a, b) for a in sweeps[one] for b in sweeps[other] if len(mine)):
-            i, j, of = _all_of(a, b, pairs[mine] % m)
-            apart = _apart(a.hulls, b.hulls, i, j, enough + ROUNDING)
-            i, j, of = (it[apart <= enough + ROUNDING] for it in (i, j, of))
+            i, j, of = _near(a, b, pairs[mine] % m, enough + ROUNDING)
             np.minimum.at(gaps, mine[of], _distance(a.hulls, b.hulls, i, j))
     return gaps
 
 
-def _all_of(a: Sweep, b: Sweep, pairs: Ints) -> tuple[Ints, Ints, Ints]:
-    """All pairs of hulls on pairs of paths: two indices of hulls, and one of the pair of paths."""
-    starts = [np.searchsorted(it.path[it.first], [pairs[:, k], pairs[:, k] + 1])
-              for k, it in enumerate((a, b))]  # fmt: skip
-    (i, p), (j, q) = starts
+def _near(a: Sweep, b: Sweep, pairs: Ints, enough: float) -> tuple[Ints, Ints, Ints]:
+    """Hulls that may be `enough` [m] or less apart, two indices, and of which pair of paths."""
+    blocks = [_blocks(it) for it in (a, b)]
+    starts = [np.searchsorted(it.path, [pairs[:, k], pairs[:, k] + 1])
+              for k, it in enumerate(blocks)]  # fmt: skip
+    i, j, of = _all_of(*starts)
+    (c, d), (r, q) = ([it.centre for it in blocks], [it.radius for it in blocks])
+    near = np.hypot(*(c[i] - d[j]).T) <= r[i] + q[j] + enough
+    (k, l_, at) = _all_of(
+        *(it.ends[:, which[near]] for it, which in zip(blocks, (i, j), strict=True))
+    )
+    of = of[near][at]
+    close = _apart(a.hulls, b.hulls, k, l_, enough) <= enough
+    return k[close], l_[close], of[close]
+
+
+def _all_of(one: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
+    """Every index in each range of one and every one in that of the other, and of which range.
+
+    Ranges are their beginnings and ends, shape (2, ranges).
+    """
+    (i, p), (j, q) = one, other
     wide = q - j
     count = (p - i) * wide
-    of = np.repeat(np.arange(len(pairs)), count)
+    of = np.repeat(np.arange(len(i)), count)
     row, column = np.divmod(np.arange(count.sum()) - (count.cumsum() - count)[of], wide[of])
     return i[of] + row, j[of] + column, of
+
+
+class _Blocks(NamedTuple):
+    """Up to `BLOCK` hulls in a row, and a circle around them."""
+
+    path: Ints  #: shape (b,)
+    ends: Ints  #: the first hull of each block, and the first behind it, shape (2, b)
+    centre: Floats  #: shape (b, 2) [m]
+    radius: Floats  #: shape (b,) [m]
+
+
+def _blocks(swept: Sweep) -> _Blocks:
+    path, (_, centre, _, half) = swept.path[swept.first], swept.hulls
+    begins = np.flatnonzero((np.arange(len(path)) - np.searchsorted(path, path)) % BLOCK == 0)
+    ends = np.array([begins, np.append(begins[1:], len(path))])
+    middle = centre[ends.sum(axis=0) // 2]
+    off = np.hypot(*(centre - np.repeat(middle, np.diff(ends, axis=0)[0], axis=0)).T)
+    radius = np.maximum.reduceat(off + np.hypot(*half.T), begins)
+    return _Blocks(path[begins], ends, middle, radius)
 
 
 def least_gap(one: Hulls, other: Hulls, i: Ints, j: Ints) -> float:
@@ -153,26 +192,39 @@ def least_gap(one: Hulls, other: Hulls, i: Ints, j: Ints) -> float:
 
 
 def _apart(one: Hulls, other: Hulls, i: Ints, j: Ints, enough: float) -> Floats:
-    """Lower bounds of the distances between hulls [m], by their boxes; infinite above `enough`.
-
-    Two boxes are as far apart as along each of their axes, the separating-axis test.
-    """
+    """Lower bounds of the distances between hulls [m], by their boxes; infinite above `enough`."""
     apart = np.full(len(i), math.inf)
-    (x, y), (r, q) = (one.centre[i] - other.centre[j]).T, (one.half, other.half)
-    reach = np.hypot(*r.T)[i] + np.hypot(*q.T)[j] + enough
+    x, y = (one.centre[i] - other.centre[j]).T
+    reach = np.hypot(*one.half.T)[i] + np.hypot(*other.half.T)[j] + enough
     near = np.flatnonzero(x * x + y * y <= reach * reach)
     (i, j), x, y = (i[near], j[near]), x[near], y[near]
-    (u, v), (w, z) = one.heading[i].T, other.heading[j].T
-    (a, b), (c, d) = r[i].T, q[j].T
+    apart[near] = boxes_apart(
+        np.stack([x, y], -1), one.heading[i], other.heading[j], one.half[i], other.half[j]
+    )
+    apart[apart > enough] = math.inf
+    return apart
+
+
+def boxes_apart(
+    between: Floats, heading: Floats, others: Floats, half: Floats, its: Floats
+) -> Floats:
+    """A lower bound of the distance between two boxes [m], at most 0 only if they overlap.
+
+    They are given by the vector between their centres, their headings and half their lengths and
+    widths, shapes (..., 2). They are as far apart as along each of their axes (the separating-axis
+    test; Gottschalk, Lin, Manocha, SIGGRAPH 1996).
+    """
+    (x, y), (u, v), (w, z) = (np.moveaxis(it, -1, 0) for it in (between, heading, others))
+    (a, b), (c, d) = np.moveaxis(half, -1, 0), np.moveaxis(its, -1, 0)
     cos, sin = np.abs(u * w + v * z), np.abs(u * z - v * w)
-    apart[near] = np.maximum.reduce([
-        np.abs(x * u + y * v) - a - c * cos - d * sin,
+    most = np.abs(x * u + y * v) - a - c * cos - d * sin
+    for apart in (
         np.abs(x * v - y * u) - b - c * sin - d * cos,
         np.abs(x * w + y * z) - c - a * cos - b * sin,
         np.abs(x * z - y * w) - d - a * sin - b * cos,
-    ])
-    apart[apart > enough] = math.inf
-    return apart
+    ):
+        np.maximum(most, apart, out=most)
+    return most
 
 
 def _distance(one: Hulls, other: Hulls, i: Ints, j: Ints) -> Floats:
@@ -198,12 +250,12 @@ def _trace(
         np.insert(swept.front, starts, swept.rear[starts], axis=0),
         indices=np.insert(path, starts, path[starts]),
     )
-    stretch = _stretch(intersection)
-    off = _off(swept, swept.front, SWEEP_STEP * stretch)
-    return lines, off + np.max([_around(intersection, it, stretch) for it in vehicles.types], axis=0)
+    longer = stretch(intersection)
+    off = _off(swept, swept.front, SWEEP_STEP * longer)
+    return lines, off + np.max([_around(intersection, it, longer) for it in vehicles.types], axis=0)
 
 
-def _stretch(intersection: Intersection) -> Floats:
+def stretch(intersection: Intersection) -> Floats:
     """How far a path leads per metre of `s`, at most, shape (m,): given lengths are rounded."""
     points = np.array([path.points for path in intersection.paths])
     steps = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=1)
@@ -211,7 +263,7 @@ def _stretch(intersection: Intersection) -> Floats:
     return np.maximum(steps / np.array(each), 1.0)
 
 
-def _around(intersection: Intersection, vehicle: VehicleType, stretch: Floats) -> Floats:
+def _around(intersection: Intersection, vehicle: VehicleType, longer: Floats) -> Floats:
     """How far from its path a hull of the type reaches at most, shape (m,) [m].
 
     A hull lies around the line from where the path is a length behind the first body's front to the
@@ -223,8 +275,8 @@ def _around(intersection: Intersection, vehicle: VehicleType, stretch: Floats) -
     u, v = u[:, None], v[:, None]
     share = ((x * u + y * v) / (u * u + v * v)).clip(0.0, 1.0)
     farthest = np.hypot(x - share * u, y - share * v).max(axis=1)
-    most = _most(swept, farthest, len(stretch))
-    return most + _off(swept, swept.rear, (vehicle.length + SWEEP_STEP) * stretch)
+    most = _most(swept, farthest, len(longer))
+    return most + _off(swept, swept.rear, (vehicle.length + SWEEP_STEP) * longer)
 
 
 def _off(swept: Sweep, begin: Floats, length: Floats) -> Floats:
