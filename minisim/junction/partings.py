@@ -14,7 +14,7 @@ from minisim.fleet import Fleet, Vehicles
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Ints
 from minisim.junction.paths import Floats, Path
-from minisim.junction.sweeps import ROUNDING, SWEEP_STEP, boxes_apart, stretch, sweep
+from minisim.junction.sweeps import ROUNDING, boxes_apart, stretch, swing
 from minisim.vehicle import VehicleType
 
 #: Rear bumpers are tried at this spacing, up to this far beyond the exit [m].
@@ -34,8 +34,7 @@ def branch(intersection: Intersection, vehicles: Vehicles) -> Floats:
     room = max(it.width for it in vehicles.types) + BRANCH_ROOM
     rears = [None, *(it for it in vehicles.types if it.rear_axle is not None)]
     paths, apart = intersection.paths, intersection.movements.apart
-    lines = np.array([path.line for path in paths])
-    shapely.prepare(lines)
+    lines = intersection.bundle.lines
     pairs = np.argwhere(~apart & ~np.eye(len(apart), dtype=bool))
     stops = [path.exit + BEYOND for path in paths]
     places, counts = _places(intersection, stops, BRANCH_STEP)
@@ -104,33 +103,16 @@ def turning_room(intersection: Intersection, fleet: Fleet) -> float:
     rear = places[np.arange(len(pair)) - (counts.cumsum() - counts)[pair]]
     centre, heading = bundle.pose(p, rear + vehicle.length, vehicle)
     half = np.array([vehicle.length, vehicle.width]) / 2.0
-    pace = _swing(intersection, vehicle) * gaps[1]
-    k, least = np.full(len(pair), len(gaps) - 1), -1
+    pace = swing(intersection, vehicle) * gaps[1]
+    k, least = np.full(len(pair), len(gaps) - 1), 0
     while len(k):  # from the largest gap down: bodies that are far apart stay apart for a while
         other, its = bundle.pose(q, rear - gaps[k], vehicle)
         room = boxes_apart(centre - other, heading, its, half, half)
-        least = max(least, int(k[room <= 0.0].max(initial=-1)))
+        least = max(least, int(k[room <= 0.0].max(initial=0)))
         k = k - np.maximum(((room - ROUNDING) / pace[q]).astype(int), 1)
         left = k > least
         k, q, rear, centre, heading = (it[left] for it in (k, q, rear, centre, heading))
-    return float(gaps[max(least, 0)]) + 0.1 * vehicle.width
-
-
-def _swing(intersection: Intersection, vehicle: VehicleType) -> Floats:
-    """How far a point of a body moves at most per metre of its front bumper, shape (m,).
-
-    The ends of its chord c are on the path. So it turns by 2/c at most, and no point is farther
-    from the chord than half the width and what the body is longer than c. With a rear axle it
-    turns about its front bumper, by 1/axle at most.
-    """
-    longer = stretch(intersection)
-    if vehicle.rear_axle is not None:
-        return longer * (1.0 + (vehicle.length + vehicle.width / 2.0) / vehicle.rear_axle)
-    swept = sweep(intersection, vehicle)
-    chord = float(np.hypot(*(swept.front - swept.rear).T).min()) - SWEEP_STEP * longer
-    chord = chord.clip(1e-3)
-    beside = vehicle.width / 2.0 + np.maximum(vehicle.length - chord, 0.0)
-    return longer * (1.0 + 2.0 * beside / chord)
+    return float(gaps[least]) + 0.1 * vehicle.width
 
 
 @lru_cache(maxsize=64)

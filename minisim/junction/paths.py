@@ -98,8 +98,7 @@ class Path:
     @property
     def line(self) -> shapely.LineString:
         """The centre line as a shapely polyline, from road entry to road end."""
-        ends = self.position([self.start, self.length])
-        return shapely.LineString(np.vstack([ends[:1], self.points, ends[1:]]))
+        return self._alone.lines[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +124,15 @@ class Bundle:
         """x and y of all points, path by path."""
         x, y = np.concatenate([it.points for it in self.paths]).T.copy()
         return x, y
+
+    @cached_property
+    def lines(self) -> npt.NDArray[np.object_]:
+        """`Path.line` of each."""
+        ends = np.array([[it.start, it.length] for it in self.paths])
+        begin, end = np.moveaxis(self.position(np.arange(len(ends))[:, None], ends), 1, 0)
+        points = [it.points for it in self.paths]
+        points = np.concatenate([begin[:, None], points, end[:, None]], axis=1)
+        return np.asarray(shapely.linestrings(points))
 
     def position(self, which: Indices, s: npt.ArrayLike) -> Floats:
         """x, y [m] at `s`, shape (..., 2); straight on beyond both ends."""

@@ -57,6 +57,11 @@ def boxed(corners: Floats) -> Hulls:
     low, high = np.empty((2, len(corners), 2))
     for k, at in enumerate((x * u + y * v, y * u - x * v)):
         low[:, k], high[:, k] = at.min(axis=1), at.max(axis=1)
+    return _box(corners, heading, low, high)
+
+
+def _box(corners: Floats, heading: Floats, low: Floats, high: Floats) -> Hulls:
+    """Shapes with their boxes; `low` and `high` are their ends along and across the heading."""
     (a, b), (u, v) = (low + high).T / 2.0, heading.T
     return Hulls(corners, np.stack([a * u - b * v, a * v + b * u], -1), heading, (high - low) / 2.0)
 
@@ -133,18 +138,16 @@ def _gaps(
 
 def _near(a: Sweep, b: Sweep, pairs: Ints, enough: float) -> tuple[Ints, Ints, Ints]:
     """Hulls that may be `enough` [m] or less apart, two indices, and of which pair of paths."""
-    blocks = [_blocks(it) for it in (a, b)]
-    starts = [np.searchsorted(it.path, [pairs[:, k], pairs[:, k] + 1])
-              for k, it in enumerate(blocks)]  # fmt: skip
-    i, j, of = _all_of(*starts)
-    (c, d), (r, q) = ([it.centre for it in blocks], [it.radius for it in blocks])
-    near = np.hypot(*(c[i] - d[j]).T) <= r[i] + q[j] + enough
-    (k, l_, at) = _all_of(
-        *(it.ends[:, which[near]] for it, which in zip(blocks, (i, j), strict=True))
-    )
-    of = of[near][at]
-    close = _apart(a.hulls, b.hulls, k, l_, enough) <= enough
-    return k[close], l_[close], of[close]
+    (one, mine), (other, its) = (_blocks(it) for it in (a, b))
+    i, j, of = _all_of(*(
+        np.searchsorted(it.path[it.first[ends[0]]], [which, which + 1])
+        for it, ends, which in ((a, mine, pairs[:, 0]), (b, its, pairs[:, 1]))
+    ))  # fmt: skip
+    close = _apart(one, other, i, j, enough) <= enough
+    i, j, at = _all_of(mine[:, i[close]], its[:, j[close]])
+    of = of[close][at]
+    close = _apart(a.hulls, b.hulls, i, j, enough) <= enough
+    return i[close], j[close], of[close]
 
 
 def _all_of(one: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
@@ -160,23 +163,21 @@ def _all_of(one: Ints, other: Ints) -> tuple[Ints, Ints, Ints]:
     return i[of] + row, j[of] + column, of
 
 
-class _Blocks(NamedTuple):
-    """Up to `BLOCK` hulls in a row, and a circle around them."""
-
-    path: Ints  #: shape (b,)
-    ends: Ints  #: the first hull of each block, and the first behind it, shape (2, b)
-    centre: Floats  #: shape (b, 2) [m]
-    radius: Floats  #: shape (b,) [m]
-
-
-def _blocks(swept: Sweep) -> _Blocks:
-    path, (_, centre, _, half) = swept.path[swept.first], swept.hulls
+def _blocks(swept: Sweep) -> tuple[Hulls, Ints]:
+    """Boxes around up to `BLOCK` hulls in a row; the first of each, and the first behind it."""
+    path, hulls = swept.path[swept.first], swept.hulls
     begins = np.flatnonzero((np.arange(len(path)) - np.searchsorted(path, path)) % BLOCK == 0)
     ends = np.array([begins, np.append(begins[1:], len(path))])
-    middle = centre[ends.sum(axis=0) // 2]
-    off = np.hypot(*(centre - np.repeat(middle, np.diff(ends, axis=0)[0], axis=0)).T)
-    radius = np.maximum.reduceat(off + np.hypot(*half.T), begins)
-    return _Blocks(path[begins], ends, middle, radius)
+    middle, count = ends.sum(axis=0) // 2, np.diff(ends, axis=0)[0]
+    (x, y), (u, v), (w, z), (a, b) = (
+        hulls.centre.T, np.repeat(hulls.heading[middle], count, axis=0).T, hulls.heading.T,
+        hulls.half.T,
+    )  # fmt: skip
+    cos, sin = np.abs(u * w + v * z), np.abs(u * z - v * w)
+    at = np.stack([x * u + y * v, y * u - x * v], axis=-1)
+    wide = np.stack([a * cos + b * sin, a * sin + b * cos], axis=-1)
+    low, high = np.minimum.reduceat(at - wide, begins), np.maximum.reduceat(at + wide, begins)
+    return _box(hulls.corners[middle], hulls.heading[middle], low, high), ends
 
 
 def least_gap(one: Hulls, other: Hulls, i: Ints, j: Ints) -> float:
@@ -251,7 +252,7 @@ def _trace(
         indices=np.insert(path, starts, path[starts]),
     )
     longer = stretch(intersection)
-    off = _off(swept, swept.front, SWEEP_STEP * longer)
+    off = _off(swept, swept.front, swept.front, SWEEP_STEP * longer)
     return lines, off + np.max([_around(intersection, it, longer) for it in vehicles.types], axis=0)
 
 
@@ -276,21 +277,42 @@ def _around(intersection: Intersection, vehicle: VehicleType, longer: Floats) ->
     share = ((x * u + y * v) / (u * u + v * v)).clip(0.0, 1.0)
     farthest = np.hypot(x - share * u, y - share * v).max(axis=1)
     most = _most(swept, farthest, len(longer))
-    return most + _off(swept, swept.rear, (vehicle.length + SWEEP_STEP) * longer)
+    return most + _off(swept, swept.rear, swept.front, (vehicle.length + SWEEP_STEP) * longer)
 
 
-def _off(swept: Sweep, begin: Floats, length: Floats) -> Floats:
+def _off(swept: Sweep, begin: Floats, end: Floats, length: Floats) -> Floats:
     """How far a path is at most from the line between the ends of a piece of it, shape (m,) [m].
 
-    A piece leads from `begin` of a body to the front of the next. If it is no longer than `length`,
-    shape (m,), it stays in the ellipse around its ends.
+    A piece leads from `begin` of a body to `end` of the next. If it is no longer than `length`,
+    shape (m,), it stays in the ellipse around its ends. Nor is it farther from where one would be
+    that moved evenly from end to end.
     """
-    x, y = (swept.front[swept.first + 1] - begin[swept.first]).T
-    chord = length[swept.path[swept.first]] ** 2 - x * x - y * y
-    return _most(swept, np.sqrt(np.maximum(chord, 0.0)) / 2.0, len(length))
+    x, y = (end[swept.first + 1] - begin[swept.first]).T
+    spare = length[swept.path[swept.first]] ** 2 - x * x - y * y
+    return _most(swept, np.sqrt(np.maximum(spare, 0.0)) / 2.0, len(length))
 
 
 def _most(swept: Sweep, values: Floats, paths: int) -> Floats:
     """The largest of the values of each path's hulls."""
     starts = np.searchsorted(swept.path[swept.first], np.arange(paths))
     return np.maximum.reduceat(values, starts)
+
+
+def swing(intersection: Intersection, vehicle: VehicleType) -> Floats:
+    """How far a point of a body moves at most per metre of its front bumper, shape (m,).
+
+    The ends of its chord c are on the path. So it turns by 2/c at most, and no point is farther
+    from the chord than half the width and what the body is longer than c. With a rear axle it
+    turns about its front bumper, by 1/axle at most.
+    """
+    longer, swept = stretch(intersection), sweep(intersection, vehicle)
+    if vehicle.rear_axle is not None:
+        return longer * (1.0 + (vehicle.length + vehicle.width / 2.0) / vehicle.rear_axle)
+    # From one body to the next, the chord is nearly a mean of the two, each moved by a step at most.
+    step = SWEEP_STEP * longer
+    least = -_most(swept, -np.hypot(*(swept.front - swept.rear)[swept.first].T), len(longer))
+    chord = np.sqrt(np.maximum(least**2 - step**2, 0.0))
+    for ends in (swept.front, swept.rear):
+        chord = chord - _off(swept, ends, ends, step)
+    chord = chord.clip(1e-3)
+    return longer * (1.0 + (vehicle.width + 2.0 * np.maximum(vehicle.length - chord, 0.0)) / chord)
