@@ -137,9 +137,7 @@ def _least_gap(
 ) -> float:
     """Smallest distance [m] between corridors and convex shapes, of the pairs in `which`."""
     sweeps, others = [sweep(intersection, it) for it in vehicles.types], boxed(shapes)
-    return min(
-        least_gap(it.hulls, others, *np.nonzero(which[it.path[it.first]])) for it in sweeps
-    )
+    return min(least_gap(it.hulls, others, *np.nonzero(which[it.path[it.first]])) for it in sweeps)
 
 
 def _tail(intersection: Intersection, vehicles: Vehicles, arm: int) -> tuple[Floats, Bools]:
@@ -147,7 +145,10 @@ def _tail(intersection: Intersection, vehicles: Vehicles, arm: int) -> tuple[Flo
     movements, allowed = intersection.movements, intersection.allowed
     leaving = np.flatnonzero(allowed & (movements.exits == arm))
     path = intersection.paths[leaving[0] if len(leaving) else 0]
-    far, wide = (2.0 * max(it.length for it in vehicles.types), max(it.width for it in vehicles.types))
+    far, wide = (
+        2.0 * max(it.length for it in vehicles.types),
+        max(it.width for it in vehicles.types),
+    )
     across = np.array([-path.heading_out[1], path.heading_out[0]]) * wide / 2.0
     near, end = path.points[-1], path.points[-1] + far * path.heading_out
     own = allowed & (movements.origins == arm) & bool(len(leaving))

@@ -56,9 +56,7 @@ def branch(intersection: Intersection, vehicles: Vehicles) -> Floats:
     return result
 
 
-def _places(
-    intersection: Intersection, stops: npt.ArrayLike, step: float
-) -> tuple[Floats, Ints]:
+def _places(intersection: Intersection, stops: npt.ArrayLike, step: float) -> tuple[Floats, Ints]:
     """Places from the entry up to the farthest of `stops` [m], and how many are before each."""
     counts = np.ceil(np.subtract(stops, intersection.approach_length) / step).astype(int)
     return np.arange(intersection.approach_length, np.max(stops), step), counts

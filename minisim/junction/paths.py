@@ -130,8 +130,8 @@ class Bundle:
         """`Path.line` of each."""
         ends = np.array([[it.start, it.length] for it in self.paths])
         begin, end = np.moveaxis(self.position(np.arange(len(ends))[:, None], ends), 1, 0)
-        points = [it.points for it in self.paths]
-        points = np.concatenate([begin[:, None], points, end[:, None]], axis=1)
+        inside = np.array([it.points for it in self.paths])
+        points = np.concatenate([begin[:, None], inside, end[:, None]], axis=1)
         return np.asarray(shapely.linestrings(points))
 
     def position(self, which: Indices, s: npt.ArrayLike) -> Floats:
@@ -151,9 +151,7 @@ class Bundle:
             )
         ], axis=-1)  # fmt: skip
 
-    def pose(
-        self, which: Indices, s: npt.ArrayLike, vehicle: VehicleType
-    ) -> tuple[Floats, Floats]:
+    def pose(self, which: Indices, s: npt.ArrayLike, vehicle: VehicleType) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
         The middle of the front bumper lies on the path. Without a `rear_axle`, that of the rear

@@ -233,7 +233,8 @@ def _distance(one: Hulls, other: Hulls, i: Ints, j: Ints) -> Floats:
     shapes = []
     for hulls, which in ((one, i), (other, j)):
         some, back = np.unique(which, return_inverse=True)
-        shapes.append(shapely.convex_hull(shapely.multipoints(hulls.corners[some]))[back])
+        drawn = shapely.convex_hull(shapely.multipoints(hulls.corners[some]))
+        shapes.append(np.asarray(drawn)[back])
     return np.asarray(shapely.distance(*shapes))
 
 
@@ -253,7 +254,9 @@ def _trace(
     )
     longer = stretch(intersection)
     off = _off(swept, swept.front, swept.front, SWEEP_STEP * longer)
-    return lines, off + np.max([_around(intersection, it, longer) for it in vehicles.types], axis=0)
+    return np.asarray(lines), off + np.max(
+        [_around(intersection, it, longer) for it in vehicles.types], axis=0
+    )
 
 
 def stretch(intersection: Intersection) -> Floats:
@@ -308,7 +311,7 @@ def swing(intersection: Intersection, vehicle: VehicleType) -> Floats:
     longer, swept = stretch(intersection), sweep(intersection, vehicle)
     if vehicle.rear_axle is not None:
         return longer * (1.0 + (vehicle.length + vehicle.width / 2.0) / vehicle.rear_axle)
-    # From one body to the next, the chord is nearly a mean of the two, each moved by a step at most.
+    # Between two bodies, the chord is nearly a mean of theirs, which differ by two steps at most.
     step = SWEEP_STEP * longer
     least = -_most(swept, -np.hypot(*(swept.front - swept.rear)[swept.first].T), len(longer))
     chord = np.sqrt(np.maximum(least**2 - step**2, 0.0))
