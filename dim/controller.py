@@ -160,6 +160,19 @@ class Dim:
         return self.matrix
 
 
+def _rests(dim: Dim, looks: float | None, takes: object) -> bool:
+    """Whether no vehicle can change its mind while any is inside the junction.
+
+    Under the paper's gate, all wait for an empty junction. Ranks that change with time, monitors,
+    and vehicles that see or read differently look on.
+    """
+    return (
+        (dim.gate, dim.commit) == ("clear", "stoppable")
+        and dim.priorities not in CHANGING
+        and (dim.monitor, looks, takes, dim.period) == (None,) * 4
+    )
+
+
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part and that `follows` DIM.
 
@@ -193,6 +206,7 @@ class DimSession:
             markings=zones.markings(site),
             marks=(zones.yellow_start, *half_green, *entry),
             wake_on_clear=True,
+            wake_when_empty=_rests(dim, looks, takes),
             period=dim.period or (None if looks is None else max(looks, site.dt)),
             sight=zones.yellow_start + SIGHT_MARGIN,
             lanes_open=False,

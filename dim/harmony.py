@@ -108,7 +108,7 @@ class HarmonyMatrix:
     @property
     def choices(self) -> int:
         """How many different participants a lane can have."""
-        return self.types * (self.n - 1)
+        return self.movements.choices
 
     def index(self, movement: Movement | str) -> int:
         """Row of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError` if unknown."""

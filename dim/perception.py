@@ -94,12 +94,12 @@ class Reader(NamedTuple):
     def typed(self, vehicle: Observed) -> Movement:
         """Its movement as the matrix counts it (`minisim.junction.movements.Movements`)."""
         kind = vehicle.type if self.types > 1 else 0
-        return Movement(vehicle.lane, kind * (self.n - 1) + vehicle.manoeuvre)
+        return Movement(vehicle.lane, movements_of(self.n).typed(kind, vehicle.manoeuvre))
 
     def read(self, view: View) -> Percept:
         """Participants and crossing vehicles of a view, ordered by lane and front to back."""
         n, types, start = self.n, self.types, self.zones.yellow_start + ROUNDING
-        movements, base = movements_of(n), types * (n - 1) + 1
+        movements, base = movements_of(n), movements_of(n, types).choices + 1
         bits, kind = movements.bits, 0
         participants, crossing = [], []
         case = occupied = unknown = 0
@@ -121,5 +121,5 @@ class Reader(NamedTuple):
                 if manoeuvre == UNKNOWN:
                     unknown += (kind + 1) * (types + 1) ** lane
                 else:
-                    case += (kind * (n - 1) + manoeuvre) * base**lane
+                    case += (movements.typed(kind, manoeuvre) if kind else manoeuvre) * base**lane
         return Percept(tuple(participants), tuple(crossing), case, occupied, unknown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -198,8 +199,9 @@ def _head(figure: Figure, axes: Axes, result: Result, note: str = "") -> None:
 
 
 def _group(result: Result) -> tuple[str, ...]:
-    return result.case.scenario.name, result.case.split, result.case.controller
+    case = result.case
+    return tuple(filter(None, (case.scenario.name, case.split, case.fleet, case.controller)))
 
 
 def _file(*words: str) -> str:
-    return "_".join(words).replace(":", "-").replace(" ", "_")
+    return re.sub("[:/,]", "-", "_".join(words)).replace(" ", "_")

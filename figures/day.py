@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import cycle
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,42 +14,63 @@ from figures import plots, style
 from minisim.clock import time_of_day
 from minisim.results.run import Run
 from minisim.results.service import LEVELS, service
+from scenarios.controllers import VARIANTS
 
-#: Line styles of the runs, in their order.
-_STROKES = ("-", "--", "-.", ":")
+#: Columns of `service` -> titles of their panels; logarithmic, but linear below `LINEAR` [s].
+TIMES = {"waiting_time_s": "mean waiting [s]", "control_delay_s": "mean control delay [s]"}
+LINEAR = 1.0
 
-#: Column of `service` -> title of its panel.
-COLUMNS = {
-    "trips": "vehicles that came",
-    "waiting_time_s": "mean waiting [s]",
-    "control_delay_s": "mean control delay [s]",
-}
+NOTE = (
+    "By the interval in which vehicles came, with the vehicles that had not arrived by the end. "
+    f"Times are on a logarithmic scale, linear below {LINEAR:g} s. A … E: where the levels of "
+    "service end at junctions without signals (Highway Capacity Manual, 6th ed.); beyond E is F."
+)
 
 
 def day_figure(runs: Mapping[str, Run], interval: float = 900.0) -> Figure:
-    """Mean waiting and control delay by the interval [s] in which vehicles came, and how many did.
+    """How many vehicles came in each `interval` [s], and their mean waiting and control delay.
 
-    `runs` maps what the legend says to runs of one demand. Grey lines are the levels of service A
-    to F at junctions without signals (`minisim.results.service.LEVELS`).
+    `runs` maps names to runs of one demand. Names of controllers have the same look as in other
+    figures; other variants of these have the same colour.
     """
     figure, panels = plots.panels(
-        12.0, 4.2, 3, sharey=False, left=0.05, right=0.97, top=0.78, bottom=0.15, wspace=0.2
+        12.0, 4.4, 3, sharey=False, left=0.05, right=0.97, top=0.77, bottom=0.2, wspace=0.2
     )
-    for axes, (column, label) in zip(panels, COLUMNS.items(), strict=True):
-        for stroke, (name, run) in zip(cycle(_STROKES), runs.items()):
-            table = service(run, interval)
-            begin = getattr(getattr(run.scenario, "demand", None), "start", 0.0)
-            hours = (begin + table["start_s"] + interval / 2.0) / 3600.0
-            axes.plot(hours, table[column], stroke, label=name)
-            if column == "trips":  # the same for all
-                break
-        axes.set_ylim(bottom=0.0)
-        style.plot_axes(axes, label, "time of day", "")
+    looks = _looks(runs)
+    tables = {name: service(run, interval) for name, run in runs.items()}
+    start = next(iter(tables.values()))["start_s"]
+    begin = max(
+        getattr(getattr(run.scenario, "demand", None), "start", 0.0) for run in runs.values()
+    )
+    hours = (begin + start + interval / 2.0) / 3600.0
+    panels[0].plot(hours, next(iter(tables.values()))["trips"], color=style.INK)
+    panels[0].set_ylim(bottom=0.0)
+    style.plot_axes(panels[0], f"vehicles per {interval / 60.0:g} min", "time of day", "")
+    for axes, (column, title) in zip(panels[1:], TIMES.items(), strict=True):
+        for look, table in zip(looks, tables.values(), strict=True):
+            axes.plot(
+                hours, table[column], look.dashes, color=look.colour, label=look.label,
+                marker=look.marker, markersize=4.5, markevery=4,
+            )  # fmt: skip
+        style.plot_axes(axes, title, "time of day", "")
+        highest = max(float(table[column].max()) for table in tables.values())
+        plots.log_time(axes, 0.0, max(1.5 * highest, 10.0), linear=LINEAR)
+    for axes in panels:
         axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
         axes.xaxis.set_major_formatter(lambda hour, _: time_of_day(3600.0 * hour))
     _levels(panels[2])
-    figure.legend(*panels[2].get_legend_handles_labels(), loc="upper center", ncols=len(runs))
+    plots.frame(figure, "A day at the junction", looks, NOTE, ncols=len(looks))
     return figure
+
+
+def _looks(names: Iterable[str]) -> list[style.Look]:
+    strokes: Iterator[Any] = cycle((":", "-.", "--", "-"))
+    return [
+        style.look(name)
+        if name in VARIANTS
+        else style.look(name.partition(":")[0])._replace(label=name, dashes=next(strokes))
+        for name in names
+    ]
 
 
 def _levels(axes: Axes) -> None:

@@ -20,13 +20,12 @@ STANDSTILL = 1e-4
 
 
 @njit_inline
-def free_road(v: float, v0: float, a: float, b: float, delta: float) -> float:
-    """IDM acceleration on an empty road, a·(1 − (v/v0)^δ) [m/s²].
+def free_road(r: float, a: float, b: float, delta: float) -> float:
+    """IDM acceleration on an empty road, a·(1 − r^δ) [m/s²], r = v/v0.
 
     Above the desired speed (when a limit begins late), a vehicle brakes at b at most.
     Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 3 without interaction.
     """
-    r = v / v0
     if delta == 4.0:
         r = r * r
         power = r * r
@@ -58,7 +57,7 @@ def idm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> floa
 
     Source: Treiber, Hennecke, Helbing 2000, PRE 62:1805, eq. 3.
     """
-    return free_road(v, v0, a, b, delta) - a * z * z
+    return free_road(v / v0, a, b, delta) - a * z * z
 
 
 @njit_inline
@@ -72,7 +71,7 @@ def iidm(v: float, v0: float, z: float, a: float, b: float, delta: float) -> flo
         return acc_free + a * (1.0 - z * z) if z >= 1.0 else acc_free
     if z >= 1.0:
         return a * (1.0 - z * z)
-    acc_free = free_road(v, v0, a, b, delta)
+    acc_free = free_road(v / v0, a, b, delta)
     if acc_free <= 0.0:  # v = v0: the exponent 2a/a_free is infinite and its term vanishes
         return acc_free
     return acc_free * float(1.0 - z ** (2.0 * a / acc_free))

@@ -226,9 +226,13 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """Give a whole lane the right of way (a green signal)."""
+    """Give a whole lane the right of way (a green signal).
+
+    `amber` says that it is about to end. Only a `CruiseVehicle` that `obeys` heeds it.
+    """
 
     lane: int
+    amber: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,6 +312,10 @@ class Plan:
         "m", default=(), low=-1000,
     )  # fmt: skip
     wake_on_clear: Switch = switch("wake when a rear bumper leaves the junction", default=False)
+    wake_when_empty: Switch = switch(
+        "marks and vehicles that leave wake only while no vehicle is inside the junction",
+        default=False,
+    )  # fmt: skip
     period: float | None = real(
         "wake at this interval, at least the step", "s", default=None, above=0, optional=True
     )

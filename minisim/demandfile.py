@@ -4,6 +4,10 @@ name = "Market Street"              # what rows call it
 model = "poisson"                   # and min_headway = …, as for a `Demand`
 start = "07:00"                     # where a run begins, if not at the first period
 
+[fleet]                             # shares of vehicle types; without it, the profile's vehicle
+car = 0.9                           # on every lane; or a list with one share per lane
+bus = 0.1
+
 [[period]]
 start = "07:00"
 end = "07:15"
@@ -15,16 +19,18 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from minisim.clock import time_of_day
-from minisim.demand import UNIFORM, DemandProfile, Period
+from minisim.demand import DemandProfile, Period
 from minisim.errors import FileError, InputError, choice, instance
 from minisim.files import AnyPath, read_file, write_text
+from minisim.fleet import TYPES, Fleet
 from minisim.parameters import parameters
+from minisim.shares import UNIFORM
 
 
 def read_demand(path: AnyPath, start: float | str | None = None) -> DemandProfile:
@@ -52,12 +58,19 @@ def read_demand(path: AnyPath, start: float | str | None = None) -> DemandProfil
 
 
 def write_demand(demand: DemandProfile, path: AnyPath) -> None:
-    """Write demand in the form that `read_demand` reads; raises `FileError`."""
+    """Write demand in the form that `read_demand` reads.
+
+    Raises:
+        InputError: a fleet with vehicle types of one's own, which a file cannot name.
+        FileError: it cannot be written.
+    """
     instance("demand", demand, DemandProfile)
     lines = [f"name = {_toml(demand.name)}", f'model = "{demand.model}"']
     if demand.model == "shifted":
         lines.append(f"min_headway = {_toml(demand.min_headway)}")
     lines.append(f'start = "{time_of_day(demand.start)}"')
+    if demand.fleet is not None:
+        lines += ["", "[fleet]", *_shares(demand.fleet)]
     for period in demand.periods:
         lines += [
             "", "[[period]]", f'start = "{time_of_day(period.start)}"',
@@ -65,6 +78,16 @@ def write_demand(demand: DemandProfile, path: AnyPath) -> None:
             f"turns = {_toml(period.turns)}",
         ]  # fmt: skip
     write_text(path, "\n".join(lines) + "\n")
+
+
+def _shares(fleet: Fleet) -> Iterator[str]:
+    for kind, row in zip(fleet.types, fleet.shares, strict=True):
+        ready = TYPES.get(kind.name)
+        if ready is None or replace(kind, model=ready.model) != ready:
+            raise InputError(
+                f"a file of demand knows only the ready vehicle types, not your own {kind.name!r}"
+            )
+        yield f"{kind.name} = {_toml(row if len(row) > 1 else row[0])}"
 
 
 def _made(where: str, make: Callable[..., Any], table: Mapping[str, Any]) -> Any:
@@ -80,4 +103,4 @@ def _toml(value: Any) -> str:
         return f"[{', '.join(map(_toml, value))}]"
     if value is None or isinstance(value, str):
         return json.dumps(value or UNIFORM, ensure_ascii=False)
-    return f"{value:.17g}".removesuffix(".0") if value != int(value) else str(int(value))
+    return repr(float(value)).removesuffix(".0")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import InputError, choice, instance, number, numbers, show
+from minisim.errors import InputError, choice, instance, number, show
 from minisim.junction.movements import ARM_NAMES
 from minisim.parameters import Takes, checked, declared
 from minisim.streams import Draws
@@ -134,22 +133,22 @@ def _types(title: str, value: Any) -> tuple[VehicleType, ...]:
     return types
 
 
-def _shares(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
+def _shares(_: str, value: Any) -> tuple[tuple[float, ...], ...]:
     rows = value if isinstance(value, list | tuple) else (value,)
-    kept = tuple(
-        numbers(f"{title}[{i}]", row if isinstance(row, list | tuple) else [row])
-        for i, row in enumerate(rows)
+    return tuple(
+        tuple(
+            number("share of a type", share, low=0, high=1)
+            for share in (row if isinstance(row, list | tuple) else (row,))
+        )
+        for row in rows
     )
-    for share in itertools.chain.from_iterable(kept):
-        number("share of a type", share, low=0, high=1)
-    return kept
 
 
 @declared
 class Fleet:
     """Which types of vehicles drive, and how many of each.
 
-    A vehicle's type is drawn by its lane and its place there, so it depends on nothing else.
+    The type of a vehicle depends only on the seed, its lane and its rank there.
     """
 
     types: Takes[tuple[VehicleType, ...], VehicleType | Sequence[VehicleType]] = checked(
@@ -201,9 +200,9 @@ class Fleet:
 
     @cached_property
     def worst(self) -> VehicleType:
-        """A vehicle that is as bad as the worst in every respect: length, brakes and so on.
+        """A vehicle as bad as the worst of the types in every respect: length, brakes and so on.
 
-        With one type it is that type.
+        A fleet of one type has that type.
         """
         first, *others = self.types
         if not others:
@@ -216,7 +215,7 @@ class Fleet:
         return replace(first, name="the worst of the fleet", **bound)
 
     def drawn(self, lane: Ints, rank: Ints, seed: int) -> Ints:
-        """Index of the type of each vehicle, shape (k,), by its lane and its place there."""
+        """Index of the type of each vehicle, shape (k,), by its lane and its rank there."""
         if len(self.types) == 1:
             return np.zeros(len(lane), int)
         draws, types = Draws(seed, "types"), np.zeros(len(lane), int)
@@ -234,11 +233,26 @@ class Fleet:
         return np.array([known[choice("vehicle type", str(it), known)] for it in names], int)
 
 
-#: What has `types`: a fleet, or the only type that drives.
+#: What has `types`: a fleet, or the one type that drives.
 Vehicles = Fleet | VehicleType
+#: What `fleet_named` reads.
+FleetLike = Vehicles | Mapping[str, float | Sequence[float]] | str
 
 
-def fleet_named(value: Any, base: VehicleType) -> Fleet:
+def driven_like(fleet: Fleet, base: VehicleType) -> Fleet:
+    """The same fleet, whose vehicles follow others by the law of `base`.
+
+    Raises `InputError` if `base` is under cruise control or has SUMO's rules.
+    """
+    if base.sumo is not None:
+        raise InputError(
+            "a fleet, given or brought by a demand, needs the profile paper or fair, not one with "
+            "SUMO's vehicles"
+        )
+    return replace(fleet, types=tuple(replace(it, model=base.model) for it in fleet.types))
+
+
+def fleet_named(value: FleetLike, base: VehicleType) -> Fleet:
     """The fleet that a value means; its vehicles follow others by the law of `base`.
 
     Args:
@@ -272,10 +286,8 @@ def fleet_named(value: Any, base: VehicleType) -> Fleet:
             raise InputError(f"fleet names a vehicle type twice: {', '.join(p[0] for p in pairs)}")
     if not isinstance(value, Mapping) or not value:
         raise InputError(f"fleet must be {wanted}, got {show(value)}")
-    if base.sumo is not None:
-        raise InputError("a fleet needs the profile paper or fair, not with SUMO's vehicles")
-    types = [TYPES[choice("vehicle type", name, TYPES)] for name in value]
-    return Fleet(tuple(replace(it, model=base.model) for it in types), tuple(value.values()))
+    types = tuple(TYPES[choice("vehicle type", name, TYPES)] for name in value)
+    return driven_like(Fleet(types, tuple(value.values())), base)
 
 
 #: Units of an inflow that are passenger car units, and how many a vehicle of each type counts.
@@ -298,10 +310,11 @@ PCU: Mapping[str, Mapping[str, tuple[float, float]]] = {
 
 
 def pcu_factors(fleet: Fleet, unit: str, n: int) -> tuple[float, ...]:
-    """Passenger car units of a vehicle of each type, given their shares over `n` equal lanes.
+    """Passenger car units of a vehicle of each type, by its mean share over `n` lanes.
 
-    Where a unit has two factors, they apply at shares of 5 % and 10 %; in between, the factor is
-    interpolated. Raises `InputError` for an unknown unit, or a type without a factor.
+    If a unit has two factors, the first holds up to a share of 5 % and the second from 10 % on; in
+    between, the factor is interpolated. Raises `InputError` for an unknown unit, or a type without
+    a factor.
     """
     table = PCU[choice("passenger car unit", unit, PCU)]
     shares = np.mean([fleet.of_lane(lane) for lane in range(n)], axis=0)

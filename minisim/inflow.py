@@ -1,4 +1,4 @@
-"""Inflow of the lanes, constant for a while at a time, and the times of vehicles drawn from it."""
+"""Inflow of the lanes, constant within each period, and arrival times drawn from it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _rows(title: str, value: Any) -> tuple[tuple[float, ...], ...]:
 
 @declared
 class Inflow:
-    """Mean inflow of each lane in each of the periods of a run; the last has no end."""
+    """Mean inflow of each lane in each period of a run; the last period has no end."""
 
     starts: Reals[tuple[float, ...]] = reals("of the periods: 0, then later ones", "s", low=0)
     rates: Takes[tuple[tuple[float, ...], ...], Iterable[Iterable[float]]] = checked(
@@ -70,9 +70,9 @@ class Inflow:
 
 
 def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[Floats, Ints]:
-    """Times and lanes of Poisson counts for every second, by inversion.
+    """Times [s] and lanes, shape (k,) each, of Poisson counts for every second, by inversion.
 
-    The periods start at whole seconds. Each number drawn belongs to a lane and a second.
+    Periods must start at whole seconds. Each number drawn belongs to a lane and a second.
     """
     k = np.arange(MOST_IN_A_SECOND)
     times: list[Floats] = []
@@ -92,10 +92,10 @@ def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[
 def spaced(
     inflow: Inflow, shift: float, duration: float, rng: np.random.Generator
 ) -> tuple[Floats, Ints]:
-    """Times and lanes with exponential headways beyond `shift` [s].
+    """Times [s] and lanes, shape (k,) each, with exponential headways beyond `shift` [s].
 
-    After a vehicle, none comes for `shift`, and then one at any moment alike: at a rate for which
-    the mean headway is that of the period. Each number drawn belongs to a lane and a vehicle.
+    For `shift` after a vehicle none comes; then the next is equally likely at any moment, at the
+    rate that gives the period its mean headway. Each number drawn belongs to a lane and a vehicle.
     """
     spans = list(inflow.spans(duration))
     with np.errstate(divide="ignore", over="ignore"):  # infinite on a lane without arrivals
@@ -122,8 +122,8 @@ def _lane_times(
 ) -> list[float]:  # fmt: skip
     """Times of one lane [s]; `drawn` gives a unit exponential for the vehicle of each rank.
 
-    What a vehicle's number has not used up at the end of a period counts in the next one, by the
-    mean wait `means` [s] beyond `shift` there. Times are summed in blocks, as by numpy.
+    What is left of a vehicle's number at the end of a period carries over to the next one, with
+    the mean wait beyond `shift` there (`means` [s]). Times are summed in blocks, as numpy does.
     """
     times: list[float] = []
     period, origin, elapsed = 0, 0.0, 0.0

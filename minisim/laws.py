@@ -74,6 +74,8 @@ class Law(NamedTuple):
 
     dt: float
     model: int  # car-following model, by its place in `minisim.vehicle.MODELS`
+    quartic: bool  # all vehicles have the usual exponent δ = 4
+    mixed: bool  # vehicles' brakes differ
     semi_implicit: bool  # positions follow from speeds by `semi_implicit`, not `ballistic`
     entry: float  # s of the junction entry
     hold: float  # s of the hold line
@@ -85,6 +87,7 @@ class Law(NamedTuple):
     sight: float  # how far before the entry a view reaches
     depart_speed: float  # highest at insertion
     wake_on_clear: bool
+    wake_when_empty: bool
     record_from: int  # ticks
     record_to: int
     record_start: float  # s where recording starts
@@ -105,6 +108,8 @@ def build_law(
     law = Law(
         dt=site.dt,
         model=list(MODELS).index(vehicle.model),
+        quartic=all(it.exponent == 4.0 for it in site.types),
+        mixed=len({it.max_deceleration for it in site.types}) > 1,
         semi_implicit=MODELS[vehicle.model].stepwise,
         entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
@@ -116,6 +121,7 @@ def build_law(
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
+        wake_when_empty=plan.wake_when_empty,
         record_from=first_tick(record_window[0], site.dt) if record else NEVER,
         record_to=first_tick(record_window[1], site.dt) if record else NEVER,
         record_start=entry - RECORD_BEFORE if near else -math.inf,

@@ -24,9 +24,20 @@ from minisim.control import (
 from minisim.engine import kernel
 from minisim.engine.collision import Collision, collisions_now
 from minisim.engine.cruise.law import build_cruise
-from minisim.engine.state import OBSERVED, TRACE, Records, build_lanes, build_road, build_vehicles
+from minisim.engine.moving import CLEAR, MARKED
+from minisim.engine.packed import empty_pack, store
+from minisim.engine.state import (
+    AMBER,
+    OBSERVED,
+    TRACE,
+    Records,
+    build_lanes,
+    build_layout,
+    build_vehicles,
+)
 from minisim.errors import InputError, number
 from minisim.hosting import AFTERMATH, REACTIONS, Alarm, Hosted, begin
+from minisim.jit import direct
 from minisim.laws import build_law
 from minisim.results.run import Run, ScenarioLike
 from minisim.results.trips import collect_trips
@@ -72,11 +83,12 @@ class Simulation:
         teleports = on_collision == "teleport"
         if teleports and not isinstance(self.site.vehicle, CruiseVehicle):
             raise InputError("on_collision 'teleport' needs a CruiseVehicle")
-        self._road = build_road(self.site, plan)
+        self._layout = build_layout(self.site, plan)
         self._law = build_law(self.site, plan, scenario.depart_speed, record, hosted.record_window)
         self._vehicles = build_vehicles(self.site, hosted.arrivals)
         self._cruise = build_cruise(self.site, len(self._vehicles), teleports)
         self._lanes = build_lanes(self.site, self._vehicles, plan.lanes_open)
+        self._pack = empty_pack(self._vehicles, self._lanes, self._layout)
         self._row = np.argsort(self._vehicles["id"]).tolist()
         self._trace = np.zeros(4096 + 2 * len(self._vehicles) if record else 0, TRACE)
         self._traces: list[Records] = []
@@ -118,18 +130,22 @@ class Simulation:
         if not self._started:
             self._started = True
             self._decide()
-        world = self._vehicles, self._lanes, self._road, self._law, self._cruise, self._trace
+        world = *self._pack, self._vehicles, self._lanes, self._layout, self._law, self._cruise
+        scratch = self._trace, self._bodies, self._observed
+        step = direct(
+            kernel.advance, self._cruise is None, (*world, *scratch, self._traced, self.tick, 0)
+        )
         while self.tick < target and not self._done:
             end = min(target, self._alarm.tick)
-            self.tick, reasons, self._traced, self._seen = kernel.advance(
-                *world, self._traced, self._bodies, self._observed, self.tick, end
+            self.tick, reasons, self._traced, self._seen = step(
+                *world, *scratch, self._traced, self.tick, end
             )
             if reasons & kernel.TRACE_FULL:
                 self._keep_trace()
             if reasons & (kernel.TOUCH | kernel.GAP):
                 self._check_collisions()
             self._done = bool(reasons & kernel.DONE)
-            if self.tick >= self._alarm.tick or reasons & (kernel.MARK | kernel.CLEAR):
+            if self.tick >= self._alarm.tick or reasons & (MARKED | CLEAR):
                 self._decide()
 
     def run(self) -> Run:
@@ -144,6 +160,7 @@ class Simulation:
     def result(self) -> Run:
         """The result so far."""
         self._keep_trace()
+        store(*self._pack, self._vehicles, self._lanes)
         end = self._horizon_tick * self.site.dt if self._done else self.time
         demand, movements = self._hosted.arrivals.time, self.site.intersection.movements
         return self._hosted.result(
@@ -168,13 +185,16 @@ class Simulation:
                 self._vehicles["brake"][self._row[vehicle]] = brake
             case Go(vehicle) | Hold(vehicle):
                 self._vehicles["go"][self._row[vehicle]] = isinstance(command, Go)
-            case Open(lane) | Close(lane):
-                self._lanes["open"][lane] = isinstance(command, Open)
+            case Open(lane, amber):
+                self._lanes["open"][lane] = AMBER if amber else 1
+            case Close(lane):
+                self._lanes["open"][lane] = 0
             case Wake():
                 self._alarm.set(command)
 
     def _check_collisions(self) -> None:
-        now = collisions_now(self._vehicles, self._road, self.site, self.time)
+        store(*self._pack, self._vehicles, self._lanes)
+        now = collisions_now(self._vehicles, self._layout, self.site, self.time)
         new = {it.vehicles: it for it in now if it.vehicles not in self._collisions}
         self._collisions |= new
         if new and self._hosted.on_collision == "stop":

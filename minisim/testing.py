@@ -99,7 +99,7 @@ class SmallScenario:
 
     def site(self, seed: int) -> Site:
         """What a controller may know about it."""
-        demand = Demand(density=self.density).rates(self.intersection.n)
+        (demand,) = Demand(density=self.density).inflow(self.intersection.n).rates
         return Site(
             self.intersection, Fleet((self.vehicle,)), self.speed_limit, demand, self.dt, seed
         )

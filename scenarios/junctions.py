@@ -14,7 +14,7 @@ from minisim.files import AnyPath, read_file
 from minisim.junction.geometry import Intersection
 from minisim.junction.roads import Road
 
-#: How the names of such files end.
+#: Endings of the names of such files.
 SUFFIXES = (".toml", ".xml", ".osm", ".gz")
 
 #: Keys of a table; another simulator's curves are not written.
@@ -29,15 +29,15 @@ class Named(NamedTuple):
 
 
 def is_junction_file(name: str) -> bool:
-    """Whether the name of a scenario is that of a file, by its ending."""
+    """Whether a scenario's name is the name of a file, by its ending."""
     return name.lower().endswith(SUFFIXES)
 
 
 def junction_from(path: AnyPath, node: str | None = None, side: str | None = None) -> Named:
     """Read a junction; `node` and `side` are for towns, see `minisim.town.read_junction`.
 
-    Raises what that raises, and `InputError` for a table with a key or value that is not allowed,
-    which it names together with the file.
+    Raises what `read_junction` raises, and `InputError` for a table with a key or value that is not
+    allowed; the message names it and the file.
     """
     instance("junction file", path, (str, os.PathLike))
     if not str(path).lower().endswith(".toml"):
@@ -65,7 +65,7 @@ def junction_from(path: AnyPath, node: str | None = None, side: str | None = Non
 
 
 def junction_text(name: str, intersection: Intersection) -> str:
-    """A junction as a table in TOML, which `junction_from` reads."""
+    """A junction as the table in TOML that `junction_from` reads."""
     lines = [f"name = {_value(name)}", *_pairs(intersection)]
     for road in intersection.roads or ():
         lines += ["", "[[roads]]", *_pairs(road)]

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack
 
 from minisim.arrivals import Arrivals
-from minisim.demand import Demand, DemandProfile, Turns
+from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, choice, instance, integer, nearest, numbers, show
 from minisim.files import AnyPath
 from minisim.fleet import PCU, Fleet, fleet_named, mean_pcu
@@ -21,6 +21,7 @@ from minisim.junction.geometry import Intersection
 from minisim.junction.movements import ARM_NAMES
 from minisim.junction.paths import Way
 from minisim.junction.roads import Road
+from minisim.shares import Turns
 from minisim.vehicle import VehicleType
 from scenarios.junctions import is_junction_file, junction_from
 from scenarios.profiles import PUBLISHED_PROFILES, Profile, profile_named

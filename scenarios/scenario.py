@@ -7,7 +7,7 @@ from minisim.clock import clock
 from minisim.control import Site
 from minisim.demand import Demand, DemandProfile
 from minisim.errors import InputError, number
-from minisim.fleet import Fleet
+from minisim.fleet import Fleet, driven_like
 from minisim.junction.geometry import Intersection
 from minisim.parameters import declared, part, real, text
 from scenarios.profiles import PAPER, Profile
@@ -22,7 +22,10 @@ class Scenario:
     demand: Demand | DemandProfile = part("what to draw arrivals from", (Demand, DemandProfile))
     profile: Profile = part("vehicle, speeds and step", Profile, default=PAPER)
     fleet: Fleet | None = part(
-        "the vehicles' types; none is the profile's vehicle", Fleet, optional=True, default=None
+        "the vehicles' types; none is those of the demand, or else the profile's vehicle",
+        Fleet,
+        optional=True,
+        default=None,
     )
     horizon: float = real(
         "simulated time; arrivals come until then", "s", above=0, high=1e7, default=3600.0
@@ -54,8 +57,20 @@ class Scenario:
 
     @property
     def vehicles(self) -> Fleet:
-        """The fleet, or the profile's vehicle as one."""
-        return self.fleet or Fleet((self.profile.vehicle,))
+        """The fleet, or else the demand's, or else the profile's vehicle as one."""
+        if self.fleet is not None:
+            return self.fleet
+        if self.recorded is None and isinstance(self.demand, DemandProfile) and self.demand.fleet:
+            return driven_like(self.demand.fleet, self.profile.vehicle)
+        return Fleet((self.profile.vehicle,))
+
+    @property
+    def replaced(self) -> str:
+        """A sentence if the fleet replaces the one that the demand brings, or else empty."""
+        theirs = getattr(self.demand, "fleet", None)
+        if self.fleet is None or theirs is None:
+            return ""
+        return f"the fleet {self.fleet} replaces that of the demand {self.demand.words[0]!r}"
 
     @property
     def profile_name(self) -> str:

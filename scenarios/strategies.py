@@ -15,8 +15,11 @@ minisim's own tests use them, and yours can too: `pip install 'minisim[testing]'
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from typing import Any, Literal
+
+import numpy as np
 
 from minisim.control import Controller
 from minisim.demand import MODELS, Demand, DemandProfile, Period
@@ -154,8 +157,18 @@ def demands(draw: st.DrawFn, n: int, max_density: float = 350.0) -> Demand:
 
 
 @st.composite
+def mixes(draw: st.DrawFn, n: int) -> dict[str, list[float]]:
+    """Shares of one to three ready types of vehicles, the same on every lane or by lane."""
+    types = draw(st.lists(st.sampled_from([*TYPES]), min_size=1, max_size=3, unique=True))
+    shape = (len(types), draw(st.sampled_from([1, n])))
+    size = math.prod(shape)
+    weights = np.reshape(draw(st.lists(st.integers(1, 9), min_size=size, max_size=size)), shape)
+    return dict(zip(types, (weights / weights.sum(axis=0)).tolist(), strict=True))
+
+
+@st.composite
 def demand_profiles(draw: st.DrawFn, n: int, max_density: float = 350.0) -> DemandProfile:
-    """Demand on n lanes over up to 5 periods of up to 20 minutes, begun in any of them."""
+    """Demand on n lanes over up to 5 periods in 20 minutes, begun in any, perhaps with a fleet."""
     edges = sorted(draw(st.sets(st.integers(0, 1200), min_size=2, max_size=6)))
     rates = st.tuples(*[st.just(0.0) | floats(1.0, max_density)] * n)
     return DemandProfile(
@@ -163,6 +176,7 @@ def demand_profiles(draw: st.DrawFn, n: int, max_density: float = 350.0) -> Dema
             Period(start=start, end=end, rates=draw(rates), turns=draw(turns(n)))
             for start, end in itertools.pairwise(edges)
         ),
+        fleet=draw(st.none() | mixes(n)),
         start=draw(st.integers(edges[0], edges[-1] - 1)),
         model=draw(st.sampled_from(MODELS)),
     )

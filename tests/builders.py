@@ -36,9 +36,13 @@ from minisim.control import (
     View,
     Wake,
 )
+from minisim.engine import packed
+from minisim.engine.state import DRIVING, Layout, Records
 from minisim.errors import FileError
 from minisim.junction.movements import ARM_NAMES
+from minisim.laws import Law
 from minisim.results.run import Run
+from minisim.simulation import Simulation
 from minisim.testing import SmallScenario
 from minisim.vehicle import VehicleType
 from scenarios import Scenario
@@ -418,3 +422,25 @@ def town_text(
             text.append(f'<connection from="{into}" to="{out_of}" fromLane="0" toLane="0"/>')
     lefthand = ' lefthand="true"' if left else ""
     return "\n".join([f"<net{lefthand}>", *text, extra, "</net>", ""])
+
+
+def pack_of(
+    vehicles: Records, lanes: Records, layout: Layout, law: Law
+) -> tuple[packed.Floats, packed.Ints]:
+    """The vehicles that drive, packed as `minisim.engine.packed` does when they are inserted."""
+    floats, ints = packed.empty_pack(vehicles, lanes, layout)
+    for name in ("slot", "driving", "entered"):
+        lanes[name] = 0
+    for lane in range(len(lanes)):
+        for row in range(lanes["first"][lane], lanes["next"][lane]):
+            if vehicles["status"][row] == DRIVING:
+                packed.admit(floats, ints, vehicles, lanes, layout, law, row)
+                lanes["entered"][lane] += row < lanes["front"][lane]
+    return floats, ints
+
+
+def rearranged(simulation: Simulation) -> None:
+    """Let a simulation go on from its rows, which a test has changed."""
+    simulation._pack = pack_of(
+        simulation._vehicles, simulation._lanes, simulation._layout, simulation._law
+    )

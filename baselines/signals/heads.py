@@ -85,6 +85,8 @@ class Heads:
             if colour is not Colour.GREEN:
                 if self.colours[lane] in self._open and colour not in self._open:
                     commands += self._close(lane, view)
+                elif colour in self._open and self.colours[lane] is Colour.GREEN:
+                    commands.append(Open(lane, amber=True))
                 self.colours[lane] = colour
         for lane, colour in enumerate(wanted):
             if colour is not self.colours[lane] and self._may_open(lane, view):

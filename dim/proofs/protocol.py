@@ -12,7 +12,7 @@ All vehicles look at the same moment, as in `dim.controller`, but after an arbit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property, lru_cache
 from typing import Final, NamedTuple
 
@@ -20,8 +20,9 @@ from dim.agent import GATES
 from dim.decision import ORDERS, DecisionTable, decision_table
 from dim.harmony import HarmonyMatrix
 from dim.perception import COMMITS
+from minisim.errors import items
 from minisim.junction.movements import Movement, Movements
-from minisim.parameters import declared, part, word
+from minisim.parameters import Takes, checked, declared, part, word
 
 #: Which lane comes first if cliques tie. "fixed": the lanes' own order. "rotating": the lane
 #: whose turn it is, then the others clockwise; a turn ends after a decision at the earliest.
@@ -81,6 +82,15 @@ class Protocol:
     gate: str = word("what may enter while others cross", GATES, default="clear")
     commit: str = word("when a vehicle commits", COMMITS, label="commit rule", default="stoppable")
     priorities: str = word("which lane comes first at a tie", PRIORITIES, default="fixed")
+    closed: Takes[tuple[str, ...], Iterable[str]] = checked(
+        "movements that no vehicle may take",
+        lambda title, value: tuple(map(str, items(title, value, "movements"))),
+        "movements such as a2", default=(),
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        for movement in self.closed:
+            self.matrix.index(movement)
 
     @property
     def start(self) -> State:
@@ -103,6 +113,8 @@ class Protocol:
             if front is None:
                 came = (*state.came, lane) if self.priorities == "waiting" else ()
                 for manoeuvre in range(1, self.matrix.choices + 1):
+                    if str(Movement(lane, manoeuvre)) in self.closed:
+                        continue
                     after = self._put(state, lane, Front(manoeuvre, WAITING, False))
                     yield Event("arrive", lane, manoeuvre), after._replace(came=came)
 

@@ -91,9 +91,13 @@ def analyse(
     matrix: HarmonyMatrix,
     order: str = "size",
     priorities: Sequence[int] | None = None,
+    closed: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> Analysis:
-    """Try all cases (20 s for 6 arms); `InputError` as `DecisionTable`, and from 8 arms on."""
+    """Try all cases (20 s for 6 arms) but those with a movement that is `closed`, such as "a2".
+
+    Raises `InputError` as `DecisionTable`, and from 8 arms on.
+    """
     table = DecisionTable(matrix, order, priorities)
     n, total = matrix.n, len(table)
     if total > MAX_CASES:
@@ -104,7 +108,13 @@ def analyse(
     sizes: Counter[int] = Counter()
     ties: Counter[int] = Counter()
     worst: dict[int, tuple[Movements, int]] = {}
+    tried, shut = 0, set(closed)
     for case, movements in enumerate(table, start=1):
+        if progress is not None and (case % 256 == 0 or case == total):
+            progress(case, total)
+        if not shut.isdisjoint(map(str, movements)):
+            continue
+        tried += 1
         cliques = brute_force(movements, matrix)
         for name, holds in zip(Case.CLAIMS, checks.check(case, movements, cliques), strict=True):
             if not holds:
@@ -118,14 +128,12 @@ def analyse(
         if tied == max(ties):
             first, count = worst.get(size, (movements, 0))
             worst[size] = first, count + 1
-        if progress is not None and (case % 256 == 0 or case == total):
-            progress(case, total)
     claims = tuple(
-        Claim(name, text, total, failures[name], examples.get(name))
+        Claim(name, text, tried, failures[name], examples.get(name))
         for name, text in Case.CLAIMS.items()
     )
     return Analysis(
-        matrix, table.order, table.priorities, total, claims,
+        matrix, table.order, table.priorities, tried, claims,
         dict(sorted(sizes.items())), dict(sorted(ties.items())), dict(sorted(worst.items())),
     )  # fmt: skip
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from minisim.engine.state import DRIVING, Floats, Records, Road
+from minisim.engine.packed import AWAY, LENGTH, PATH, TYPE, S, count
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.paths import dragged, locate
 from minisim.laws import Law
@@ -17,29 +18,36 @@ place, drag = njit_inline(locate), njit_inline(dragged)
 
 
 @njit
-def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: Floats) -> bool:
+def may_touch(
+    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, bodies: Floats
+) -> bool:
     """Broad phase: whether any two bodies in or near the junction may touch.
 
     The separating-axis test is exact, and the rectangles are a little larger than the bodies, so
     it misses no touch that pymunk would find.
     """
+    n = count(lanes)
+    inside = False
+    where, away = floats[S], floats[AWAY]
+    for i in range(n):
+        inside |= law.entry <= where[i] <= away[i]
+    if not inside:
+        return False
     ends, shape, headings = road.ends, road.shape, road.headings
-    count, inside = 0, False
+    found = 0
     for lane in range(len(lanes)):
-        for i in range(lanes[lane]["first"], lanes[lane]["next"]):
-            s = vehicles[i]["s"]
-            p = vehicles[i]["path"]
+        first = lanes[lane]["slot"]
+        for i in range(first, first + lanes[lane]["driving"]):
+            s, p, length = where[i], ints[PATH, i], floats[LENGTH, i]
             if s < law.entry - law.longest:
                 break
-            length = vehicles[i]["length"]
-            if vehicles[i]["status"] != DRIVING or s > ends[p, 0] + 2.0 * length:
+            if s > away[i]:
                 continue
-            if count == len(bodies):
+            if found == len(bodies):
                 return True
-            inside |= s >= law.entry
             past, crossing = s - law.entry, ends[p, 0] - law.entry
             x, y = place(shape[p], headings[p], crossing, past)
-            kind = vehicles[i]["type"]
+            kind = ints[TYPE, i]
             axle = road.types[kind].rear_axle
             if axle > 0.0:
                 ux, uy = drag(shape[p], headings[p], crossing, past, road.trails[kind, p], axle)
@@ -47,16 +55,14 @@ def may_touch(vehicles: Records, lanes: Records, road: Road, law: Law, bodies: F
                 x_rear, y_rear = place(shape[p], headings[p], crossing, past - length)
                 along = math.hypot(x - x_rear, y - y_rear)
                 ux, uy = (x - x_rear) / along, (y - y_rear) / along
-            bodies[count, 0] = x - ux * length / 2.0
-            bodies[count, 1] = y - uy * length / 2.0
-            bodies[count, 2] = ux
-            bodies[count, 3] = uy
-            bodies[count, 4] = length / 2.0 + TOUCH_MARGIN
-            bodies[count, 5] = road.types[kind].width / 2.0 + TOUCH_MARGIN
-            count += 1
-    if not inside:
-        return False
-    for i in range(count):
+            bodies[found, 0] = x - ux * length / 2.0
+            bodies[found, 1] = y - uy * length / 2.0
+            bodies[found, 2] = ux
+            bodies[found, 3] = uy
+            bodies[found, 4] = length / 2.0 + TOUCH_MARGIN
+            bodies[found, 5] = road.types[kind].width / 2.0 + TOUCH_MARGIN
+            found += 1
+    for i in range(found):
         for j in range(i):
             dx = bodies[i, 0] - bodies[j, 0]
             dy = bodies[i, 1] - bodies[j, 1]

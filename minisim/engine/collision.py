@@ -10,7 +10,7 @@ import numpy as np
 import pymunk
 
 from minisim.control import Site
-from minisim.engine.state import DRIVING, Records, Road
+from minisim.engine.state import DRIVING, Layout, Records
 
 
 class Body(NamedTuple):
@@ -41,7 +41,7 @@ class Collision(NamedTuple):
         return f"at {self.time:.1f} s {one} and {other} touched"
 
 
-def collisions_now(vehicles: Records, road: Road, site: Site, time: float) -> list[Collision]:
+def collisions_now(vehicles: Records, road: Layout, site: Site, time: float) -> list[Collision]:
     """All collisions at this moment: pymunk decides near the junction, the gap within a lane."""
     rows, bodies = near_bodies(vehicles, site)
     pairs = [(rows[i], rows[j]) for i, j in touching(bodies)]
@@ -70,7 +70,7 @@ def near_bodies(vehicles: Records, site: Site) -> tuple[list[int], list[Body]]:
     return rows, bodies
 
 
-def _overlaps_in_lane(vehicles: Records, road: Road) -> list[tuple[int, int]]:
+def _overlaps_in_lane(vehicles: Records, road: Layout) -> list[tuple[int, int]]:
     """Row pairs (j, i) in which the front of vehicle i has reached the rear of j ahead of it."""
     s, path, lane = vehicles["s"], vehicles["path"], vehicles["lane"]
     rears = s - vehicles["length"]

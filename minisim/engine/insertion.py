@@ -6,15 +6,17 @@ import math
 
 from minisim.engine.cruise.ends import blocked
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import DRIVING, Records, Road
+from minisim.engine.packed import B_MAX, LENGTH, S, V, admit
+from minisim.engine.state import DRIVING, Floats, Ints, Layout, Records
 from minisim.jit import njit
 from minisim.laws import STOP_MARGIN, Law, insertable, room_behind
 
 
 @njit
 def insert(
-    vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise | None, tick: int
-) -> bool:
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
+    cruise: Cruise | None, tick: int,
+) -> bool:  # fmt: skip
     """Insert the next vehicle that is due on each lane, if the gap allows it; none is dropped.
 
     Its speed is the highest up to `law.depart_speed` from which it can follow the vehicle ahead,
@@ -44,13 +46,13 @@ def insert(
         v = min(v, law.depart_speed, math.sqrt(2.0 * mine.b_max * max(law.entry - s, 0.0)))
         if lanes[lane]["open"] == 0:
             v = min(v, math.sqrt(2.0 * mine.b * max(law.hold - STOP_MARGIN - s, 0.0)))
-        j = i - 1
-        if j >= lanes[lane]["first"] and vehicles[j]["status"] == DRIVING:
-            gap = vehicles[j]["s"] - vehicles[j]["length"] - s
-            safe = insertable(gap, vehicles[j]["v"], mine, law)
+        if i > lanes[lane]["first"] and vehicles[i - 1]["status"] == DRIVING:
+            j = lanes[lane]["slot"] + lanes[lane]["driving"] - 1
+            gap = floats[S, j] - floats[LENGTH, j] - s
+            safe = insertable(gap, floats[V, j], mine, law)
             if safe < 0.0:
                 continue
-            room = room_behind(gap, vehicles[j]["v"], vehicles[j]["b_max"], mine, law)
+            room = room_behind(gap, floats[V, j], floats[B_MAX, j], mine, law)
             v = min(v, safe, math.sqrt(max(room, 0.0)))
         lanes[lane]["next"] = i + 1
         vehicles[i]["status"] = DRIVING
@@ -61,4 +63,5 @@ def insert(
         while s >= road.marks[vehicles[i]["mark"]]:
             vehicles[i]["mark"] += 1
             passed = True
+        admit(floats, ints, vehicles, lanes, road, law, i)
     return passed

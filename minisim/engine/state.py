@@ -1,8 +1,8 @@
 """The arrays that a run consists of.
 
 Vehicles form one structured array sorted by (lane, demand time), so the vehicle ahead in a lane is
-the row before. Lanes form another array. `Road` and `Law` hold what never changes during a run. Few
-arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
+the row before. Lanes form another array. `Layout` and `Law` hold what never changes during a run.
+Few arguments keep a call into the compiled kernel cheap, since unboxing arrays is most of its cost.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ VEHICLE = np.dtype(
         ("rank", np.int64),  # its place among the vehicles of its lane
         ("manoeuvre", np.int64),
         ("path", np.int64),  # index of the movement
-        ("type", np.int64),  # index into `Road.types`
+        ("type", np.int64),  # index into `Layout.types`
         ("demand_tick", np.int64),
         ("length", np.float64),  # of its type [m]
         ("b_max", np.float64),  # the most that its brakes can do [m/s²]
@@ -57,6 +57,9 @@ VEHICLE = np.dtype(
     ]
 )
 
+#: The right of way of an open lane is about to end (`minisim.control.Open`).
+AMBER = 2
+
 LANE = np.dtype(
     [
         ("end", np.int64),  # one past its last row
@@ -64,8 +67,12 @@ LANE = np.dtype(
         ("next", np.int64),  # next row to be inserted
         ("front", np.int64),  # first row whose front has not entered the junction
         ("uncleared", np.int64),  # first row not yet clear of the junction
-        ("open", np.int64),
+        ("open", np.int64),  # 0, 1 or `AMBER`
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
+        ("tail", np.int64),  # its slot (`minisim.engine.packed`), or -1 once it has arrived
+        ("slot", np.int64),  # slot of its first vehicle on the road
+        ("driving", np.int64),  # how many it has there
+        ("entered", np.int64),  # how many of these have entered the junction
     ]
 )
 
@@ -84,7 +91,7 @@ _TYPES = {int: np.int64, float: np.float64}
 OBSERVED = np.dtype([(name, _TYPES[kind]) for name, kind in get_type_hints(Observed).items()])
 
 
-class Road(NamedTuple):
+class Layout(NamedTuple):
     """The paths as arrays; p counts movements, k sections of the speed profile."""
 
     #: (p, 4): `s` of the junction exit and of the road's end [m], index of exit arm, `s` of the
@@ -100,7 +107,7 @@ class Road(NamedTuple):
     types: Any  #: `Traits` of each type of vehicle, as records where the kernel is compiled
 
 
-def build_road(site: Site, plan: Plan) -> Road:
+def build_layout(site: Site, plan: Plan) -> Layout:
     """Lay out the paths with the speed profile of the site and the plan's markings."""
     paths = site.intersection.paths
     profiles = [_speed_profile(path, site, plan) for path in paths]
@@ -111,7 +118,7 @@ def build_road(site: Site, plan: Plan) -> Road:
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
     marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
-    return Road(
+    return Layout(
         ends=np.array([(p.exit, p.length, float(p.exit_arm), p.start) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
@@ -211,5 +218,6 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
     for name in ("first", "next", "front", "uncleared"):
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
-    lanes["last"] = -1
+    for name in ("last", "tail"):
+        lanes[name] = -1
     return lanes

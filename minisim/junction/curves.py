@@ -1,4 +1,4 @@
-"""A curve between two lanes that do not mirror each other, as where their widths differ."""
+"""A curve between two lanes that do not mirror each other, for instance of different widths."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ class Curve(NamedTuple):
 
 
 def join(start: Floats, heading_in: Floats, end: Floats, heading_out: Floats, count: int) -> Curve:
-    """The curve from `start` to `end` [m] with these unit headings there: the wider of two.
+    """The curve from `start` to `end`, shape (2,) each [m], with these unit headings there.
 
-    One is an arc with a straight piece before or behind it, where the lanes' lines meet between
-    their ends. The other is a cubic Bézier curve, an S where the lanes are nearly opposite.
+    It is the one of two whose smallest radius is larger. The first is an arc with a straight piece
+    before or behind it, possible if the lines of the lanes meet between their ends. The second is a
+    cubic Bézier curve, an S if the lanes are nearly opposite. The curve has `count` points.
     """
     across, turn = _cross(heading_in, heading_out), _angle(heading_in, heading_out)
     chord = end - start
@@ -54,7 +55,7 @@ def _bezier(
 ) -> tuple[Floats, float]:
     """`FINE` points of a cubic Bézier curve, and its smallest radius [m].
 
-    Its handles are those that would make it nearly a circle if the lanes mirrored each other.
+    Its handles are as long as those that make nearly a circle of lanes that mirror each other.
     """
     reach = float(np.linalg.norm(end - start)) / (3.0 * math.cos(turn / 4.0) ** 2)
     p, q, r, s = start, start + reach * heading_in, end - reach * heading_out, end

@@ -78,6 +78,15 @@ class Movements(tuple[Movement, ...]):
     def __reduce__(self) -> tuple[Any, ...]:
         return movements_of, (self.n, self.types)
 
+    @property
+    def choices(self) -> int:
+        """How many different movements a lane has, those of each type counted."""
+        return self.types * (self.n - 1)
+
+    def typed(self, kind: int, manoeuvre: int) -> int:
+        """The manoeuvre as which a manoeuvre of vehicles of type `kind` counts."""
+        return kind * (self.n - 1) + manoeuvre
+
     def number(self, movement: Movement | str) -> int:
         """Index of a movement, such as `Movement(0, 1)` or `"a1"`; raises `InputError`."""
         try:
@@ -90,7 +99,11 @@ class Movements(tuple[Movement, ...]):
             ) from None
 
 
-@lru_cache
 def movements_of(n: int, types: int = 1) -> Movements:
     """The movements of a junction of n arms, once per type of vehicle."""
+    return _made(n, types)
+
+
+@lru_cache
+def _made(n: int, types: int) -> Movements:
     return Movements(n, types)

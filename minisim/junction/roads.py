@@ -12,8 +12,8 @@ DIRECTIONS = ("both", "in", "out")
 class Road:
     """The road of one arm: one lane in and one lane out, or only one of the two.
 
-    The two lanes of a road lie beside its axis, the only lane of a one-way road on it. What is none
-    is as the junction, or for the limit the profile, has it.
+    The two lanes of a road lie beside its axis; the only lane of a one-way road lies on it. A value
+    of none means the junction's own, or for the limit the profile's.
     """
 
     length: float | None = real(

@@ -1,6 +1,6 @@
 """The path of a movement, from the geometry of its junction.
 
-Where the two lanes mirror each other, as on equal roads, the way through is one arc, or straight.
+If the two lanes mirror each other, as on equal roads, the way through is one arc, or straight.
 """
 
 from __future__ import annotations

@@ -30,18 +30,22 @@ def level_of_service(delay: float, kind: str = "unsignalised") -> str:
 
 
 def service(run: Run, interval: float = 900.0, kind: str = "unsignalised") -> pd.DataFrame:
-    """What vehicles met that came in each interval of a run, from its warm-up on.
-
-    Columns: `start_s` of the run; `time`, the time of day if the demand has one; `trips`, how many
-    came, and `served`, how many of them arrived before the end; the means over all that came of
-    `waiting_time_s` and `control_delay_s`, with what unfinished ones had by the end, NaN if none
-    came; and the level of service `los`. Control delay is time loss and departure delay: what the
-    junction costs against driving on at the limit.
+    """Waiting and delay of the vehicles that came in each interval of a run, after its warm-up.
 
     Args:
-        run: what to look at.
-        interval: its length [s].
+        run: whose trips are counted.
+        interval: length of an interval [s].
         kind: of the junction, for the level of service: "signalised" or "unsignalised".
+
+    Returns:
+        A row per interval: `start_s` in the run; `time`, the time of day if the demand has one;
+        `trips`, how many came; `served`, how many of these arrived before the end; `waiting_time_s`
+        and `control_delay_s`, means over all that came, with what unfinished trips had by the end,
+        NaN if none came; `los`, the level of service. Control delay is time loss plus departure
+        delay: what the junction costs against driving on at the limit.
+
+    Raises:
+        InputError: an `interval` outside 1 … 10⁶ s, or an unknown `kind`.
     """
     import pandas as pd
 

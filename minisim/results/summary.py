@@ -76,7 +76,7 @@ def summarise(
     not recorded, a metric whose function raises or returns the wrong type or shape, or a
     controller's count that has the name of another number.
     """
-    full = spillback(run.columns, run.site.vehicle, float(run.scenario.warmup))
+    full = spillback(run.columns, run.site, float(run.scenario.warmup))
     run = run.counted
     asked = asked_metrics(metrics)
     keys = [GROUPS[choice("group of trips", one, GROUPS)] for one in items("by", by, "words")]

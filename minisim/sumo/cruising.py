@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from minisim.carfollowing import cruise_control
-from minisim.engine.cruise.law import Cruise, follow, realise
+from minisim.engine.cruise.law import FASTEST, Cruise, follow, realise
 from minisim.errors import InputError
 from minisim.laws import STOP_MARGIN, hold
 from minisim.sumo.messages import Job
@@ -53,6 +53,7 @@ class Cruiser(Steering):
     def __init__(self, job: Job, libsumo: Any, cruise: Cruise) -> None:
         super().__init__(job.law, libsumo)
         self._cruise, law = cruise, job.law
+        self._limit = job.road.section_speed[:, 0]
         top = max(cruise.cruise_speed, job.road.section_speed.max())
         b = cruise.type.b
         self.near = law.hold - STOP_MARGIN - 1.0 - (top + 4.0 * b * law.dt) ** 2 / (2.0 * b)
@@ -100,7 +101,8 @@ class Cruiser(Steering):
         if ahead is not None:
             gap = ahead.s - ahead.traits.length - car.traits.min_gap - car.s
             u = min(u, follow(car.v, gap, ahead.v, law, cruise))
-        return realise(car.v, car.a, u, v0 == 0.0, law, cruise)
+        u = min(u, (FASTEST * v0 / self._limit[car.path] - car.v) / law.dt)
+        return realise(car.v, car.a, u, law, cruise)
 
     def _desired(self, car: Car) -> float:
         return self._cruise.cruise_speed if car.advice == math.inf else car.advice

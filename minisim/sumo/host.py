@@ -19,7 +19,7 @@ from typing import IO, NamedTuple
 
 from minisim.control import Command, Controller, View
 from minisim.engine.cruise.law import build_cruise
-from minisim.engine.state import build_road, build_vehicles
+from minisim.engine.state import build_layout, build_vehicles
 from minisim.errors import FileError, InputError, MissingExtraError, SumoError, choice, instance
 from minisim.files import replacing
 from minisim.hosting import AFTERMATH, REACTIONS, Hosted, begin
@@ -215,7 +215,7 @@ def _prepare(hosted: Hosted, options: _Options, folder: Path) -> Job:
         temporary=options.keep_files is None,
         model=model,
         plan=plan,
-        road=build_road(site, plan),
+        road=build_layout(site, plan),
         law=build_law(
             site, plan, depart_speed=depart_speed, record=hosted.record,
             record_window=hosted.record_window,

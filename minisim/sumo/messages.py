@@ -8,7 +8,7 @@ from typing import IO, Any, NamedTuple
 from minisim.control import Observed, Plan
 from minisim.engine.collision import Collision
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import Records, Road
+from minisim.engine.state import Layout, Records
 from minisim.junction.movements import Movements
 from minisim.laws import Law
 from minisim.sumo.network import Network
@@ -22,7 +22,7 @@ class Job(NamedTuple):
     temporary: bool  #: whether the process removes the folder if its caller is gone
     model: str  #: car-following model, one of `minisim.sumo.MODELS`
     plan: Plan  #: the session's
-    road: Road
+    road: Layout
     law: Law
     cruise: Cruise | None  #: see `minisim.engine.cruise.law.build_cruise`
     top_speed: float  #: no vehicle exceeds it [m/s]

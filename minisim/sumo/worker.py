@@ -144,7 +144,7 @@ class Worker:
         return car.go or self._open[car.lane]
 
     def _observe(self) -> bool:
-        """Read the new state; returns whether a front passed a mark or a rear left the junction."""
+        """Read the new state; returns whether to wake the session."""
         sumo = self._libsumo
         if self._tick < self._job.horizon:
             for name in sumo.simulation.getDepartedIDList():
@@ -160,7 +160,10 @@ class Worker:
             travelled = values[sumo.VAR_DISTANCE]
             if travelled >= 0.0:  # not while SUMO teleports it
                 passed |= self._move(self._cars[name], travelled, values[sumo.VAR_SPEED])
-        return passed
+        return passed and not (self._job.law.wake_when_empty and self._occupied())
+
+    def _occupied(self) -> bool:
+        return any(car.s > self._job.law.entry for lane in self._lanes for car in lane)
 
     def _depart(self, car: Car) -> None:
         law = self._job.law

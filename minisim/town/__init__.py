@@ -3,10 +3,11 @@
     from minisim.town import read_junction, survey
 
     read_junction("town.net.xml", node="252016277")  # an Intersection
-    survey("town.net.xml")  # every node, and whether the simulator can say it
+    survey("town.net.xml")  # every node, and whether it can be simulated
 
 Networks are read as they are; an extract of OpenStreetMap goes through netconvert first (extra
-`sumo`).
+`sumo`). Bearings are from true north, also where the network's y axis is the north of a UTM grid,
+which may be 3° off; other projections are taken as they are.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The arms of a node: which edges are one road, and where their axes lead."""
+"""The arms of a node: which edges make up one road, and where its axis leads."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from minisim.junction.geometry import MIN_ANGLE
 from minisim.junction.paths import Floats, distances_along
 from minisim.town.reading import Edge, Node, Town
 
-#: How much of a road, from the junction on, says where it leads [m].
+#: The length of road next to the junction that gives an arm its direction [m].
 SPAN = 20.0
-#: Spacing of the points looked at on it [m].
+#: Spacing of the points that are looked at there [m].
 SPACING = 1.0
-#: Weight of the node's own place in the search for the centre, against 1 for each arm's axis. It
-#: decides only where the axes do not, as when all are nearly parallel.
+#: Weight of the node's own position in the search for the centre; each arm's axis has weight 1. It
+#: matters only if the axes leave the centre open, as when all are nearly parallel.
 OWN_PLACE = 0.01
 
 
@@ -28,12 +28,12 @@ class Arm(NamedTuple):
 
     @property
     def edges(self) -> tuple[Edge, ...]:
-        """Those that there are."""
+        """The edges that exist, the one into the junction first."""
         return tuple(edge for edge in self if edge is not None)
 
     @property
     def traffic(self) -> str:
-        """As of `minisim.junction.roads.Road`."""
+        """The road's traffic, as in `minisim.junction.roads.Road`: "both", "in" or "out"."""
         return "both" if None not in self else "in" if self.into else "out"
 
     @property
@@ -42,7 +42,7 @@ class Arm(NamedTuple):
         return self.edges[0]
 
     def lanes(self) -> tuple[Floats, ...]:
-        """Points on each lane's middle, from the junction outwards, shape (k, 2) each [m]."""
+        """Points along the middle of each lane, from the junction on, shape (k, 2) each [m]."""
         given = [edge.shape[::-1] if edge is self.into else edge.shape for edge in self.edges]
         return tuple(map(_near, given))
 
@@ -55,8 +55,8 @@ class Arm(NamedTuple):
 def arms_of(town: Town, node: str) -> list[Arm]:
     """The arms of a node.
 
-    Two edges are one road if they lead to the same node, or, where those of a dual carriageway do
-    not, if they leave at nearly the same angle. Of several, those at the closest angles.
+    An edge into the node and one out of it are one road if they lead to the same node or, as on a
+    dual carriageway, leave at nearly the same angle. If several would do, the closest angles win.
     """
     into, out_of = list(town.into[node]), list(town.out_of[node])
     pairs = [(_apart(a, b), a, b) for a in into for b in out_of]
@@ -73,7 +73,7 @@ def arms_of(town: Town, node: str) -> list[Arm]:
 
 
 def centre_of(node: Node, arms: list[Arm]) -> Floats:
-    """The point nearest to all axes, in the sense of least squares [m]."""
+    """The point nearest to all axes by least squares, shape (2,) [m]."""
     left = OWN_PLACE * np.eye(2)
     right = left @ (node.x, node.y)
     for axis in (arm.axis() for arm in arms):
@@ -90,9 +90,9 @@ def bearing_of(arm: Arm, centre: Floats) -> float:
 
 
 def length_of(town: Town, edge: Edge, *, into: bool, most: float) -> float:
-    """How far one may follow a road away from the junction, at most `most` [m].
+    """How far a road leads from the junction, at most `most` [m].
 
-    It ends at the next node that is more than a bend: where more or fewer than two roads meet.
+    It ends at the next node that is not just a bend: where more or fewer than two roads meet.
     """
     length, seen = edge.length, {edge.id}
     while length < most:

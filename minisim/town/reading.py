@@ -1,7 +1,7 @@
 """A SUMO network as plain data: its nodes, edges and connections for cars.
 
 The format: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html. A file may be hostile, so it
-is limited in size, and no document type is allowed, without which XML has no entities.
+is limited in size and may not declare a document type; without one, XML has no entities.
 """
 
 from __future__ import annotations
@@ -32,11 +32,18 @@ LANE_WIDTH = 3.2
 #: SUMO's class of a car.
 CAR = "passenger"
 
-#: Edges that are no roads: inside junctions, and for pedestrians.
+#: Edges that are not roads: inside junctions, and for pedestrians.
 NO_ROADS = ("internal", "crossing", "walkingarea", "connector")
 
-#: What elements are and have.
+#: Called with the name of an element and its attributes.
 Element = Callable[[str, dict[str, str]], None]
+
+
+#: The earth's mean radius by UTM's scale at the meridian of a zone [m].
+UTM_RADIUS = 0.9996 * 6_371_009.0
+
+#: What UTM adds to distances from the meridian and, south of the equator, from the equator [m].
+FALSE_EASTING, FALSE_NORTHING = 500_000.0, 10_000_000.0
 
 
 class Edge(NamedTuple):
@@ -63,7 +70,7 @@ class Node(NamedTuple):
 
 
 class Town(NamedTuple):
-    """A network's roads for cars."""
+    """A network's roads for cars; y points to true north if the network has a projection by UTM."""
 
     left: bool  #: whether traffic keeps to the left
     nodes: Mapping[str, Node]
@@ -75,7 +82,7 @@ class Town(NamedTuple):
 def read_town(path: AnyPath) -> Town | None:
     """Read a network (.net.xml, perhaps packed by gzip); None for an extract of OpenStreetMap.
 
-    Raises `FileError`: unreadable, too large, broken or hostile XML, or neither of the two.
+    Raises `FileError` if it is unreadable, too large, broken or hostile XML, or neither of the two.
     """
     made = _Maker(str(path))
     parse(path, made.element)
@@ -128,6 +135,7 @@ class _Maker:
         self._turns: set[tuple[str, str]] = set()
         self._cars: dict[str, list[bool]] = {}  # edge: whether each of its lanes is for cars
         self._edge: dict[str, str] | None = None
+        self._turned = np.eye(2)  # from the network's axes to east and true north
 
     def element(self, name: str, has: dict[str, str]) -> None:
         """Take note of one element."""
@@ -139,8 +147,10 @@ class _Maker:
                 self._cars[has["id"]] = []
             elif name == "lane" and self._edge is not None:
                 self._lane(self._edge, has)
+            elif name == "location":
+                self._turned = _to_true_north(has)
             elif name == "junction" and has.get("type") != "internal":
-                x, y = (_number(has[key]) for key in "xy")
+                x, y = (self._turned @ [_number(has[key]) for key in "xy"]).tolist()
                 self._nodes[has["id"]] = Node(has["id"], has.get("type", ""), x, y)
             elif name == "connection":
                 self._connection(has)
@@ -161,7 +171,8 @@ class _Maker:
         if len(shape) < 2 or any(len(point) != 2 for point in shape):
             raise ValueError("its shape needs two points or more, such as 0,0 50,0")
         self._edges[edge["id"]] = Edge(
-            edge["id"], edge["from"], edge["to"], edge.get("name", ""), 1, np.array(shape),
+            edge["id"], edge["from"], edge["to"], edge.get("name", ""), 1,
+            np.array(shape) @ self._turned.T,
             _number(has["length"]), _number(has["speed"]), _number(has.get("width", LANE_WIDTH)),
         )  # fmt: skip
 
@@ -182,6 +193,25 @@ class _Maker:
                 out_of[edge.origin].append(edge)
         turns = frozenset(self._turns)
         return Town(self._left, self._nodes, into, out_of, turns)
+
+
+def _to_true_north(location: Mapping[str, str]) -> Floats:
+    """The matrix (2, 2) that turns a network's coordinates so that y points to true north.
+
+    UTM is a transverse Mercator projection: x from its meridian and y from the equator, the grid's
+    north is atan(tanh(x/k₀R) tan(y/k₀R)) east of true north (J. P. Snyder, Map Projections, USGS
+    Professional Paper 1395, 1987, chapter 8, for the sphere; the ellipsoid changes it by about
+    0.01°). The middle of the network stands for all of it.
+    """
+    projection = location.get("projParameter", "")
+    if "+proj=utm" not in projection:
+        return np.eye(2)
+    offset = [_number(it) for it in location["netOffset"].split(",")]
+    left, bottom, right, top = (_number(it) for it in location["convBoundary"].split(","))
+    x = (left + right) / 2.0 - offset[0] - FALSE_EASTING
+    y = (bottom + top) / 2.0 - offset[1] - FALSE_NORTHING * ("+south" in projection)
+    turn = math.atan(math.tanh(x / UTM_RADIUS) * math.tan(y / UTM_RADIUS))
+    return np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
 
 
 def _for_cars(has: Mapping[str, str]) -> bool:

@@ -1,4 +1,4 @@
-"""What the simulator makes of a node: an intersection, or the reason why it cannot."""
+"""What the simulator makes of a node: an intersection, or the reason why it cannot make one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from minisim.control import Site
-from minisim.errors import InputError, instance, show
+from minisim.errors import FileError, InputError, instance, show
 from minisim.files import AnyPath
 from minisim.fleet import Fleet
 from minisim.junction.geometry import Intersection
@@ -22,12 +22,12 @@ from minisim.town.arms import Arm, arms_of, bearing_of, centre_of, length_of, of
 from minisim.town.reading import Node, Town, read_town
 from minisim.vehicle import VehicleType
 
-#: The longest road [m], as junctions on paper have it.
+#: The longest road [m], which is also the usual arm_length.
 LONGEST = 500.0
-#: The shortest approach lane [m], however near the next junction is: DIM's zones take 38 m, and a
-#: bus of 12 m has to fit in before them.
+#: The shortest approach lane [m], even if the next junction is nearer: DIM's zones take 38 m, and a
+#: bus of 12 m has to fit before them.
 SHORTEST = 60.0
-#: Lane widths that the simulator can say [m].
+#: Lane widths that `Road` allows [m].
 WIDTHS = (2.0, 6.0)
 #: By how much the junction's radius is raised at a time until cars can turn [m].
 WIDENING = 0.5
@@ -40,7 +40,7 @@ class Survey(NamedTuple):
 
     node: Node
     arms: tuple[Arm, ...]  #: clockwise from north: a, b, c, …
-    intersection: Intersection | None  #: None if the simulator cannot say it
+    intersection: Intersection | None  #: None if it cannot be simulated
     problem: str = ""  #: why not
     notes: tuple[str, ...] = ()  #: what is different from the network
     misfit: float = 0.0  #: largest distance of a lane near the junction from its modelled lane [m]
@@ -52,7 +52,7 @@ class Survey(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """All of that in a line."""
+        """The outcome in one line."""
         if self.intersection is None:
             return self.problem
         return "; ".join([f"lanes at most {self.misfit:.1f} m from the network's", *self.notes])
@@ -69,18 +69,19 @@ def read_junction(path: AnyPath, node: str | None = None, side: str | None = Non
 
 
 def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -> Survey:
-    """What the simulator makes of a node that it can say.
+    """What the simulator makes of one node.
 
     Args:
         path: SUMO's network (.net.xml, perhaps packed by gzip), or an extract (.osm).
         node: the node's id; None if the file has only one that can be read.
-        side: of an extract's traffic, "left" or "right" (the default); a network knows it.
+        side: on which an extract's traffic drives, "left" or "right" (the default); a network
+            says so itself.
 
     Raises:
         FileError: unreadable, too large, broken or hostile XML, or neither network nor extract.
         MissingExtraError: an extract, and netconvert is not installed.
         SumoError: netconvert refuses the extract.
-        InputError: no such node (with near ones), or one that the simulator cannot say, and why.
+        InputError: no such node (with similar ids), or one that cannot be simulated, and why.
     """
     town = town_of(path, side)
     if node is not None:
@@ -97,10 +98,9 @@ def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -
         every = list(_surveys(town))
         possible = [it for it in every if it.intersection is not None]
         if len(possible) != 1:
-            what = f"{len(possible)} of {len(every)} nodes" if every else "no node"
             raise InputError(
-                f"{path} has {what} that can be read; name one with node "
-                "(minisim junction --list names them)"
+                f"{path} has {len(possible)} of {len(every)} nodes that can be read; name one with "
+                "node (minisim junction --list names them)"
             )
         found = possible[0]
     if found.intersection is None:
@@ -109,7 +109,7 @@ def survey_of(path: AnyPath, node: str | None = None, side: str | None = None) -
 
 
 def survey(path: AnyPath, side: str | None = None) -> tuple[Survey, ...]:
-    """What the simulator makes of every node; raises as `read_junction`."""
+    """What the simulator makes of every node; raises as `survey_of`, but for single nodes."""
     return tuple(_surveys(town_of(path, side)))
 
 
@@ -118,9 +118,11 @@ def _surveys(town: Town) -> Iterator[Survey]:
 
 
 def town_of(path: AnyPath, side: str | None = None) -> Town:
-    """A network, or an extract that netconvert has turned into one."""
+    """A network as it is, or an extract as netconvert makes it one; raises as `survey_of`."""
     town = read_town(path)
     if town is not None:
+        if not town.nodes:
+            raise FileError(f"{path} has no nodes")
         if side is not None:
             raise InputError("side is for an extract of OpenStreetMap: a network knows its own")
         return town
@@ -165,7 +167,7 @@ def survey_node(town: Town, node: str) -> Survey:
 def _modelled(
     town: Town, node: str, arms: list[Arm], centre: Floats
 ) -> tuple[Intersection, list[str]]:
-    """The intersection, and what in it is not as in the network."""
+    """The intersection, and where it differs from the network."""
     notes = list(_notes(town, node, arms))
     ends = [float(np.linalg.norm(arm.axis()[0] - centre)) for arm in arms]  # where lanes begin
     given: dict[str, Any] = {
@@ -191,7 +193,7 @@ def _modelled(
 
 
 def _widened(town: Town, arms: list[Arm], measured: float, given: dict[str, Any]) -> Intersection:
-    """The intersection with the measured radius, or the least larger one at which cars fit."""
+    """The intersection with the measured radius, or the smallest larger one at which cars fit."""
     largest = Intersection(given["bearings"], arm_length=20_000.0).junction_radius
     radius = measured
     while True:
@@ -222,7 +224,7 @@ def _road(town: Town, arm: Arm, radius: float) -> Road:
 
 
 def _forbidden(town: Town, arms: list[Arm]) -> list[str]:
-    """The movements between lanes that there are, but for which there is no connection."""
+    """The movements whose lanes exist, but without a connection between them."""
     missing, movements = [], movements_of(len(arms))
     for movement, exit_arm in zip(movements, movements.exits.tolist(), strict=True):
         into, out_of = arms[movement.origin].into, arms[exit_arm].out_of
@@ -232,9 +234,9 @@ def _forbidden(town: Town, arms: list[Arm]) -> list[str]:
 
 
 def _notes(town: Town, node: str, arms: list[Arm]) -> Iterable[str]:
-    """What the model leaves out, or takes otherwise."""
+    """What the model leaves out or changes."""
     if town.nodes[node].kind.startswith("traffic_light"):
-        yield "it has a signal in the network; here the controller decides"
+        yield "its signal in the network is left out; the controller decides"
     backs = [
         name
         for name, (into, out_of) in zip(ARM_NAMES, arms, strict=False)
@@ -246,7 +248,7 @@ def _notes(town: Town, node: str, arms: list[Arm]) -> Iterable[str]:
         if into is None or out_of is None:
             continue
         if into.origin != out_of.target:
-            yield f"{into.id} and {out_of.id} are taken for one road, {name}"
+            yield f"{into.id} and {out_of.id} are taken as one road, {name}"
         if into.speed != out_of.speed:
             yield f"limit of {name} {into.speed:g} m/s, though {out_of.speed:g} m/s on the way out"
         if into.width != out_of.width:

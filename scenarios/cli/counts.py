@@ -13,7 +13,7 @@ from scenarios.cli.shared.options import option
 
 
 @app.command(
-    epilog="Then: minisim run four-way --demand day.toml --start 07:00 --horizon 3600\n\n"
+    epilog="Then: minisim run four-way --demand day.toml --horizon 3600 --lane-width 3.5\n\n"
     "A mapping says what a sheet does not say in usual words, such as\n\n"
     "  start = 'from'\n\n"
     "  arms = \\['North', 'East', 'South', 'West']\n\n"
@@ -24,10 +24,10 @@ def counts(
     mapping: Annotated[
         Path | None, option("Columns, arms, classes and turns (TOML).", "FILE", "--mapping", "-m")
     ] = None,
-    save: Annotated[Path | None, option("Write the demand (.toml).", "FILE")] = None,
+    save: Annotated[Path | None, option("Write the demand and its fleet (.toml).", "FILE")] = None,
     as_json: options.AsJson = False,
 ) -> None:
-    """Read a count of turning movements: what was understood, and what was left out."""
+    """Read a count of turning movements; say what was understood and what was left out."""
     from minisim.counts import read_counts
     from minisim.demandfile import write_demand
     from minisim.files import check_apart, check_file

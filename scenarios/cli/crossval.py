@@ -71,6 +71,9 @@ def crossval(
     ] = None,
     seeds: Annotated[int | None, option("Runs per cell, 1 … 1000; 3, or 2 with --quick.")] = None,
     horizon: Annotated[float | None, option("Of each run; 3600, or 300 with --quick.", "S")] = None,
+    fleet: options.Fleet = None,
+    unit: options.Unit = None,
+    lane_width: options.LaneWidth = None,
     demand: options.DemandFile = None,
     start: options.Start = None,
     replay: Annotated[
@@ -96,7 +99,7 @@ def crossval(
         "SCENARIO": scenarios, "--controller": controller, "--density": density, "--split": split,
     })  # fmt: skip
     if demand is not None:
-        given = {"--replay": replay, "--density": density, "--split": split}
+        given = {"--replay": replay, "--density": density, "--split": split, "--unit": unit}
         refuse_beside("--demand", [name for name, value in given.items() if value])
     elif start is not None:
         raise InputError("--start needs --demand: it is a time of day there")
@@ -109,11 +112,20 @@ def crossval(
         if seeds is not None:
             raise InputError("--seeds does not go with --replay: published arrivals are not drawn")
         if node is not None:
-            raise InputError("--node does not go with --replay: published junctions are no towns'")
+            raise InputError("--node does not go with --replay: published junctions have no nodes")
+        ours = {"--fleet": fleet, "--unit": unit, "--lane-width": lane_width}
+        for what in (name for name, value in ours.items() if value is not None):
+            raise InputError(
+                f"{what} does not go with --replay: published runs are of cars on lanes of 3.2 m"
+            )
         cases = replayed_cases(scenarios or [], who, densities, splits, profile, horizon or 0.0)
     else:
-        more: dict[str, Any] = {} if horizon is None else {"horizon": horizon}
-        more |= {"node": node, "profile": profile or "fair"}
+        chosen = {
+            "horizon": horizon, "fleet": fleet, "unit": unit, "lane_width": lane_width,
+            "node": node,
+        }  # fmt: skip
+        more: dict[str, Any] = {key: value for key, value in chosen.items() if value is not None}
+        more["profile"] = profile or "fair"
         make: Callable[..., Scenario] = partial(scenario_named, **more)
         where = scenarios or ["four-way"]
         if demand is None:
@@ -122,6 +134,7 @@ def crossval(
         else:
             day = read_demand(demand, start)
             cases = [Case(make(name, demand=day), it) for name, it in product(where, who)]
+    options.say_replaced(case.scenario for case in cases)
     count = (2 if quick else 3) if seeds is None else integer("--seeds", seeds, low=1, high=1000)
     numbers = range(1, 1 + count)
     workers = options.processes(jobs)

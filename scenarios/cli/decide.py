@@ -10,7 +10,7 @@ from minisim.errors import InputError, choice
 from minisim.fleet import TYPES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import Plot, answer, decision_text, junction, names
+from scenarios.cli.shared.proof import Plot, answer, closed, decision_text, junction, names
 
 
 @app.command(
@@ -29,6 +29,7 @@ def decide(
     order: options.Order = "size",
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     fleet: options.Fleet = None,
     lane_width: options.LaneWidth = None,
@@ -44,8 +45,11 @@ def decide(
     if corridor is not None and plot is None:
         raise InputError("--corridor needs --plot: it is drawn there")
     what, matrix = junction(
-        scenario, bearings, side=side, profile=profile, fleet=fleet, lane_width=lane_width
-    )
+        scenario, bearings, side=side, node=node, profile=profile, fleet=fleet,
+        lane_width=lane_width,
+    )  # fmt: skip
+    if shut := [it for it in movements if it in closed(what)]:
+        raise InputError(f"no vehicle may take {shut[0]} at {what.name}")
     explanation = explain(movements, matrix, order)
     if plot is not None:
         from figures.junction.decision import decision_figure

@@ -11,7 +11,7 @@ from minisim.errors import InputError
 from minisim.junction.conflicts import CLEARANCE
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import answer, harmony_table, junction
+from scenarios.cli.shared.proof import answer, closed, harmony_table, junction
 
 
 @app.command(
@@ -22,6 +22,7 @@ def harmony(
     scenario: options.ScenarioName,
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     fleet: options.Fleet = None,
     lane_width: options.LaneWidth = None,
@@ -35,7 +36,7 @@ def harmony(
     if csv and as_json:
         raise InputError("--csv and --json cannot be combined; give one")
     what, matrix = junction(
-        scenario, bearings, clearance, side=side, profile=profile, fleet=fleet,
+        scenario, bearings, clearance, side=side, node=node, profile=profile, fleet=fleet,
         lane_width=lane_width,
     )  # fmt: skip
     if csv:
@@ -47,7 +48,10 @@ def harmony(
         "fleet": str(what.vehicles),
         "clearance_m": clearance,
         "movements": list(matrix.movements.names),
+        "closed": closed(what),
         "harmony": matrix.values.astype(int).tolist(),
     }
     title = Text(f"{what.name}, {what.intersection.side}-hand traffic: ● harmony, · conflict")
+    if closed(what):
+        title.append(f"; no vehicle may take {', '.join(closed(what))}")
     answer(as_json, facts, title, harmony_table(matrix))

@@ -12,7 +12,7 @@ from minisim.files import check_file
 from minisim.junction.movements import ARM_NAMES
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import answer, junction, names, protocol_text
+from scenarios.cli.shared.proof import answer, closed, junction, names, protocol_text
 from scenarios.cli.shared.terminal import bar
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ def protocol(
     ] = None,
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     as_json: options.AsJson = False,
 ) -> None:  # fmt: skip
@@ -73,11 +74,11 @@ def protocol(
 
     if counterexample is not None:
         check_file(counterexample, ".csv")
-    what, matrix = junction(scenario, bearings, side=side, profile=profile)
+    what, matrix = junction(scenario, bearings, side=side, node=node, profile=profile)
     if matrix.n > MAX_ARMS:
         only = "the protocol is searched for 3 and 4 arms"
         raise InputError(f"{only}; {what.name} has {matrix.n}, and too many states")
-    rules = Protocol(matrix, order, gate, commit, priorities)
+    rules = Protocol(matrix, order, gate, commit, priorities, closed(what))
     with bar("visiting all states") as progress:
         search = explore(rules, progress=lambda states: progress(states, states))
         lassos = () if search.unsafe else starvation(rules)

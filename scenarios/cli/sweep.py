@@ -101,6 +101,7 @@ def sweep(
     if export is not None:
         check_table(export)
     experiments = _experiments(what, seeds, horizon)
+    options.say_replaced(recipe.scenario for recipe in experiments)
     remote = nullcontext() if scheduler is None else cluster(scheduler)
     with remote as executor, Store(out) as store:
         rows = _run(experiments, executor, workers, store, out)

@@ -6,7 +6,15 @@ import typer
 
 from scenarios.cli.shared import options
 from scenarios.cli.shared.app import app
-from scenarios.cli.shared.proof import Plot, analysis_text, answer, claims_table, junction, names
+from scenarios.cli.shared.proof import (
+    Plot,
+    analysis_text,
+    answer,
+    claims_table,
+    closed,
+    junction,
+    names,
+)
 from scenarios.cli.shared.terminal import bar
 
 
@@ -19,6 +27,7 @@ def verify(
     order: options.Order = "size",
     bearings: options.Bearings = None,
     side: options.Side = None,
+    node: options.Node = None,
     profile: options.ProfileName = "paper",
     plot: Plot = None,
     as_json: options.AsJson = False,
@@ -26,9 +35,9 @@ def verify(
     """Check the paper's claims one by one, in every case that can occur at a junction."""
     from dim.proofs.verification import analyse, most_cliques
 
-    what, matrix = junction(scenario, bearings, side=side, profile=profile)
+    what, matrix = junction(scenario, bearings, side=side, node=node, profile=profile)
     with bar("trying all cases") as progress:
-        analysis = analyse(matrix, order, progress=progress)
+        analysis = analyse(matrix, order, closed=closed(what), progress=progress)
     if plot is not None:
         from figures.junction.all_cases import verification_figure
         from figures.style import save

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from minisim.demand import BALANCED, read_shares, shares_text
 from minisim.errors import InputError, choice
 from minisim.parameters import declared, part, text
+from minisim.shares import BALANCED, read_shares, shares_text
 from scenarios import paper
 from scenarios.controllers import controller_named
 from scenarios.crossval.comparison import Tolerance
@@ -75,9 +75,16 @@ class Case:
         return self.scenario.density if self.published is None else self.published.density
 
     @property
+    def fleet(self) -> str:
+        """The fleet, such as "car:0.9,bus:0.1"; empty for the profile's vehicle alone."""
+        vehicles = self.scenario.vehicles
+        return "" if vehicles.types == (self.scenario.profile.vehicle,) else str(vehicles)
+
+    @property
     def name(self) -> str:
         """The cell's name, such as "four-way balanced 350 dim"."""
-        return f"{self.scenario.name} {self.split} {self.density:g} {self.controller}"
+        words = (self.scenario.name, self.split, f"{self.density:g}", self.fleet, self.controller)
+        return " ".join(filter(None, words))
 
     @property
     def same_law(self) -> bool:

@@ -98,7 +98,8 @@ def _rows(result: Result) -> Iterator[dict[str, Any]]:
     case, scenario = result.case, result.case.scenario
     cell = {
         "controller": case.controller, "scenario": scenario.name, "arms": scenario.intersection.n,
-        "split": case.split, "density": case.density, "profile": scenario.profile.name,
+        "split": case.split, "density": case.density, "fleet": str(scenario.vehicles),
+        "profile": scenario.profile.name,
         "arrivals": "drawn" if case.published is None else "published",
         "horizon_s": scenario.horizon,
     }  # fmt: skip

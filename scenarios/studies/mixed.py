@@ -14,7 +14,7 @@ from scenarios.studies.shared.study import Study
 #: The fleets compared: cars alone, and the vehicles registered in India.
 FLEETS = ("car", "india")
 
-#: Lanes in which a bus fits the paper's junctions: 3.5 m, as IRC:86-1983 has them in towns [m].
+#: Width of lanes with which buses fit the paper's junctions: that of IRC:86-1983 for towns [m].
 LANE_WIDTH = 3.5
 
 
@@ -37,7 +37,7 @@ class FleetPoint(NamedTuple):
 
     @property
     def where(self) -> str:
-        """What sets it apart from other points of its series, besides demand."""
+        """What distinguishes it from other points of its series, besides demand."""
         return f"{self.arms} arms, {self.fleet}"
 
 

@@ -26,7 +26,7 @@ KEPT = {
     "fair/5/reservation/2": "2d1ce58f6f1556e6",
     "as_run/4/dim/1": "25bba17c88569873",
     "as_run/4/v2ic-as-run/1": "5640e6dfdec90219",
-    "as_run_signals/4/fixed-time/1": "52248c2a0a120170",
+    "as_run_signals/4/fixed-time/1": "3b58a9120ba587b6",
     "fair/4/dim/2 model=krauss": "fd5f33336042bc1f",
     "fair/4/dim/1 model=iidm": "e3b9799c17b33ec2",
     "fair/4/dim:gate=harmonious/1 side=right": "27fc7ed105d9aac7",

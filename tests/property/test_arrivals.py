@@ -57,7 +57,7 @@ def test_drawn_tables_are_sorted_and_fit(demand: Demand, duration: float, seed: 
     table.check(N)
     assert (np.diff(table.time) >= 0).all()
     assert ((table.time >= 0) & (table.time < duration)).all()
-    rates = demand.rates(N)
+    rates = demand.inflow(N).rates[0]
     assert all(rates[lane] > 0 for lane in set(table.lane.tolist()))
 
 
@@ -112,8 +112,8 @@ def test_what_comes_before_a_time_does_not_depend_on_what_comes_after(
     demand: DemandProfile, seed: int, data: st.DataObject
 ) -> None:
     """Other rates and turns, or more of the same, from a period on."""
-    k = data.draw(st.integers(0, len(demand.ahead) - 1))
-    one, other = demand.ahead[k], data.draw(demand_profiles(N)).periods[0]
+    ahead = [period for period in demand.periods if period.end > demand.start]
+    one, other = data.draw(st.sampled_from(ahead)), data.draw(demand_profiles(N)).periods[0]
     changed = replace(one, rates=other.rates, turns=other.turns)
     more = Period(start=demand.periods[-1].end, end=10_000, rates=other.rates, turns=other.turns)
     periods = (*(changed if it is one else it for it in demand.periods), more)

@@ -42,6 +42,15 @@ def test_both_hosts_agree_in_a_short_run(capsys: Captured, tmp_path: Path) -> No
     assert not [p for p in (tmp_path / "new" / "out").iterdir() if p.name.startswith(".")]
 
 
+def test_hosts_agree_on_a_fleet(tmp_path: Path) -> None:
+    arguments = ("-c", "dim", "-d", "200", "--seeds", "1", "--horizon", "120")
+    code, table, report = crossval(tmp_path, *arguments, "--fleet", "car:0.8,truck:0.2")
+    assert code == 0
+    assert set(table["fleet"]) == {"car:0.8,truck:0.2"}
+    assert table["error"].isna().all()
+    assert "--fleet car:0.8,truck:0.2" in report
+
+
 def test_the_same_law_gives_the_same_trips(tmp_path: Path) -> None:
     """The first three minutes of a published run, by minisim's engine and by SUMO's CC model."""
     arguments = ("--replay", "four-way", "-d", "150", "--split", "balanced", "--horizon", "180")

@@ -91,9 +91,10 @@ def test_an_extract_of_openstreetmap_is_read(tmp_path: Path, side: str) -> None:
     path.write_text(OSM)
     made = read_junction(path, "1", side)
     assert made.side == side
-    # From the north of the UTM grid, which is 2.06° off at 2.61° east of the zone's meridian.
-    assert made.bearings == pytest.approx((87.94, 176.2, 357.94), abs=0.1)
-    assert (made.roads or ())[2].speed_limit == 8.33
+    # From true north, which is 2.06° off the grid's at 2.61° east of the zone's meridian. The road
+    # to node 4 goes 6.8 m east over 222.6 m.
+    assert made.bearings == pytest.approx((0.0, 90.0, 178.2), abs=0.1)
+    assert (made.roads or ())[0].speed_limit == 8.33
 
 
 def test_hosts_agree_on_roads_that_differ() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from minisim.carfollowing import braking_distance
 from minisim.engine.cruise.law import Cruise
-from minisim.engine.state import ARRIVED, DRIVING, Records, Road
+from minisim.engine.state import ARRIVED, DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import PAST_THE_END, Law
 
@@ -19,7 +19,7 @@ TOLERANCE = 0.001
 
 
 @njit
-def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -> bool:
+def blocked(vehicles: Records, road: Layout, law: Law, cruise: Cruise, arm: int) -> bool:
     """Whether a vehicle arriving on an arm keeps others from being inserted there.
 
     Where the road leads back, SUMO assumes that the vehicle at its end might turn, and keeps room
@@ -38,7 +38,7 @@ def blocked(vehicles: Records, road: Road, law: Law, cruise: Cruise, arm: int) -
 
 @njit
 def look(
-    vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise, tick: int
+    vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise, tick: int
 ) -> bool:
     """Note after a step which vehicles have entered the junction or an exit lane.
 
@@ -70,7 +70,7 @@ def look(
 
 
 @njit
-def teleport(vehicles: Records, road: Road, cruise: Cruise, i: int, tick: int) -> bool:
+def teleport(vehicles: Records, road: Layout, cruise: Cruise, i: int, tick: int) -> bool:
     """Remove a vehicle that has run into the one ahead on its exit; return whether it has.
 
     SUMO's default answer to a collision. It counts as one if the gap is less than `min_gap`.

@@ -9,7 +9,7 @@ import numpy as np
 
 from minisim.carfollowing import STANDSTILL, distance_control, engine_lag, safe_speed
 from minisim.control import Site
-from minisim.engine.state import Floats, Ints, Records, Road
+from minisim.engine.state import Floats, Ints, Layout, Records
 from minisim.jit import njit, njit_inline
 from minisim.junction.geometry import Intersection
 from minisim.junction.meetings import Bools, meetings, right_of_way, sagittas
@@ -23,9 +23,18 @@ MEMORY = np.dtype(
         ("merged", np.int64),  # tick of passing the waiting position, if there is one
         ("left", np.int64),  # its front has left the junction
         ("at_red", np.int64),  # it would have run a red light and stops dead
-        ("stopping", np.int64),  # it was advised to stand still in the previous step
+        ("fastest", np.float64),  # its top speed as set in the previous step, see `FASTEST` [m/s]
+        ("blocked", np.int64),  # inside the junction, behind another, and hardly moving
+        ("unseen", np.int64),  # it was so in the previous step
     ]
 )
+
+
+#: SUMO's default `desiredMaxSpeed` (`SUMOVTypeParameter`), 10000 km/h [m/s]. CC makes its desired
+#: speed a factor on the limit (`MSCFModel_CC::finalizeSpeed`); from the next step on this speed
+#: times that factor is the top speed (`MSBaseVehicle::getDesiredMaxSpeed`). So one that desires
+#: nearly 0 must slow down at once.
+FASTEST = 10000.0 / 3.6
 
 
 class Cruise(NamedTuple):
@@ -39,6 +48,7 @@ class Cruise(NamedTuple):
         waits: (p, 2): waiting position past the junction entry, sagitta [m].
         yields: (p, p): whether the first way must give way to the second.
         turns_back: (n,): whether the road of an arm leads back at its far end.
+        straightest: (p,): whether a way is the straightest one onto its exit.
         memory: (k,) of `MEMORY`.
         type: the only type of the vehicles.
         last: (n,): last row that entered the exit lane of each arm, or -1.
@@ -62,6 +72,7 @@ class Cruise(NamedTuple):
     waits: Floats
     yields: Bools
     turns_back: Bools
+    straightest: Bools
     memory: Records
     type: Traits
     last: Ints
@@ -76,6 +87,8 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
     if not isinstance(vehicle, CruiseVehicle):
         vehicle = CruiseVehicle()  # without effect under any other law
     waits = [way.wait for way in intersection.ways or ()] or [0.0] * len(intersection.paths)
+    memory = np.zeros(count, MEMORY)
+    memory["fastest"] = FASTEST
     return Cruise(
         cruise_speed=vehicle.cruise_speed,
         cruise_gain=vehicle.cruise_gain,
@@ -95,7 +108,8 @@ def build_cruise(site: Site, count: int, teleports: bool = False) -> Cruise | No
         waits=np.stack([waits, sagittas(intersection, site.vehicle.length)], axis=-1),
         yields=_yields(intersection),
         turns_back=_turns_back(intersection),
-        memory=np.zeros(count, MEMORY),
+        straightest=_straightest(intersection),
+        memory=memory,
         type=traits_of(site.vehicle),
         last=np.full(intersection.n, -1),
     )
@@ -114,6 +128,13 @@ def _turns_back(intersection: Intersection) -> Bools:
     return np.array([arm in arms for arm in range(intersection.n)])
 
 
+def _straightest(intersection: Intersection) -> Bools:
+    """Whether a way bends least of those onto its exit (`MSLane::getLogicalPredecessorLane`)."""
+    bends = np.array([abs(path.turn) for path in intersection.paths])
+    exits = intersection.movements.exits
+    return np.array([bends[exits == exits[p]].min() == bends[p] for p in range(len(bends))])
+
+
 @njit_inline
 def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> float:
     """Acceleration that a leader asks for [m/s²]; under the ACC infinite beyond the radar.
@@ -128,7 +149,7 @@ def follow(v: float, gap: float, v_leader: float, law: Law, cruise: Cruise) -> f
 
 
 @njit
-def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise: Cruise) -> float:
+def allowed(s: float, v: float, p: int, v0: float, road: Layout, law: Law, cruise: Cruise) -> float:
     """The speed that a vehicle which obeys limits may drive [m/s].
 
     It takes its desired speed for a factor on the limit where it was one step before. So a limit
@@ -145,11 +166,8 @@ def allowed(s: float, v: float, p: int, v0: float, road: Road, law: Law, cruise:
 
 
 @njit_inline
-def realise(v: float, a: float, u: float, stopping: bool, law: Law, cruise: Cruise) -> float:
-    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero.
-
-    From one step after a desired speed of 0, SUMO asks for standstill within one step.
-    """
-    u = -v / law.dt if stopping else max(u, -v / law.dt)
+def realise(v: float, a: float, u: float, law: Law, cruise: Cruise) -> float:
+    """Acceleration of this step: the engine's answer to `u`, never taking the speed below zero."""
+    u = max(u, -v / law.dt)
     a = max(min(engine_lag(a, u, cruise.lag, law.dt), cruise.a_max), -cruise.type.b_max)
     return -v / law.dt if v + a * law.dt < STANDSTILL * law.dt else a

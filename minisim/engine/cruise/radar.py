@@ -11,7 +11,7 @@ from minisim.carfollowing import braking_distance
 from minisim.control import HALTING
 from minisim.engine.cruise.law import Cruise, follow
 from minisim.engine.state import DRIVING, Floats, Ints, Records
-from minisim.jit import njit, njit_inline
+from minisim.jit import allocating, njit, njit_inline
 from minisim.junction.meetings import Meeting
 from minisim.laws import KRAUSS, Law, krauss_stop
 from minisim.ticks import NEVER
@@ -35,7 +35,7 @@ class Ahead(NamedTuple):
     tail: float  # the last one on its exit
 
 
-@njit
+@allocating
 def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cruise) -> Ints:
     """The rows of the vehicles at least partly in the junction."""
     inside = np.empty(INSIDE, np.int64)
@@ -52,14 +52,25 @@ def gather(vehicles: Records, lanes: Records, ends: Floats, law: Law, cruise: Cr
             ):
                 inside[count] = i
                 count += 1
+                cruise.memory[i]["unseen"] = cruise.memory[i]["blocked"]
+                cruise.memory[i]["blocked"] = 0
     return inside[:count]
 
 
 @njit
 def meet(
-    vehicles: Records, ends: Floats, law: Law, cruise: Cruise, inside: Ints, i: int, ahead: Ahead
+    vehicles: Records,
+    ends: Floats,
+    law: Law,
+    cruise: Cruise,
+    inside: Ints,
+    i: int,
+    ahead: Ahead,
+    most: float,
 ) -> float:
     """Acceleration that vehicles inside the junction on other ways ask of vehicle i [m/s²].
+
+    Without them it would take `most`.
 
     A vehicle that has yet to enter may drive up to the junction (`MSVehicle::checkLinkLeader`), so
     only its radar counts. Inside it follows those that meet the part of the way that it is on; it
@@ -99,7 +110,20 @@ def meet(
                 faster = max(v, 2.0 * (to_crossing - cruise.type.min_gap) / time - v)
                 a = max(a, min((faster - v) / time, crossing))
             u = min(u, a)
+            if v + min(u, most) * law.dt < HALTING and yields(vehicles, cruise, i, j, kind):
+                cruise.memory[i]["blocked"] = 1
     return u
+
+
+@njit_inline
+def yields(vehicles: Records, cruise: Cruise, i: int, j: int, kind: int) -> bool:
+    """Whether vehicle i, which hardly moves inside, gives up its request to leave because of j.
+
+    It does so for one from its own lane, and on the straightest way also for any on its exit.
+    Source: `MSVehicle::checkLinkLeader`, without leaders that have stood for 5 s.
+    """
+    p, left = vehicles[i]["path"], cruise.memory[j]["left"] != 0
+    return bool((kind == PART and not left) or (kind == JOIN and left and cruise.straightest[p]))
 
 
 @njit
@@ -189,6 +213,9 @@ def room(
         )
     )
     if to_crossing < -law.margin and not in_the_way:
+        return math.inf, 0.0, False
+    unseen = cruise.memory[j]["unseen"] != 0 and driven < end and kind in (JOIN, CROSS)
+    if unseen and not in_the_way:
         return math.inf, 0.0, False
     if kind == PART and s >= law.entry and driven < s - law.entry - cruise.type.length:
         return math.inf, 0.0, False

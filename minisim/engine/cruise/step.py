@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from minisim.carfollowing import STANDSTILL, cruise_control
-from minisim.engine.cruise.law import Cruise, allowed, follow, realise
+from minisim.carfollowing import STANDSTILL, braking_distance, cruise_control
+from minisim.engine.cruise.law import FASTEST, Cruise, allowed, follow, realise
 from minisim.engine.cruise.radar import Ahead, gather, meet
-from minisim.engine.state import DRIVING, Records, Road
+from minisim.engine.state import AMBER, DRIVING, Layout, Records
 from minisim.jit import njit
 from minisim.laws import (
     KRAUSS,
@@ -28,7 +28,7 @@ from minisim.vehicle import POSITION_EPS
 
 
 @njit
-def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: Cruise) -> bool:
+def accelerate(vehicles: Records, lanes: Records, road: Layout, law: Law, cruise: Cruise) -> bool:
     """Choose every vehicle's acceleration from the present state; returns whether two overlap.
 
     All in one function for the reason given in `minisim.engine.kernel.accelerate`.
@@ -54,6 +54,11 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             nearest = own = tail = math.inf
             part = 2  # of its way that the leader is on, see `Ahead`
             leave = ends[p, 0]
+            held = not is_open and me["go"] == 0 and s < law.entry
+            # Where it can stop at a light, only the radar sees beyond (`planMoveInternal`).
+            blind = held and (law.model == KRAUSS or cruise.obeys)
+            if cruise.obeys and lanes[lane]["open"] == AMBER and s < law.entry:
+                blind = braking_distance(v, mine.b_max, law.dt) <= law.entry - s
             if s < leave:
                 if law.model != KRAUSS:
                     u = min(u, (cruise.max_speed - v) / law.dt)
@@ -67,7 +72,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     on_lane = j == i - 1 and s < law.entry and rear < law.entry
                     if on_way or on_lane:
                         asked = follow(v, rear - s - mine.min_gap, ahead["v"], law, cruise)
-                        u = min(u, asked)
+                        u = min(u, asked) if on_lane or not blind else u
                         nearest = min(nearest, rear - s)
                         if part == 2:
                             own = asked
@@ -77,28 +82,27 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                 j = cruise.last[int(ends[p, 2])]
             else:
                 j = me["ahead"]
-            held = not is_open and me["go"] == 0 and s < law.entry
-            blind = held and law.model == KRAUSS  # to what is beyond a red light
-            if j >= 0 and vehicles[j]["status"] == DRIVING and not blind:
+            if j >= 0 and vehicles[j]["status"] == DRIVING:
                 ahead = vehicles[j]
                 rear = ahead["s"] - mine.length - ends[ahead["path"], 0]
                 gap = rear - (s - leave)
                 # A vehicle beside it on another way is left to the radar, or waited for before the
                 # junction (`adaptToLeader`).
                 beside = s < leave and gap < mine.min_gap and rear < 0.0 and ahead["path"] != p
-                if beside and law.model == KRAUSS:
+                if beside and law.model == KRAUSS and not blind:
                     u = min(u, krauss_stop(v, law.entry - s - POSITION_EPS, mine, law))
                 elif not beside:
                     tail = follow(v, gap - mine.min_gap, ahead["v"], law, cruise)
-                    u = min(u, tail)
+                    u = u if blind else min(u, tail)
                 if s >= leave:
                     nearest = min(nearest, gap)
-            near = law.entry - s <= cruise.radar and s < leave and not blind
+            near = law.entry - s <= cruise.radar and s < leave and (len(inside) > 0 or blind)
             if law.model == KRAUSS and s < law.entry:  # it may drive up to the line
-                near = near and braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
-            if len(inside) and near and (part >= 0 or s >= law.entry):
+                stops = braking_begins(v, law.entry - s - 2.0 * STOP_LINE_GAP, mine, law)
+                near = near and stops and not blind
+            if near and (part >= 0 or s >= law.entry):
                 foes = Ahead(own, part, tail)
-                asked = meet(vehicles, ends, law, cruise, inside, i, foes)
+                asked = meet(vehicles, ends, law, cruise, inside, i, foes, u)
                 if law.model == KRAUSS and s < law.entry:
                     asked = max(asked, stop_at_line(v, law.entry - s, mine, law))
                 u = min(u, asked)
@@ -106,8 +110,8 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
             if law.model == KRAUSS:
                 a = max(u, -mine.b_max) if v + u * law.dt >= STANDSTILL * law.dt else -v / law.dt
             else:
-                stopping = cruise.memory[i]["stopping"] != 0
-                a = realise(v, me["a"], u, stopping, law, cruise)
+                u = min(u, (cruise.memory[i]["fastest"] - v) / law.dt)
+                a = realise(v, me["a"], u, law, cruise)
                 to_wait = law.entry + cruise.waits[p, 0] - s
                 if cruise.obeys and not is_open and 0.0 < to_wait <= cruise.waits[p, 0]:
                     # Past a light that is red now, it is quick to pass its waiting position: SUMO
@@ -115,7 +119,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
                     least = min(v + u * law.dt, (to_wait + POSITION_EPS) / law.dt)
                     a = max(a, (least - v) / law.dt)
             a = min(a, max(me["brake"], -v / law.dt))
-            cruise.memory[i]["stopping"] = v0 == 0.0
+            cruise.memory[i]["fastest"] = FASTEST * v0 / road.section_speed[p, me["section"]]
             if held and cruise.obeys:
                 if s + (v + a * law.dt) * law.dt >= law.entry:
                     a = -v / law.dt
@@ -127,7 +131,7 @@ def accelerate(vehicles: Records, lanes: Records, road: Road, law: Law, cruise: 
 
 
 @njit
-def free(me: np.void, road: Road, law: Law, cruise: Cruise) -> float:
+def free(me: np.void, road: Layout, law: Law, cruise: Cruise) -> float:
     """The acceleration of a vehicle that nothing hinders, within the limits here and ahead."""
     s, v, p, section, factor = me["s"], me["v"], me["path"], me["section"], me["factor"]
     start, speed = road.section_start, road.section_speed

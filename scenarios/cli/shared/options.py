@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -84,6 +84,12 @@ DemandFile = Annotated[
 Start = Annotated[str | None, option("Begin here in the file.", "07:00", rich_help_panel=FILES)]
 
 
+def say_replaced(scenarios: Iterable[Scenario]) -> None:
+    """Say on stderr which fleets replace those of the demand."""
+    for sentence in dict.fromkeys(it.replaced for it in scenarios if it.replaced):
+        typer.echo(f"minisim: {sentence}", err=True)
+
+
 def processes(jobs: int | None) -> int:
     """The number of processes that --jobs asks for, or one per core."""
     return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
@@ -121,6 +127,7 @@ def build_scenario(
     elif demand is None and start is not None:
         raise InputError("--start needs --arrivals or --demand: it is a time of day there")
     made = scenario_named(name, None if bearings is None else _bearings(bearings), **given)
+    say_replaced([made])
     if file is None:
         return made
     recorded = read_arrivals(file, made.intersection.n, start or 0.0)

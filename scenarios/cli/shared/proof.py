@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,6 +46,12 @@ def junction(
     scenario = build_scenario(name, bearings, **more)
     vehicles = scenario.vehicles
     return scenario, HarmonyMatrix.from_geometry(scenario.intersection, vehicles, clearance)
+
+
+def closed(scenario: Scenario) -> list[str]:
+    """The movements of a junction that no vehicle may take."""
+    junction = scenario.intersection
+    return [str(it) for it in compress(junction.movements, ~junction.allowed)]
 
 
 def answer(

@@ -60,8 +60,8 @@ def test_free_acceleration_is_a_times_one_minus_the_power(driver: Driver, share:
 
 
 def test_above_the_desired_speed_braking_is_comfortable_at_most() -> None:
-    assert free_road(15.0, 14.0, 2.6, 4.5, 4.0) == pytest.approx(2.6 * (1 - (15 / 14) ** 4))
-    assert free_road(40.0, 14.0, 2.6, 4.5, 4.0) == -4.5
+    assert free_road(15.0 / 14.0, 2.6, 4.5, 4.0) == pytest.approx(2.6 * (1 - (15 / 14) ** 4))
+    assert free_road(40.0 / 14.0, 2.6, 4.5, 4.0) == -4.5
     for v in (14.1, 20.0, 40.0):
         assert -4.5 <= SUMO.iidm(v, math.inf, v) < 0.0
 

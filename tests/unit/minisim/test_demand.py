@@ -13,8 +13,9 @@ import pytest
 from scipy import stats
 
 from minisim.arrivals import Arrivals
-from minisim.demand import MODELS, Demand, DemandProfile, Period, Shares
+from minisim.demand import MODELS, Demand, DemandProfile, Period
 from minisim.errors import InputError
+from minisim.shares import Shares
 
 ALPHA = 1e-3
 DAY = 86_400.0
@@ -114,8 +115,8 @@ def test_manoeuvres_do_not_depend_on_those_before_nor_on_other_lanes(model: str)
 def test_unbalanced_demand_keeps_the_total_and_gives_each_lane_its_share() -> None:
     """The paper's unbalanced demand: λ = share · D · N, shares 0.4, 0.3, 0.2, 0.1."""
     demand = Demand(density=350.0, split=(4, 3, 2, 1))
-    assert demand.rates(4) == pytest.approx((560.0, 420.0, 280.0, 140.0))
-    assert sum(demand.rates(4)) == pytest.approx(4 * 350.0)
+    assert demand.inflow(4).rates[0] == pytest.approx((560.0, 420.0, 280.0, 140.0))
+    assert sum(demand.inflow(4).rates[0]) == pytest.approx(4 * 350.0)
     counts = np.bincount(demand.draw(4, DAY, seed=3).lane, minlength=4)
     expected = np.array([560.0, 420.0, 280.0, 140.0]) * 24.0
     assert (np.abs(counts - expected) < 4.0 * np.sqrt(expected)).all()
@@ -177,7 +178,7 @@ def test_impossible_shares_are_refused(options: dict[str, object], message: str)
 
 def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
     with pytest.raises(InputError, match="split has 3 shares for 4 lanes"):
-        Demand(density=100.0, split=(1, 2, 3)).rates(4)
+        Demand(density=100.0, split=(1, 2, 3)).inflow(4)
     with pytest.raises(InputError, match="turns has 2 shares for 3 manoeuvres"):
         Demand(density=100.0, turns=(1, 2)).draw(4, 60.0, seed=1)
     with pytest.raises(InputError, match="turns has 2 rows for 4 lanes"):
@@ -185,9 +186,9 @@ def test_demand_that_does_not_match_the_geometry_is_refused() -> None:
     with pytest.raises(InputError, match="turns on lane b has 2 shares for 3 manoeuvres"):
         Demand(density=100.0, turns="1:2:1/1:2/uniform/1:2:1").draw(4, 60.0, seed=1)
     with pytest.raises(InputError, match="gives a lane 4000 veh/h; at most 3600"):
-        Demand(density=1000.0, split=(1, 0, 0, 0)).rates(4)
+        Demand(density=1000.0, split=(1, 0, 0, 0)).inflow(4)
     with pytest.raises(InputError, match="leave no room for a min_headway of 4 s"):
-        Demand(density=1000.0, model="shifted", min_headway=4.0).rates(4)
+        Demand(density=1000.0, model="shifted", min_headway=4.0).inflow(4)
     with pytest.raises(InputError, match="duration"):
         Demand(density=100.0).draw(4, 0.0, seed=1)
 
@@ -283,7 +284,7 @@ def test_impossible_periods_are_refused(changes: dict[str, object], message: str
 def test_a_profile_must_fit_the_junction_and_the_run() -> None:
     with pytest.raises(InputError, match="the demand 'Market' has 4 lanes, the junction has 3"):
         PROFILE.check(3, 60.0)
-    with pytest.raises(InputError, match="'Market' ends 8100 s after the start, before the run of"):
+    with pytest.raises(InputError, match="ends 8100 s after its start, before the run of"):
         PROFILE.draw(4, 8101.0, seed=1)
     crowded = replace(PROFILE, model="shifted", min_headway=10)
     with pytest.raises(InputError, match="400 veh/h leave no room for a min_headway of 10 s"):
@@ -304,7 +305,7 @@ def test_forbidden_manoeuvres_are_not_drawn_and_no_share_of_them_is_dropped() ->
     message = "turns of 07:15-09:15 send vehicles of lane a where none may go"
     with pytest.raises(InputError, match=message):
         by_lane.check(4, 60.0, allowed)
-    with pytest.raises(InputError, match="turns leave lane a none of the manoeuvres allowed"):
+    with pytest.raises(InputError, match="turns of 07:15-09:15 leave lane a none of"):
         replace(demand, periods=(replace(quiet, turns="1:0:0"),)).check(4, 60.0, allowed)
     with pytest.raises(InputError, match="'Market' has vehicles from lane d, but none may come"):
         replace(demand, periods=(NOON,)).check(4, 60.0, allowed)

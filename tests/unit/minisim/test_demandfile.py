@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from minisim.demandfile import read_demand, write_demand
 from minisim.errors import FileError, InputError
+from minisim.vehicle import VehicleType
 
 DAY = """
 [[period]]
@@ -42,6 +44,25 @@ def test_a_file_says_what_its_example_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "given", ["[fleet]\ncar = 0.9\nbus = [0.1, 0.1, 0.1, 0.1]", 'fleet = "car:0.9,bus:0.1"']
+)
+def test_a_file_brings_its_fleet(tmp_path: Path, given: str) -> None:
+    demand = read_demand(saved(tmp_path, f"{given}\n{DAY}"))
+    assert demand.fleet is not None
+    assert demand.fleet.names == ("car", "bus")
+    assert demand.fleet.of_lane(3) == (0.9, 0.1)
+    write_demand(demand, tmp_path / "again.toml")
+    assert read_demand(tmp_path / "again.toml") == demand
+
+
+def test_vehicle_types_of_ones_own_are_not_written(tmp_path: Path) -> None:
+    mine = replace(read_demand(saved(tmp_path)), fleet=VehicleType(name="car", length=5.0))
+    with pytest.raises(InputError, match="only the ready vehicle types, not your own 'car'"):
+        write_demand(mine, tmp_path / "mine.toml")
+    assert not (tmp_path / "mine.toml").exists()
+
+
+@pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ("rates = [120", "rate = [120", r"day.toml: period 1: .* 'rate'.*did you mean 'rates'"),
@@ -60,6 +81,17 @@ def test_a_file_says_what_its_example_says(tmp_path: Path) -> None:
         ),
         (DAY, "", r"periods are written \[\[period\]\]"),
         (DAY, "]", "not valid TOML"),
+        (
+            DAY,
+            f"[fleet]\ncra = 1\n{DAY}",
+            "unknown vehicle type 'cra'.*did you mean 'car'",
+        ),
+        (
+            DAY,
+            f"[fleet]\ncar = 0.4\n{DAY}",
+            r"toml: shares must sum to 1, got 0.4 \(car",
+        ),
+        (DAY, f"[fleet]\ncar = [1, 1, 1]\n{DAY}", "has shares for 3 lanes, the junction has 4"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_with_the_place(

@@ -119,7 +119,7 @@ def test_a_density_in_passenger_car_units_becomes_vehicles() -> None:
     lanes = "car:1/0.5/1/0.5,bus:0/0.5/0/0.5"
     by_lane = four_way(200, unit="pcu-irc64", fleet=lanes, lane_width=3.5)
     assert mean_pcu(by_lane.vehicles, "pcu-irc64", 4) == (1.0, 2.0, 1.0, 2.0)
-    assert by_lane.demand.rates(4) == pytest.approx((200.0, 100.0, 200.0, 100.0))
+    assert by_lane.demand.inflow(4).rates[0] == pytest.approx((200.0, 100.0, 200.0, 100.0))
     with pytest.raises(InputError, match="unit 'pcu' needs a fleet"):
         four_way(200, unit="pcu")
 

@@ -34,7 +34,7 @@ from minisim.vehicle import MODELS, CruiseVehicle, VehicleType
 from scenarios import FAIR, PAPER, four_way, three_way
 from scenarios.profiles import Profile
 from scenarios.scenario import Scenario
-from tests.builders import Fixed, Scripted, digest, python, replayed
+from tests.builders import Fixed, Scripted, digest, python, rearranged, replayed
 
 STRAIGHT = (0.0, 0, 2)
 KRAUSS = dataclasses.replace(FAIR, name="krauss", vehicle=VehicleType(model="krauss"))
@@ -269,7 +269,9 @@ def test_overlap_in_a_lane_is_a_collision_that_no_floor_hides() -> None:
     scenario = replayed(four_way(), (0.0, 0, 2), (5.0, 0, 2), horizon=100.0)
     sim = Simulation(scenario, Unregulated())
     sim.advance(20.0)
+    sim.result()  # brings the rows up to date
     sim._vehicles["s"][1] = sim._vehicles["s"][0] - 3.0
+    rearranged(sim)
     with pytest.raises(CollisionError, match=r"vehicle 0 .* vehicle 1"):
         sim.advance(21.0)
 
@@ -395,10 +397,13 @@ def test_advised_to_stand_a_follower_still_brakes_for_its_leader(model: str) -> 
     scenario = replayed(four_way(100, profile=profile), (0.0, 0, 2), (0.0, 0, 2), horizon=120.0)
     simulation = Simulation(scenario, Fixed(Plan(lanes_open=True)), on_collision="record")
     simulation.advance(20.0)
+    simulation.result()  # brings the rows up to date
     rows = simulation._vehicles
     rows["v"][0], rows["advice"][:] = 2.0, 0.0  # the leader, suddenly slow
     rows["s"][1] = rows["s"][0] - vehicle.length - 40.0
     rows["v"][1] = 12.0  # stops in 48 m when comfortable, the leader in 1.3 m
+    rearranged(simulation)
     simulation.advance(60.0)
+    simulation.result()
     assert simulation.collisions == ()
     assert rows["v"][1] == 0.0

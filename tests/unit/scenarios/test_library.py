@@ -93,10 +93,26 @@ def test_demand_by_time_of_day_replaces_the_constant_one_and_gives_the_horizon()
         three_way(demand=day, recorded=scenario.arrivals(1))
     with pytest.raises(InputError, match="'profile' has 3 lanes, the junction has 4"):
         four_way(demand=day)
-    with pytest.raises(InputError, match="ends 3600 s after the start, before the run of 3601 s"):
+    with pytest.raises(InputError, match="ends 3600 s after its start, before the run of 3601 s"):
         three_way(demand=day, horizon=3601)
     with pytest.raises(InputError, match="demand must be a DemandProfile"):
         three_way(demand="day.toml")
+
+
+def test_a_demand_brings_its_fleet_and_one_given_beside_it_wins() -> None:
+    quarter = Period(start=0, end=900, rates=(100, 0, 200))
+    day = DemandProfile(periods=(quarter,), fleet="car:0.5,lcv:0.5")
+    own = three_way(demand=day, profile="fair")
+    assert str(own.vehicles) == str(own.site().fleet) == "car:0.5,lcv:0.5"
+    assert not own.replaced
+    beside = three_way(demand=day, fleet="truck")
+    assert beside.vehicles.names == ("truck",)
+    assert beside.replaced == "the fleet truck replaces that of the demand 'profile'"
+    assert not three_way(100, fleet="truck").replaced
+    like = replace(FAIR, vehicle=replace(FAIR.vehicle, model="krauss"))
+    assert {it.model for it in three_way(demand=day, profile=like).vehicles.types} == {"krauss"}
+    with pytest.raises(InputError, match=r"a fleet, .*, needs the profile paper or"):
+        three_way(demand=day, profile="as_run")
 
 
 @pytest.mark.parametrize("text", ["", "(4,3,2,1", "4;3;2;1", "4:x", "::", "even"])

@@ -19,9 +19,9 @@ from minisim.carfollowing import (
 )
 from minisim.control import Advise, Plan, Unregulated
 from minisim.engine.cruise.ends import look
-from minisim.engine.cruise.law import build_cruise
+from minisim.engine.cruise.law import FASTEST, build_cruise
 from minisim.engine.cruise.step import accelerate
-from minisim.engine.state import DRIVING, Records, build_lanes, build_road, build_vehicles
+from minisim.engine.state import AMBER, DRIVING, Records, build_lanes, build_layout, build_vehicles
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.laws import build_law
@@ -129,6 +129,27 @@ def test_advice_of_zero_stops_within_a_metre_one_step_later() -> None:
     assert v[-1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("v", "a", "wanted", "acceleration"),
+    [
+        (14.733474, -0.5484, 0.070323, -2.0682),
+        (14.712792, -2.0682, 0.029533, -19.3866),
+        (14.518926, -19.3866, 0.006979, -44.7599),
+    ],
+)
+def test_a_desired_speed_near_0_lowers_the_top_speed_from_the_next_step_on(
+    v: float, a: float, wanted: float, acceleration: float
+) -> None:
+    """SUMO 1.18, V2I-C, 4:1:4:1 at 250 veh/h, vehicle 80 from 280.79 s on.
+
+    10000 km/h times `wanted` over the limit of 14 m/s is all that it may drive.
+    """
+    assert chosen((0, 2, 325.0, v, a, 0), wanted=wanted)[0] == pytest.approx(acceleration, abs=0.02)
+    enough = v * 14.0 / FASTEST + 1e-3
+    free = engine_lag(a, 14.0 - v, 0.5, DT)
+    assert chosen((0, 2, 325.0, v, a, 0), wanted=enough)[0] == pytest.approx(free)
+
+
 def test_closed_lanes_hold_it() -> None:
     never = Fixed(Plan(hold_distance=2.0))
     frame = trace((0.0, 0, 2), until=80.0, controller=never).trajectories
@@ -173,27 +194,36 @@ def test_a_crossing_vehicle_does_not_slow_an_approaching_one() -> None:
 
 
 def chosen(
-    *cars: tuple[int, int, float, float, float, int], sumo: str = "1.28", arms: int = 4
+    *cars: tuple[int, int, float, float, float, int],
+    sumo: str = "1.28",
+    arms: int = 4,
+    within: Scenario | None = None,
+    light: int = 1,
+    steps: int = 1,
+    wanted: float = 14.0,
 ) -> list[float]:
     """Accelerations [m/s²] of cars alone on the published 4-arm junction, one step on.
 
     Each is (lane, manoeuvre, s, v, a, tick of entering the junction); all want 10 m/s inside and
-    14 m/s before it.
+    14 m/s before it. `light` is what all lanes show; `wanted` is what they desired in the step
+    before, and in the last of `steps` all that they remember is of this scene.
     """
     profile = replace(AS_RUN, vehicle=replace(AS_RUN.vehicle, sumo=sumo))
+    what = within or replace(MAKERS[arms](profile="as_run"), profile=profile)
     demanded = [(0.0, lane, manoeuvre) for lane, manoeuvre, *_ in cars]
-    what = replayed(MAKERS[arms](profile="as_run"), *demanded, horizon=200.0)
-    what = replace(what, profile=profile)
+    what = replayed(what, *demanded, horizon=200.0)
     site = what.site(0)
     plan = Unregulated().start(site).plan
-    road = build_road(site, plan)
+    road = build_layout(site, plan)
     law = build_law(
         site, plan, depart_speed=what.depart_speed, record=None, record_window=(0.0, math.inf)
     )
     vehicles = build_vehicles(site, what.arrivals(0))
     lanes = build_lanes(site, vehicles, plan.lanes_open)
+    lanes["open"] = light
     cruise = build_cruise(site, len(vehicles))
     assert cruise is not None
+    cruise.memory["fastest"] = FASTEST * wanted / 14.0
     rows = []
     for lane, _, s, v, a, entered in cars:
         row = int(lanes[lane]["next"])
@@ -212,7 +242,10 @@ def chosen(
             cruise.last[exit_arm] = row
             cruise.memory["left"][row] = 1
         rows.append(row)
-    accelerate(vehicles, lanes, road, law, cruise)
+    before = vehicles["a"].copy()
+    for _ in range(steps):
+        vehicles["a"] = before
+        accelerate(vehicles, lanes, road, law, cruise)
     return [float(vehicles["a"][row]) for row in rows]
 
 
@@ -350,7 +383,64 @@ def test_ways_are_checked(ways: object, message: str) -> None:
         Intersection((0.0, 90.0, 180.0, 270.0), ways=ways)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("scene", "acceleration"),
+    [
+        (60902, 2.6386286934876324),  # it hardly moves, and yields to a1 on its exit
+        (60914, 2.7159611690461105),  # it would drive 0.1 m/s in the next step
+    ],
+)
+def test_one_that_hardly_moves_inside_and_yields_is_not_seen(
+    scene: int, acceleration: float
+) -> None:
+    """SUMO 1.18, fixed-time, 4:3:2:1 at 350 veh/h: a3 (vehicle 157) has run amber, d2 sets off.
+
+    d2's way is the straightest onto the exit that a1 has not left with its tail.
+    """
+    cars = {
+        60902: (
+            (0, 1, 501.83 + 2.4206112561810453, 11.24375821062331, 2.7224838604087864, 60743),
+            (0, 3, 482.5898209318934, 8.3513480053597, 2.611401267357394, 0),
+            (3, 2, 492.8 + 3.1218762028245055e-05, 0.00233756247597078, 0.15532487504805842, 60901),
+        ),
+        60914: (
+            (0, 1, 501.83 + 3.7910690728796372, 11.569483523355508, 2.6966321078019106, 60743),
+            (0, 3, 483.6132912956612, 8.684498951193401, 2.9050993756897014, 0),
+            (3, 2, 492.8 + 0.004124975411724168, 0.07575004917657889, 0.968499901646841, 60901),
+        ),
+    }
+    a = chosen(*cars[scene], within=replay("4:3:2:1", 350, 4, "fts"), steps=2)
+    assert a[1] == pytest.approx(acceleration, abs=1e-6)
+
+
+def test_one_that_yields_to_none_is_seen_however_slow() -> None:
+    """As above, but a1 is gone, or bound for another exit."""
+    a3 = (0, 3, 482.5898209318934, 8.3513480053597, 2.611401267357394, 0)
+    d2 = (3, 2, 492.8 + 3.1218762028245055e-05, 0.00233756247597078, 0.15532487504805842, 60901)
+    a2 = (0, 2, 507.2 + 2.4, 11.24, 2.72, 60743)
+    for ahead in ((), (a2,)):
+        a = chosen(*ahead, a3, d2, within=replay("4:3:2:1", 350, 4, "fts"), steps=2)
+        assert a[len(ahead)] == pytest.approx(asked(a3[3], 0.0, d2[3], a3[4]))
+
+
 # --- speed mode 31: limits and lights -------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("light", "behind"), [(AMBER, "b3"), (0, "b3"), (1, "b1")])
+def test_beyond_an_amber_or_red_light_only_the_radar_sees(light: int, behind: str) -> None:
+    """SUMO 1.18, fixed-time, 4:1:4:1 at 300 veh/h, amber at 564.58 s: vehicle 157 (b1) looks ahead.
+
+    The radar shows b3 on its lane, but not b1 inside, on its own way.
+    """
+    cars = (
+        (1, 1, 492.8 + 3.2464104484473673, 9.002269266332927, -3.532411732476959, 56400),
+        (1, 3, 471.2881541858806, 11.788475019923231, -0.9664430021294024, 0),
+        (1, 1, 444.8136683339488, 11.708889772558932, 0.6017198310020788, 0),
+    )
+    a = chosen(*cars, within=replay("4:1:4:1", 300, 4, "fts"), light=light)
+    (_, _, inside, its, *_), _, (_, _, s, v, before, _) = cars
+    b1 = asked(v, inside - 4.0 - s - 2.0, its, before)
+    assert a[2] == pytest.approx({"b3": 0.5921527802852822, "b1": b1}[behind], abs=1e-6)
 
 
 def obeying(
@@ -360,7 +450,7 @@ def obeying(
     car = (0.0, lane, manoeuvre)
     what = replayed(MAKERS[4](profile="as_run_obeying"), car, horizon=200.0)
     site = what.site(0)
-    road = build_road(site, FixedTime().start(site).plan)
+    road = build_layout(site, FixedTime().start(site).plan)
     law = build_law(
         site, FixedTime().start(site).plan, depart_speed=0.0, record=None,
         record_window=(0.0, math.inf),

@@ -72,10 +72,23 @@ def test_a_burst_of_arrivals_is_no_spillback(profile: str) -> None:
     """On an open road of 1200 veh/h, vehicles wait for a place one after another."""
     scenario = four_way(1200, profile=profile, turns="1:0:0", horizon=600.0)
     summary = simulate(scenario, Unregulated()).summary(["depart_delay_s"])
-    assert summary["depart_delay_s_max"] > clearing_time(PROFILES[profile].vehicle)
+    one = PROFILES[profile]
+    assert summary["depart_delay_s_max"] > clearing_time(one.vehicle, one.speed_limit)
+    assert summary["spillback_s"] is None
+
+
+@pytest.mark.parametrize("profile", ["as_run", "as_run_signals"])
+def test_a_burst_of_the_published_vehicles_is_no_spillback(profile: str) -> None:
+    """Twelve at once: each enters when the one before it has driven on."""
+    scenario = replayed(four_way(0, profile=profile), *[(0.0, 0, 1)] * 12, horizon=150.0)
+    summary = simulate(scenario, Unregulated(), on_collision="record").summary(["depart_delay_s"])
+    assert summary["depart_delay_s_max"] > 10.0
     assert summary["spillback_s"] is None
 
 
 def test_the_time_to_drive_on_is_from_rest() -> None:
     vehicle = VehicleType(length=4.0, min_gap=2.0, acceleration=3.0, headway=1.5)
-    assert clearing_time(vehicle) == pytest.approx(2.0 + 1.5)
+    assert clearing_time(vehicle, 20.0) == pytest.approx(2.0 + 1.5)
+    assert clearing_time(vehicle, 3.0) == pytest.approx(2.0 + 0.5 + 1.5)
+    drivers = replace(vehicle, speed_deviation=0.1)
+    assert clearing_time(drivers, 3.0 / 0.7) == pytest.approx(2.0 + 0.5 + 1.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import math
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,26 @@ def test_only_lanes_for_cars_count(tmp_path: Path) -> None:
 
 def test_an_extract_of_openstreetmap_is_no_network(tmp_path: Path) -> None:
     assert read_town(written(tmp_path, "<osm><node id='1' lat='1' lon='2'/></osm>")) is None
+
+
+@pytest.mark.parametrize(
+    ("zone", "south", "turn"), [("+zone=32", "", 2.06), ("+zone=32 +south", "10000000", -2.06)]
+)
+def test_y_points_to_true_north(tmp_path: Path, zone: str, south: str, turn: float) -> None:
+    """At 52.1° N or S and 2.61° east of the meridian of zone 32, tan γ = tan 2.61° · sin 52.1°."""
+    x, y = 678_800.0, 5_775_300.0  # of that place by UTM [m]
+    y = float(south) - y if south else y
+    where = (
+        f'<location netOffset="{-x},{-y}" convBoundary="-9,-9,9,9" origBoundary="" '
+        f'projParameter="+proj=utm {zone} +datum=WGS84"/>'
+    )
+    text = town_text(STAR).replace("<edge ", f"{where}<edge ", 1)
+    town = read_town(written(tmp_path, text))
+    assert town is not None
+    north = town.nodes["a"]  # of C, on the grid
+    assert math.degrees(math.atan2(north.x, north.y)) == pytest.approx(turn, abs=0.01)
+    along = town.into["C"][0].shape[0] - town.into["C"][0].shape[-1]
+    assert math.degrees(math.atan2(*along)) == pytest.approx(turn, abs=0.01)
 
 
 BOMB = '<!DOCTYPE n [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><net>&b;</net>'

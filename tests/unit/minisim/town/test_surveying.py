@@ -82,7 +82,7 @@ def test_two_one_way_edges_at_nearly_one_angle_are_one_road(tmp_path: Path) -> N
     places = {**SQUARE, "x": (40.0, 196.0), "n": (-40.0, 196.0)}
     found = surveyed(written(tmp_path, places, one_way=["nC", "Cx"]))
     assert [arm.traffic for arm in found.arms] == ["both"] * 4
-    assert "nC and Cx are taken for one road, a" in found.verdict
+    assert "nC and Cx are taken as one road, a" in found.verdict
 
 
 def test_roads_go_on_through_bends_to_the_next_junction(tmp_path: Path) -> None:

@@ -390,6 +390,11 @@ def test_a_run_draws_from_demand_by_time_of_day(capsys: Captured, tmp_path: Path
     assert answer(capsys, *run, "--start", "07:15")["trips"] == 0
     assert answer(capsys, *run, "--horizon", "450")["trips"] == 95
     assert "before the run of 3600 s" in fails(capsys, *run, "--horizon", "3600")
+    day.write_text('fleet = "lcv"\n' + day.read_text())
+    assert answer(capsys, *run)["fleet"] == "lcv"
+    assert main([*run, "--fleet", "car"]) == 0
+    said = capsys.readouterr().err
+    assert said == "minisim: the fleet car replaces that of the demand 'day'\n"
     assert "--demand replaces --density" in fails(capsys, *run, "-d", "350")
     assert "--arrivals replaces --demand" in fails(capsys, *run, "--arrivals", "x.csv")
     film = ("animate", "three-way", "--demand", str(day), "-o", str(tmp_path / "film.gif"))

@@ -71,6 +71,32 @@ def test_bad_input_is_one_sentence_and_code_2(
     assert not told.out
 
 
+def test_commands_about_rules_take_a_node_and_know_what_is_closed_there(
+    town: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of the 26 cases of three arms, those without a1 remain: 2 · 3 · 3 − 1."""
+    at = [town, "--node", "C"]
+    assert main(["harmony", *at, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["closed"] == ["a1"]
+    assert main(["harmony", *at]) == 0
+    assert "no vehicle may take a1" in capsys.readouterr().out
+    assert main(["verify", *at, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["cases"] == sum(told["cases_by_vehicles_that_go"].values()) == 17
+    assert main(["decide", *at, "a2", "b1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["participants"] == ["a2", "b1"]
+    assert main(["decide", *at, "a1", "b1"]) == 2
+    assert "no vehicle may take a1 at town C" in capsys.readouterr().err
+    states = []
+    for where in (at, ["three-way"]):
+        assert main(["protocol", *where, "--json"]) == 0
+        states.append(json.loads(capsys.readouterr().out)["states"])
+    assert states[0] < states[1]
+    for command in (["harmony"], ["verify"], ["protocol"], ["decide", "a1"]):
+        assert main([command[0], "four-way", *command[1:], "--node", "C"]) == 2
+        assert "node needs a town's network" in capsys.readouterr().err
+
+
 def test_a_hostile_file_is_one_sentence_and_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

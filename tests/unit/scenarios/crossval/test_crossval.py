@@ -284,6 +284,19 @@ def test_verdicts_over_few_trips_are_marked() -> None:
     assert "few trips |" not in markdown([many], "x", {})
 
 
+def test_cells_are_told_apart_by_their_fleets() -> None:
+    mixed = "car:0.5/0.4/0.5/0.5,lcv:0.5/0.6/0.5/0.5"
+    cases = [Case(four_way(300, profile="fair", fleet=it), "dim") for it in (None, "lcv", mixed)]
+    assert [case.name.removeprefix("four-way balanced 300 ") for case in cases] == [
+        "dim", "lcv dim", f"{mixed} dim",
+    ]  # fmt: skip
+    done = [result(case, pair()) for case in cases]
+    assert table(done)["fleet"].unique().tolist() == [str(it.scenario.vehicles) for it in cases]
+    files = [name for name, *_ in crossval_figures(done)]
+    assert len({*files}) == len(files) >= 3
+    assert not any("/" in name or ":" in name for name in files)
+
+
 def test_sumos_runs_are_used_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ran: list[int] = []
 

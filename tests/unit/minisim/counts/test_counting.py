@@ -92,6 +92,20 @@ def test_a_row_per_pair_of_arms_and_class(tmp_path: Path, encoding: str) -> None
     assert count.left_out == {"Pedal Cycle (left out)": 48}
 
 
+def test_a_sheet_is_of_one_day(tmp_path: Path) -> None:
+    dated = GERMAN.replace(",06:", ",2012-05-08 06:")
+    count = read(tmp_path, dated)
+    assert count.edges == (21_600, 22_500, 23_400)
+    with pytest.raises(FileError, match="a second day, 2012-05-09; keep the rows of one day"):
+        read(tmp_path, dated.replace("05-08 06:15,", "05-09 06:15,"))
+
+
+def test_a_number_that_may_be_thousands_is_refused(tmp_path: Path) -> None:
+    """In a sheet of decimal commas."""
+    with pytest.raises(FileError, match=r"'1\.200' may mean 1200 or 1\.2; write 1200 or 1,2"):
+        read(tmp_path, BRITISH.replace("12,5", "1.200"))
+
+
 def test_a_mapping_says_what_a_sheet_does_not(tmp_path: Path) -> None:
     text = GERMAN.replace("zufahrt", "leg no").replace("pkw", "P").replace(",A,", ",A,")
     mapping = {"approach": "leg no", "classes": {"P": "car"}, "arms": ["D", "A", "B", "C"],
@@ -135,6 +149,7 @@ def test_a_missing_row_is_named(tmp_path: Path) -> None:
         ("2,1,20,0", "2,1,many,0", r"line 2: a count must be a number"),
         ("2,1,20,0", "2,1,20", r"line 2: 10 cells are needed, got 9"),
         ("06:00,06:15", "06:0x,06:15", r"line 2: a time must be a time of day"),
+        ("06:15,06:30", "06:15,06:10", r"the interval 06:15-06:10 must end after its start"),
         ("zufahrt,", "x,", r"no column has the approach, and none is a movement such as NBL"),
         ("kennung", "x", r"no column has the turn or the exit"),
         ("intervall_start", "x", r"no column has the start of the intervals"),
@@ -174,7 +189,15 @@ def test_what_is_no_sheet_is_refused(tmp_path: Path, data: bytes, message: str) 
         ({"classes": {"pkw": "cra"}}, "unknown type of the class 'pkw', 'cra'.*'car'"),
         ({"arms": ["A", "B", "C"]}, "unknown arm of .* 'D'"),
         ({"arms": 4}, "arms must be a sequence"),
-        ({"turns": {"AL..(1)": 4}}, "4 arms have manoeuvres 1 … 3"),
+        *(
+            (
+                {"turns": {"AL..(1)": k}},
+                f"'AL..\\(1\\)' on 'A': 4 arms have manoeuvres 1 … 3, got {k}",
+            )
+            for k in (4, 0, -1)
+        ),
+        ({"arms": ["A", "B", "B", "C", "D"]}, "arms names 'B' twice"),
+        ({"interval": 0.01}, r"interval \[min\] must be at least 1"),
         ({"from": "09:00"}, "nothing is left to simulate"),
         ({"from": "9h"}, "from must be a time of day"),
     ],
@@ -192,6 +215,44 @@ def test_five_arms_need_exits(tmp_path: Path) -> None:
     )
     with pytest.raises(FileError, match="with 5 arms, left on '1' does not say which exit"):
         read(tmp_path, text)
+
+
+@pytest.mark.parametrize("n", [5, 6])
+@pytest.mark.parametrize("wide", [False, True])
+def test_with_exits_a_sheet_may_have_five_arms_or_more(tmp_path: Path, n: int, wide: bool) -> None:
+    """From every arm to every other: as many vehicles as the rank of the exit, clockwise."""
+    points = ("N", "NE", "SE", "S", "SW", "NW")[:n]
+    counts = {(points[k], points[(k + j) % n]): j for k in range(n) for j in range(1, n)}
+    header = ",".join(f"{a}-{b}" for a, b in counts) if wide else "from,to,car"
+    lines = [
+        f"{time},{row}" for time in ("7:00", "7:15")
+        for row in ([",".join(map(str, counts.values()))] if wide
+                    else [f"{a},{b},{count}" for (a, b), count in counts.items()])
+    ]  # fmt: skip
+    count = read(tmp_path, "\n".join([f"time,{header}", *lines]))
+    assert count.arms == points
+    assert count.demand.periods[1].turns == (tuple(range(1, n)),) * n
+    assert len(count.demand.draw(n, 900.0, 1)) > 0
+
+
+def test_a_mapping_says_which_exits_turns_of_five_arms_take(tmp_path: Path) -> None:
+    text = "time,approach,turn,car\n" + "".join(
+        f"{time},{arm},{turn},{number}\n"
+        for time in ("7:00", "7:15") for arm in "12345"
+        for number, turn in enumerate(("hard left", "left", "right", "hard right"), start=1)
+    )  # fmt: skip
+    turns = {"hard left": 1, "left": "2", "right": 3, "hard right": 4}
+    count = read(tmp_path, text, {"turns": turns})
+    assert count.demand.periods[0].turns == ((1, 2, 3, 4),) * 5
+
+
+def test_columns_that_others_replace_are_named(tmp_path: Path) -> None:
+    text = "time,from,to,count,car\n" + "".join(
+        f"{time},{a},{b},9,1\n" for time in ("7:00", "7:15") for a in "123" for b in "123" if a != b
+    )
+    count = read(tmp_path, text)
+    assert "columns not used: count" in count.notes
+    assert count.vehicles.sum() == 12
 
 
 def test_a_count_is_of_one_junction(tmp_path: Path) -> None:

@@ -1,0 +1,287 @@
+"""How vehicles choose their accelerations, from the state at the beginning of a step.
+
+Three passes over the packed arrays: who the leaders are, what they ask for, and the acceleration.
+Plain loops over few arrays each, so that the compiler vectorises them. A vehicle with nothing but a
+leader ahead, which is most of them, needs no more than these loops; the others are flagged, and
+take `careful`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from minisim.carfollowing import free_road
+from minisim.engine.packed import (
+    ACC,
+    AHEAD,
+    B_MAX,
+    BRAKE,
+    CARE,
+    CLOSENESS,
+    CLOSEST,
+    FLAG,
+    GAP,
+    HEADWAY,
+    LANE,
+    LEAD_B,
+    LEAD_V,
+    LEAVE,
+    LENGTH,
+    LIMIT,
+    MIN_GAP,
+    NARROWEST,
+    PATH,
+    RATIO,
+    REACH,
+    RELEASED,
+    ROOM,
+    ROOT,
+    ROW,
+    SECTION,
+    TYPE,
+    A,
+    B,
+    S,
+    V,
+    count,
+    padded,
+)
+from minisim.engine.state import Floats, Ints, Layout, Records
+from minisim.jit import njit, njit_inline
+from minisim.laws import (
+    IDM,
+    KRAUSS,
+    Law,
+    braking_begins,
+    closeness,
+    drive,
+    hold,
+    keep_room,
+    room_behind,
+    slow_down,
+)
+
+
+@njit_inline
+def accelerate(
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law,
+    braking: bool,
+) -> bool:  # fmt: skip
+    """Choose every vehicle's acceleration; returns whether two overlap."""
+    n = count(lanes)
+    next_ahead(floats, padded(n))
+    overlap = False
+    for lane in range(len(lanes)):
+        overlap |= near_junction(floats, ints, lanes, road, law, lane)
+    overlap |= weigh(floats, ints, road, law, n)
+    choose(floats, ints, vehicles, lanes, road, law, n)
+    keep_rooms(floats, ints, road, law, n)
+    limit(floats, n, braking)
+    return overlap
+
+
+@njit_inline
+def next_ahead(floats: Floats, n: int) -> None:
+    """Take the vehicle in the slot before for the leader; right only before the junction."""
+    s, v, length, b_max = floats[S], floats[V], floats[LENGTH], floats[B_MAX]
+    gap, lead_v, lead_b = floats[GAP], floats[LEAD_V], floats[LEAD_B]
+    for i in range(1, n):
+        gap[i] = s[i - 1] - length[i - 1] - s[i]
+    for i in range(1, n):
+        lead_v[i] = v[i - 1]
+    for i in range(1, n):
+        lead_b[i] = b_max[i - 1]
+
+
+@njit_inline
+def near_junction(
+    floats: Floats, ints: Ints, lanes: Records, road: Layout, law: Law, lane: int
+) -> bool:
+    """The leaders of the vehicles that have entered the junction, and of the first that has not.
+
+    Returns whether two overlap.
+    """
+    overlap = False
+    branch = road.branch
+    s, v, length, b_max, leave = floats[S], floats[V], floats[LENGTH], floats[B_MAX], floats[LEAVE]
+    row, path, ahead = ints[ROW], ints[PATH], ints[AHEAD]
+    first = lanes[lane]["slot"]
+    front = first + lanes[lane]["entered"]
+    for i in range(first, min(front + 1, first + lanes[lane]["driving"])):
+        p, out = path[i], s[i] >= leave[i]
+        gap, lead = math.inf, i
+        closest, narrowest = 0.0, math.inf
+
+        # The vehicle ahead in the lane, until its rear has left the shared path. If it has
+        # turned off, one further ahead may still be on the path, but not once it is on its exit.
+        j = i - 1
+        if out and row[j] != row[i] - 1:
+            j = -1
+        while j >= first:
+            rear = s[j] - length[j]
+            if rear < branch[path[j], p]:
+                gap, lead = rear - s[i], j
+                break
+            j = -1 if out else j - 1
+
+        # A vehicle that cannot stop before the junction sees past a leader that may turn off.
+        if not out and v[i] * v[i] > 2.0 * b_max[i] * (law.entry - s[i]):
+            narrowest = beyond(floats, ints, road, law, first, lead, i)
+
+        # From the junction on, also the last vehicle ahead bound for the same exit lane.
+        # Both positions are measured from that lane, so a vehicle that is still on another arc
+        # counts as if it were on this one.
+        k = ahead[i]
+        if i == front and ints[RELEASED, i]:
+            k = lanes[int(road.ends[p, 2])]["tail"]
+        if k >= 0:
+            rear = s[k] - length[k] - leave[k]
+            other = rear - (s[i] - leave[i])
+            if rear >= 0.0 and lead == i:
+                gap, lead = other, k
+            elif rear >= 0.0 and lead == k and law.model != KRAUSS:
+                gap = min(gap, other)  # the same vehicle: the smaller gap decides everything
+            else:
+                mine = road.types[ints[TYPE, i]]
+                closest = closeness(v[i], other, v[k], mine, law)
+                if rear >= 0.0:
+                    room = room_behind(other, v[k], b_max[k], mine, law)
+                    narrowest = min(narrowest, room)
+                overlap |= other <= 0.0 and out
+        floats[GAP, i], floats[LEAD_V, i], floats[LEAD_B, i] = gap, v[lead], b_max[lead]
+        floats[CLOSEST, i], floats[NARROWEST, i] = closest, narrowest
+    return overlap
+
+
+@njit
+def beyond(
+    floats: Floats, ints: Ints, road: Layout, law: Law, first: int, stop: int, i: int
+) -> float:
+    """The least room behind the vehicles from slot `first` to before `stop` on i's path."""
+    narrowest = math.inf
+    p, mine = ints[PATH, i], road.types[ints[TYPE, i]]
+    for j in range(stop - 1, first - 1, -1):
+        rear = floats[S, j] - floats[LENGTH, j]
+        if rear < road.branch[ints[PATH, j], p]:
+            gap = rear - floats[S, i]
+            new = room_behind(gap, floats[V, j], floats[B_MAX, j], mine, law)
+            narrowest = min(narrowest, new)
+    return narrowest
+
+
+@njit_inline
+def weigh(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> bool:
+    """What the leaders ask for; returns whether two vehicles overlap."""
+    v, gap, lead_v, lead_b = floats[V], floats[GAP], floats[LEAD_V], floats[LEAD_B]
+    z, room, b_max = floats[CLOSENESS], floats[ROOM], floats[B_MAX]
+    closest, narrowest = floats[CLOSEST], floats[NARROWEST]
+    overlap = False
+    m = padded(n)
+    for i in range(n):
+        overlap |= gap[i] <= 0.0
+    if law.model == KRAUSS:
+        for i in range(n):
+            z[i] = closest[i]
+            if gap[i] < math.inf:
+                mine = road.types[ints[TYPE, i]]
+                z[i] = max(z[i], closeness(v[i], gap[i], lead_v[i], mine, law))
+    else:  # `gap_ratio`, in two loops
+        headway, root, min_gap = floats[HEADWAY], floats[ROOT], floats[MIN_GAP]
+        for i in range(m):
+            z[i] = v[i] * headway[i] + v[i] * (v[i] - lead_v[i]) / root[i]
+        for i in range(m):
+            wanted = (min_gap[i] + (z[i] if z[i] > 0.0 else 0.0)) / gap[i]
+            z[i] = max(wanted if gap[i] > 0.0 else math.inf, closest[i])
+    if law.semi_implicit or law.mixed:
+        for i in range(n):
+            room[i] = room_behind(gap[i], lead_v[i], lead_b[i], road.types[ints[TYPE, i]], law)
+    else:  # `room_behind` with equal brakes
+        for i in range(m):
+            room[i] = 2.0 * b_max[i] * (gap[i] - law.room) + lead_v[i] * lead_v[i]
+    for i in range(m):
+        room[i] = min(room[i], narrowest[i])
+    return overlap
+
+
+@njit_inline
+def choose(
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, n: int
+) -> None:
+    """The acceleration that the law, the limits and the hold line allow."""
+    flag = floats[FLAG]
+    if law.model == IDM and law.quartic:
+        s, v, acc, ratio, z = floats[S], floats[V], floats[ACC], floats[RATIO], floats[CLOSENESS]
+        a, b, top = floats[A], floats[B], floats[LIMIT]
+        care, reach = floats[CARE], floats[REACH]
+        m = padded(n)
+        for i in range(m):
+            acc[i] = free_road(ratio[i], a[i], b[i], 4.0)
+        for i in range(m):
+            acc[i] = acc[i] - a[i] * z[i] * z[i]
+        for i in range(m):
+            near = v[i] + reach[i]
+            flag[i] = 1.0 if near * near >= 2.0 * b[i] * (care[i] - s[i]) else 0.0
+        for i in range(m):
+            flag[i] = 1.0 if v[i] < top[i] < v[i] + acc[i] * law.dt else flag[i]
+    else:
+        for i in range(n):
+            flag[i] = 1.0
+    for i in range(n):
+        if flag[i] != 0.0:
+            careful(floats, ints, vehicles, lanes, road, law, i)
+
+
+@njit_inline
+def careful(
+    floats: Floats, ints: Ints, vehicles: Records, lanes: Records, road: Layout, law: Law, i: int
+) -> None:
+    """`choose` for a vehicle that may have to slow down, or has an advised speed."""
+    s, v, z, p = floats[S, i], floats[V, i], floats[CLOSENESS, i], ints[PATH, i]
+    me, mine = vehicles[ints[ROW, i]], road.types[ints[TYPE, i]]
+    start, speed = road.section_start, road.section_speed
+    acc = drive(v, floats[LIMIT, i], me["advice"], z, mine, law)
+    k = ints[SECTION, i] + 1
+    while braking_begins(v, start[p, k] - s, mine, law):
+        lower = speed[p, k] * me["factor"]
+        acc = min(acc, slow_down(v, acc, lower, start[p, k] - s, mine, law))
+        k += 1
+    if s < law.entry and not ints[RELEASED, i]:
+        acc = min(acc, hold(v, s, mine, law))
+    floats[ACC, i] = acc
+    first = lanes[ints[LANE, i]]["slot"]
+    front = first + lanes[ints[LANE, i]]["entered"]
+    if i > front and v * v > 2.0 * mine.b_max * (law.entry - s):
+        room = min(floats[ROOM, i], beyond(floats, ints, road, law, first, front, i))
+        k = lanes[int(road.ends[p, 2])]["tail"]
+        if ints[RELEASED, i] and k >= 0:
+            rear = floats[S, k] - floats[LENGTH, k] - road.ends[ints[PATH, k], 0]
+            gap = rear - (s - road.ends[p, 0])
+            if rear >= 0.0:
+                room = min(room, room_behind(gap, floats[V, k], floats[B_MAX, k], mine, law))
+        floats[ROOM, i] = room
+
+
+@njit_inline
+def keep_rooms(floats: Floats, ints: Ints, road: Layout, law: Law, n: int) -> None:
+    """Brake harder where the room behind a leader asks for it."""
+    v, acc, room, b_max, flag = floats[V], floats[ACC], floats[ROOM], floats[B_MAX], floats[FLAG]
+    for i in range(padded(n)):
+        v_new = v[i] + acc[i] * law.dt
+        top = v_new if v_new > v[i] else v[i]
+        flag[i] = 1.0 if top * (top + 2.0 * b_max[i] * law.dt) > room[i] else 0.0
+    for i in range(n):
+        if flag[i] != 0.0:
+            mine = road.types[ints[TYPE, i]]
+            acc[i] = min(acc[i], keep_room(v[i], room[i], mine, law))
+
+
+@njit_inline
+def limit(floats: Floats, n: int, braking: bool) -> None:
+    """Keep within what the brakes can do, and brake where a command says so."""
+    v, acc, b_max = floats[V], floats[ACC], floats[B_MAX]
+    if braking:
+        for i in range(n):
+            brake = floats[BRAKE, i] if v[i] > 0.0 else max(floats[BRAKE, i], 0.0)
+            acc[i] = min(acc[i], brake)
+    for i in range(padded(n)):
+        acc[i] = max(acc[i], -b_max[i])
