@@ -172,7 +172,7 @@ class Intersection:
         free = np.array([k not in forbidden for k in range(len(movements))])
         return _fixed(free & entered[movements.origins] & left[movements.exits])
 
-    @property
+    @cached_property
     def allowed_by_lane(self) -> Bools:
         """The same by lane and manoeuvre, shape (n, n−1)."""
         return self.allowed.reshape(self.n, self.n - 1)
@@ -217,7 +217,7 @@ class Intersection:
         """
         return max(self.lengths[arm] for arm in self.approaches) - self.junction_radius
 
-    @property
+    @cached_property
     def shortest_approach(self) -> float:
         """The same of the shortest approach lane [m]."""
         return min(self.lengths[arm] for arm in self.approaches) - self.junction_radius

@@ -98,7 +98,8 @@ class Path:
     @property
     def line(self) -> shapely.LineString:
         """The centre line as a shapely polyline, from road entry to road end."""
-        return self._alone.lines[0]
+        line: shapely.LineString = self._alone.lines[0]
+        return line
 
 
 @dataclass(frozen=True, eq=False)

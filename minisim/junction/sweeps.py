@@ -218,7 +218,7 @@ def boxes_apart(
     (x, y), (u, v), (w, z) = (np.moveaxis(it, -1, 0) for it in (between, heading, others))
     (a, b), (c, d) = np.moveaxis(half, -1, 0), np.moveaxis(its, -1, 0)
     cos, sin = np.abs(u * w + v * z), np.abs(u * z - v * w)
-    most = np.abs(x * u + y * v) - a - c * cos - d * sin
+    most: Floats = np.abs(x * u + y * v) - a - c * cos - d * sin
     for apart in (
         np.abs(x * v - y * u) - b - c * sin - d * cos,
         np.abs(x * w + y * z) - c - a * cos - b * sin,
@@ -264,7 +264,7 @@ def stretch(intersection: Intersection) -> Floats:
     points = np.array([path.points for path in intersection.paths])
     steps = np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=1)
     each = [path.crossing / (len(path.points) - 1) for path in intersection.paths]
-    return np.maximum(steps / np.array(each), 1.0)
+    return np.asarray(np.maximum(steps / np.array(each), 1.0))
 
 
 def _around(intersection: Intersection, vehicle: VehicleType, longer: Floats) -> Floats:
