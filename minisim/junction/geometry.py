@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import compress, pairwise
 from typing import Any, Literal
@@ -144,6 +144,10 @@ class Intersection:
                 f"(the default here is {smallest:.3g} m)"
             )
         self._check_ways()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What makes it: copies in other processes work out the rest themselves."""
+        return {it.name: getattr(self, it.name) for it in fields(self)}
 
     @property
     def arms(self) -> tuple[Arm, ...]:
