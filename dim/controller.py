@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
 from dim.agent import GATES, Agent, Rules
@@ -173,6 +174,10 @@ def _rests(dim: Dim, looks: float | None, takes: object) -> bool:
     )
 
 
+#: Plans by their values: they are the same in most runs.
+_plan = lru_cache(maxsize=256)(Plan)
+
+
 class DimSession:
     """One run of DIM: hosts an agent for each vehicle that takes part and that `follows` DIM.
 
@@ -201,7 +206,7 @@ class DimSession:
         half_green = (zones.green / 2.0,) if dim.commit == "paper" else ()
         entry = (0.0,) if dim.gate == "harmonious" else ()
         looks = dim.perception.period
-        self.plan = Plan(
+        self.plan = _plan(
             hold_distance=zones.green,
             markings=zones.markings(site),
             marks=(zones.yellow_start, *half_green, *entry),

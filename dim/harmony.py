@@ -19,7 +19,7 @@ from typing import NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from minisim.errors import FileError, InputError, instance, integer, show
+from minisim.errors import FileError, InputError, instance, integer, number, show
 from minisim.files import read_file, write_text
 from minisim.fleet import Fleet, Vehicles
 from minisim.junction.conflicts import CLEARANCE, conflicts
@@ -69,8 +69,8 @@ class HarmonyMatrix:
         vehicles = VehicleType() if vehicles is None else vehicles
         instance("vehicles", vehicles, (VehicleType, Fleet))
         # Movements of one arm share their start: they are at distance 0 and in conflict too.
-        types = len(vehicles.types) if by_type else 1
-        return cls(intersection.n, ~conflicts(intersection, vehicles, clearance, by_type), types)
+        number("clearance [m]", clearance, low=0, high=10)
+        return _measured(intersection, vehicles, float(clearance), bool(by_type))
 
     @classmethod
     def paper(cls, n: int) -> HarmonyMatrix:
@@ -149,6 +149,14 @@ class HarmonyMatrix:
         digest = hashlib.sha256(self.values.tobytes()).hexdigest()[:8]
         pairs = int(self.values.sum()) // 2
         return f"<HarmonyMatrix of {self.n} arms, {pairs} pairs in harmony, {digest}>"
+
+
+@lru_cache(maxsize=256)
+def _measured(
+    intersection: Intersection, vehicles: Vehicles, clearance: float, by_type: bool
+) -> HarmonyMatrix:
+    values = ~conflicts(intersection, vehicles, clearance, by_type)
+    return HarmonyMatrix(intersection.n, values, len(vehicles.types) if by_type else 1)
 
 
 @lru_cache(maxsize=len(PAPER_ARMS))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from minisim.control import COMMIT_MARGIN, Marking, Site, stopping_distance
 from minisim.errors import InputError
 from minisim.laws import STOP_LINE_GAP
@@ -51,8 +53,10 @@ class Zones:
         to 20 km/h at 2 m/s². In a red zone that is too short for this, the limit begins with the
         yellow zone, and vehicles begin to brake before the red zone.
         """
-        b = site.vehicle.deceleration
-        braking = stopping_distance(site.speed_limit, b) - stopping_distance(self.red_speed, b)
+        return _markings(self, site.vehicle.deceleration, site.speed_limit)
+
+    def _stretches(self, b: float, limit: float) -> tuple[Marking, ...]:
+        braking = stopping_distance(limit, b) - stopping_distance(self.red_speed, b)
         slowed = min(max(self.red_start - braking, self.yellow_start), self.red_start)
         stretches = (
             ("red", self.red_start, slowed, None),
@@ -76,3 +80,8 @@ class Zones:
                 f"the zones are {self.red_start:g} m long, but the approach lanes leave only "
                 f"{room:.4g} m in front of an inserted vehicle; increase arm_length"
             )
+
+
+@lru_cache(maxsize=64)
+def _markings(zones: Zones, deceleration: float, limit: float) -> tuple[Marking, ...]:
+    return zones._stretches(deceleration, limit)

@@ -113,6 +113,8 @@ def _column(name: str, value: npt.ArrayLike, dtype: type) -> npt.NDArray[np.gene
         raise wanted from None
     if raw.ndim != 1 or raw.dtype.kind not in "iuf":
         raise wanted
+    if raw.dtype == dtype:
+        return raw
     with np.errstate(invalid="ignore", over="ignore"):
         column: npt.NDArray[np.generic] = raw.astype(dtype)
     if not np.array_equal(column, raw, equal_nan=True):

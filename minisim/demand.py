@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -108,8 +108,9 @@ class ArrivalModel:
         veh/h/lane, in 0.4 % of the lane-seconds.)
         """
         number("duration [s]", duration, above=0, high=MAX_TIME)
-        self.check(n, duration, allowed)
-        inflow, shares = self.inflow(n, allowed), self.turning(n, allowed)
+        inflow, bounds = _laid_out(
+            self, n, duration, None if allowed is None else allowed.tobytes()
+        )
         rng = stream(seed, "arrivals")
         if self.model == "poisson":
             time, lane = counted(inflow, duration, rng)
@@ -118,9 +119,21 @@ class ArrivalModel:
             time, lane = spaced(inflow, shift, duration, rng)
         rank = ranks(lane)
         draws = stream(seed, "manoeuvres").random((rank.max(initial=-1) + 1, n))[rank, lane]
-        bounds = np.cumsum(shares, axis=2)
-        bounds = (bounds / bounds[..., -1:])[inflow.period(time), lane]
-        return Arrivals(time, lane, (bounds <= draws[:, None]).sum(axis=1) + 1)
+        passed = bounds[inflow.period(time), lane] <= draws[:, None]
+        return Arrivals(time, lane, passed.sum(axis=1) + 1)
+
+
+@lru_cache(maxsize=64)
+def _laid_out(
+    demand: ArrivalModel, n: int, duration: float, allowed: bytes | None
+) -> tuple[Inflow, Floats]:
+    """The inflow, and where each manoeuvre's share ends, (p, n, n−1), after `check`."""
+    open_ = None if allowed is None else np.frombuffer(allowed, bool).reshape(n, n - 1)
+    demand.check(n, duration, open_)
+    bounds = np.cumsum(demand.turning(n, open_), axis=2)
+    bounds /= bounds[..., -1:].copy()
+    bounds.setflags(write=False)
+    return demand.inflow(n, open_), bounds
 
 
 @declared(kw_only=True)

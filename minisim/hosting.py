@@ -27,6 +27,7 @@ from minisim.control import (
     View,
     Wake,
     as_controller,
+    keeps,
 )
 from minisim.engine.collision import Collision
 from minisim.errors import (
@@ -112,7 +113,7 @@ class Hosted:
         """
         try:
             commands = _listed(self.session.decide(view))
-            if 0.0 < view.time <= self.scenario.warmup and isinstance(self.session, Counting):
+            if 0.0 < view.time <= self.scenario.warmup and keeps(self.session, Counting):
                 self.before.update(self.session.counts)
             for command in commands:
                 _check_command(command, tick, self.site, len(self.arrivals))
@@ -130,10 +131,10 @@ class Hosted:
         """The result; `measured` are the fields of `Run` that only the host knows."""
         session, lanes, ranks = self.session, self.arrivals.lane, self.arrivals.rank
         try:
-            counts = dict(session.counts) if isinstance(session, Counting) else {}
+            counts = dict(session.counts) if keeps(session, Counting) else {}
             counts |= {name: round(counts[name] - was, 6) for name, was in self.before.items()}
             kinds: tuple[str, ...] = ()
-            if isinstance(session, Kinds):
+            if keeps(session, Kinds):
                 kinds = tuple(map(session.kind, lanes.tolist(), ranks.tolist()))
         except (Exception, SystemExit) as error:  # a caller's code may raise anything
             raise _blame(self.controller, error, session) from error
@@ -200,7 +201,7 @@ def start(controller: Controller, site: Site) -> tuple[Session, Plan]:
     except (Exception, SystemExit) as error:  # a caller's code may raise anything
         raise _blame(controller, error, controller) from error
     try:
-        if not isinstance(plan, Plan) or not isinstance(session, Session):
+        if not isinstance(plan, Plan) or not keeps(session, Session):
             raise InputError(f"start() must return a Session with a Plan, got {show(session)}")
         if plan.period is not None:
             site.period("period of the plan", plan.period)

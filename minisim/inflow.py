@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -74,12 +74,10 @@ def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[
 
     Periods must start at whole seconds. Each number drawn belongs to a lane and a second.
     """
-    k = np.arange(MOST_IN_A_SECOND)
     times: list[Floats] = []
     lanes: list[Ints] = []
     for begin, end, rates in inflow.spans(math.ceil(duration)):
-        chances = np.exp(-rates)[:, None] * rates[:, None] ** k / np.cumprod(np.maximum(k, 1))
-        at_most = chances.cumsum(axis=1)  # chance of at most k vehicles in a second, (n, k)
+        at_most = _at_most(tuple(rates.tolist()))
         for start in range(int(begin), int(end), BLOCK):
             draws = rng.random((min(BLOCK, int(end) - start), len(rates)))
             second, lane = np.nonzero(draws >= at_most[:, 0])
@@ -87,6 +85,16 @@ def counted(inflow: Inflow, duration: float, rng: np.random.Generator) -> tuple[
             times.append(np.repeat(start + second, counts).astype(float))
             lanes.append(np.repeat(lane, counts))
     return np.concatenate(times), np.concatenate(lanes)
+
+
+@lru_cache(maxsize=256)
+def _at_most(rates: tuple[float, ...]) -> Floats:
+    """The chance of at most k vehicles in a second at rates [veh/s], (n, k)."""
+    k, mean = np.arange(MOST_IN_A_SECOND), np.array(rates)[:, None]
+    chances = np.exp(-mean) * mean**k / np.cumprod(np.maximum(k, 1))
+    at_most: Floats = chances.cumsum(axis=1)
+    at_most.setflags(write=False)
+    return at_most
 
 
 def spaced(

@@ -7,6 +7,7 @@ models in `minisim.vehicle`. Hosts move vehicles by these functions, `baselines.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from minisim.carfollowing import (
@@ -23,7 +24,9 @@ from minisim.carfollowing import (
     stop_within,
 )
 from minisim.control import Plan, Site
+from minisim.fleet import Fleet
 from minisim.jit import njit, njit_inline
+from minisim.junction.geometry import Intersection
 from minisim.junction.partings import turning_room
 from minisim.ticks import NEVER, first_tick
 from minisim.vehicle import MODELS, POSITION_EPS, VehicleType
@@ -102,28 +105,35 @@ def build_law(
     record_window: tuple[float, float] = (0.0, math.inf),
 ) -> Law:
     """The scalars of a run."""
-    vehicle = site.vehicle
-    entry = site.intersection.approach_length
+    return _law(site.intersection, site.fleet, site.dt, plan, depart_speed, record, record_window)
+
+
+@lru_cache(maxsize=256)
+def _law(
+    intersection: Intersection, fleet: Fleet, dt: float, plan: Plan, depart_speed: float | None,
+    record: str | None, record_window: tuple[float, float],
+) -> Law:  # fmt: skip
+    vehicle, entry = fleet.worst, intersection.approach_length
     near = record == "junction"
     law = Law(
-        dt=site.dt,
+        dt=dt,
         model=list(MODELS).index(vehicle.model),
-        quartic=all(it.exponent == 4.0 for it in site.types),
-        mixed=len({it.max_deceleration for it in site.types}) > 1,
+        quartic=all(it.exponent == 4.0 for it in fleet.types),
+        mixed=len({it.max_deceleration for it in fleet.types}) > 1,
         semi_implicit=MODELS[vehicle.model].stepwise,
         entry=entry + PAST_THE_END if vehicle.sumo and vehicle.model == "krauss" else entry,
         hold=entry - plan.hold_distance,
         leave=entry + plan.reach,
         longest=vehicle.length,
-        room=turning_room(site.intersection, site.fleet),
+        room=turning_room(intersection, fleet),
         margin=vehicle.margin,
         sumo=vehicle.sumo is not None,
         sight=plan.sight,
         depart_speed=math.inf if depart_speed is None else depart_speed,
         wake_on_clear=plan.wake_on_clear,
         wake_when_empty=plan.wake_when_empty,
-        record_from=first_tick(record_window[0], site.dt) if record else NEVER,
-        record_to=first_tick(record_window[1], site.dt) if record else NEVER,
+        record_from=first_tick(record_window[0], dt) if record else NEVER,
+        record_to=first_tick(record_window[1], dt) if record else NEVER,
         record_start=entry - RECORD_BEFORE if near else -math.inf,
         record_past=RECORD_PAST if near else math.inf,
     )

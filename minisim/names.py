@@ -6,7 +6,8 @@ import dataclasses
 import hashlib
 import inspect
 import keyword
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from numbers import Integral, Real
 from typing import Any
 
@@ -47,17 +48,20 @@ def name_of(controller: Any) -> str:
 def _arguments(recipe: Any) -> str:
     return ",".join(
         f"{name}={spelled_value(getattr(recipe, name), kinds)}"
-        for name, kinds, default in _fields(recipe)
+        for name, kinds, default in _fields(recipe.__class__)
         if getattr(recipe, name) != default
     )
 
 
-def _fields(recipe: Any) -> Iterator[tuple[str, Mapping[str, Callable[..., Any]], Any]]:
-    """Name, kinds (as in `part`) and default of each parameter of a recipe."""
-    known = {name: it.kinds for name, it, _ in parameters(recipe.__class__)}
-    for field in dataclasses.fields(recipe) if dataclasses.is_dataclass(recipe) else ():
-        if field.init and (field.name in known or not known):
-            yield field.name, known.get(field.name, {}), default_of(field)
+@lru_cache(maxsize=256)
+def _fields(kind: type) -> tuple[tuple[str, Mapping[str, Callable[..., Any]], Any], ...]:
+    """Name, kinds (as in `part`) and default of each parameter of a class of recipes."""
+    known = {name: it.kinds for name, it, _ in parameters(kind)}
+    return tuple(
+        (field.name, known.get(field.name, {}), default_of(field))
+        for field in (dataclasses.fields(kind) if dataclasses.is_dataclass(kind) else ())
+        if field.init and (field.name in known or not known)
+    )
 
 
 def spelled_value(value: Any, kinds: Mapping[str, Callable[..., Any]]) -> str:

@@ -118,8 +118,13 @@ def _check_arguments(made: type) -> None:
 
     @functools.wraps(make)
     def init(self: Any, *places: Any, **named: Any) -> None:
+        try:
+            make(self, *places, **named)
+            return
+        except TypeError as error:
+            wrong = error
         bound(made.__name__, signature, places, named)
-        make(self, *places, **named)
+        raise wrong
 
     made.__init__ = init  # type: ignore[misc]  # in its place
 

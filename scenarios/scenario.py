@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from minisim.arrivals import Arrivals
 from minisim.clock import clock
 from minisim.control import Site
@@ -99,6 +101,10 @@ class Scenario:
 
     def site(self, seed: int = 0) -> Site:
         """What a controller may know about the scenario."""
+        return self._site.with_seed(seed)
+
+    @cached_property
+    def _site(self) -> Site:
         junction = self.intersection
         varies = self.recorded is None and isinstance(self.demand, DemandProfile)
         return Site(
@@ -107,7 +113,6 @@ class Scenario:
             speed_limit=self.profile.speed_limit,
             demand=self.rates,
             dt=self.profile.dt,
-            seed=seed,
             inflow=self.demand.inflow(junction.n, junction.allowed_by_lane) if varies else None,
         )
 

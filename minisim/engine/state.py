@@ -7,14 +7,18 @@ Few arguments keep a call into the compiled kernel cheap, since unboxing arrays 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from minisim.arrivals import LEAST_FACTOR, MOST_FACTOR, Arrivals
-from minisim.control import LATERAL_ACCELERATION, Observed, Plan, Site
+from minisim.control import LATERAL_ACCELERATION, Marking, Observed, Plan, Site
+from minisim.fleet import Fleet
 from minisim.jit import COMPILED
+from minisim.junction.geometry import Intersection
 from minisim.junction.partings import branch
 from minisim.junction.paths import Path, trail_of
 from minisim.laws import Traits, traits_of
@@ -108,56 +112,70 @@ class Layout(NamedTuple):
 
 
 def build_layout(site: Site, plan: Plan) -> Layout:
-    """Lay out the paths with the speed profile of the site and the plan's markings."""
-    paths = site.intersection.paths
-    profiles = [_speed_profile(path, site, plan) for path in paths]
+    """Lay out the paths with the speed profile of the site and the plan's markings.
+
+    Runs that differ in nothing of that share it.
+    """
+    limits = tuple(site.limit(arm) for arm in range(site.intersection.n))
+    return _layout(
+        site.intersection, site.fleet, limits, site.speed_limit, plan.markings, plan.marks
+    )
+
+
+@lru_cache(maxsize=64)
+def _layout(
+    intersection: Intersection, fleet: Fleet, limits: tuple[float, ...], speed_limit: float,
+    markings: tuple[Marking, ...], marks: tuple[float, ...],
+) -> Layout:  # fmt: skip
+    paths = intersection.paths
+    profiles = [_speed_profile(intersection, path, limits, markings) for path in paths]
     width = max(len(profile) for profile in profiles) + 1
     start = np.full((len(paths), width), np.inf)
-    speed = np.full((len(paths), width), site.speed_limit)  # of sections that never begin
+    speed = np.full((len(paths), width), speed_limit)  # of sections that never begin
     for p, profile in enumerate(profiles):
         for k, (s, limit) in enumerate(profile):
             start[p, k], speed[p, k] = s, limit
-    marks = sorted(site.intersection.approach_length - distance for distance in plan.marks)
+    ascending = sorted(intersection.approach_length - distance for distance in marks)
     return Layout(
         ends=np.array([(p.exit, p.length, float(p.exit_arm), p.start) for p in paths]),
         shape=np.array([p.points for p in paths]),
         headings=np.array([(*p.heading_in, *p.heading_out) for p in paths]),
         section_start=start,
         section_speed=speed,
-        branch=np.array(branch(site.intersection, site.fleet)),
-        trails=_trails(site),
-        marks=np.array([*marks, np.inf]),
-        types=_types(site),
+        branch=np.array(branch(intersection, fleet)),
+        trails=_trails(intersection, fleet),
+        marks=np.array([*ascending, np.inf]),
+        types=_types(fleet),
     )
 
 
-def _trails(site: Site) -> Floats:
+def _trails(intersection: Intersection, fleet: Fleet) -> Floats:
     """The trails of each type on each path, shape (types, p, points); 0 for chords."""
-    paths = site.intersection.paths
+    paths = intersection.paths
     return np.array([
         [trail_of(path, it.rear_axle).halves if it.rear_axle else np.zeros(len(path.points))
          for path in paths]
-        for it in site.types
+        for it in fleet.types
     ])  # fmt: skip
 
 
-def _types(site: Site) -> Any:
+def _types(fleet: Fleet) -> Any:
     """The traits of the types, as the kernel reads them fastest."""
-    traits = tuple(map(traits_of, site.types))
+    traits = tuple(map(traits_of, fleet.types))
     records = np.array([tuple(it) for it in traits], TRAITS)
     return records.view(np.recarray) if COMPILED else traits
 
 
-def _speed_profile(path: Path, site: Site, plan: Plan) -> list[tuple[float, float]]:
+def _speed_profile(
+    intersection: Intersection, path: Path, limits: Sequence[float], markings: Iterable[Marking]
+) -> list[tuple[float, float]]:
     """Piecewise-constant limit along a path: ascending (start [m], speed [m/s])."""
-    before, behind = site.limit(path.movement.origin), site.limit(path.exit_arm)
-    turn = site.intersection.turn_speed(path.movement, LATERAL_ACCELERATION)
+    before, behind = limits[path.movement.origin], limits[path.exit_arm]
+    turn = intersection.turn_speed(path.movement, LATERAL_ACCELERATION)
     stretches = [(0.0, path.exit, before), (path.entry, path.exit, turn)]
     stretches += [(path.exit, np.inf, behind)]
     stretches += [
-        (path.entry - m.start, path.entry - m.end, m.speed)
-        for m in plan.markings
-        if m.speed is not None
+        (path.entry - m.start, path.entry - m.end, m.speed) for m in markings if m.speed is not None
     ]
     edges = sorted({max(s, 0.0) for *ends, _ in stretches for s in ends if s < np.inf})
     profile: list[tuple[float, float]] = []

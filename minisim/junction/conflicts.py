@@ -21,6 +21,7 @@ from minisim.fleet import Vehicles
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Bools
 from minisim.junction.paths import Floats, Path
+from minisim.junction.sweeps import ROUNDING, SWEEP_STEP, boxed, fronts, least_gap, meeting, sweep
 from minisim.vehicle import VehicleType
 
 Shapes = npt.NDArray[np.object_]
@@ -28,9 +29,6 @@ Shapes = npt.NDArray[np.object_]
 #: Room between two corridors that may be used at the same time [m]: twice the static buffer of
 #: 0.25 m around each body in Dresner & Stone, JAIR 31 (2008), §3.
 CLEARANCE = 0.5
-
-#: Spacing of the bodies that make up a corridor, and of those tested for zones [m].
-SWEEP_STEP = 0.5
 
 #: Spacing of the bodies tested for clearing distances [m]; half the clearance misses none.
 CLEARING_STEP = CLEARANCE / 2.0
@@ -52,14 +50,9 @@ class Areas(NamedTuple):
 
 def corridor(path: Path, vehicles: Vehicles) -> shapely.Geometry:
     """The area that bodies sweep from when their front enters until their rear has left."""
-    pairs = []
-    for vehicle in vehicles.types:
-        first, last = path.entry, path.exit + vehicle.length
-        count = math.ceil((last - first) / SWEEP_STEP) + 1
-        corners = path.bodies(np.linspace(first, last, count), vehicle)
-        pairs.append(np.concatenate([corners[:-1], corners[1:]], axis=1))
-    hulls = shapely.convex_hull(shapely.multipoints(np.concatenate(pairs)))
-    return shapely.union_all(hulls)
+    rows = [path.bodies(fronts(path, it), it) for it in vehicles.types]
+    pairs = np.concatenate([np.concatenate([it[:-1], it[1:]], axis=1) for it in rows])
+    return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
 
 
 def bodies(path: Path, fronts: Floats, vehicle: VehicleType) -> Shapes:
@@ -95,7 +88,26 @@ def conflicts(
 ) -> Bools:  # fmt: skip
     """Whether two movements come closer than `clearance` [m]; shapes as `separation`, symmetric."""
     number("clearance [m]", clearance, low=0, high=10)
-    return np.asarray(separation(intersection, vehicles, by_type) <= clearance)
+    return _conflicts(intersection, vehicles, float(clearance), by_type)
+
+
+@lru_cache(maxsize=256)
+def _conflicts(
+    intersection: Intersection, vehicles: Vehicles, clearance: float, by_type: bool
+) -> Bools:
+    kinds: tuple[Vehicles, ...] = vehicles.types if by_type else (vehicles,)
+    m, apart = len(intersection.paths), intersection.movements.apart
+    result = ~np.tile(apart, (len(kinds), len(kinds)))
+    pairs = np.argwhere(np.triu(~result))
+    near, sure = meeting(intersection, kinds, clearance, pairs)
+    for k in np.flatnonzero(~sure).tolist():
+        rows = pairs[k].tolist()
+        swept = _prepared([corridor(intersection.paths[r % m], kinds[r // m]) for r in rows])
+        near[k] = shapely.distance(*swept) <= clearance
+    i, j = pairs[near].T
+    result[i, j] = result[j, i] = True
+    result.setflags(write=False)
+    return result
 
 
 @lru_cache(maxsize=256)
@@ -107,30 +119,40 @@ def entry_room(intersection: Intersection, vehicles: Vehicles) -> float:
     beside its own approach lane either: its overhang swings out. How far such a body stands off its
     lane only falls beyond the exit, so farther out it touches none either.
     """
-    entry, movements = intersection.approach_length, intersection.movements
-    arms, allowed = intersection.approaches, intersection.allowed
+    movements, allowed, arms = intersection.movements, intersection.allowed, intersection.approaches
     firsts = [intersection.paths[movements.rows[arm][1]] for arm in arms]
-    bodies_held = [[path.bodies(entry, it) for it in vehicles.types] for path in firsts]
-    held = np.array([shapely.MultiPolygon([(c, ()) for c in four]) for four in bodies_held])
-    distance = shapely.distance(corridors(intersection, vehicles)[:, None], held[None, :])
-    others = allowed[:, None] & (movements.origins[:, None] != np.array(arms))
-    room = float(distance[others].min(initial=math.inf))
+    held = np.array([
+        [path.bodies(intersection.approach_length, it) for path in firsts] for it in vehicles.types
+    ]).reshape(-1, 4, 2)  # fmt: skip
+    others = allowed[:, None] & (movements.origins[:, None] != np.tile(arms, len(vehicles.types)))
+    room = _least_gap(intersection, vehicles, held, others)
     if any(it.rear_axle is not None for it in vehicles.types):
-        room = min(room, *(_tail_room(intersection, vehicles, arm) for arm in arms))
-    return room
+        strips, own = zip(*(_tail(intersection, vehicles, arm) for arm in arms), strict=True)
+        room = min(room, _least_gap(intersection, vehicles, np.array(strips), np.array(own).T))
+    return room if room > ROUNDING else 0.0
 
 
-def _tail_room(intersection: Intersection, vehicles: Vehicles, arm: int) -> float:
-    """Smallest distance [m] between corridors from an arm and bodies that leave by it."""
+def _least_gap(
+    intersection: Intersection, vehicles: Vehicles, shapes: Floats, which: Bools
+) -> float:
+    """Smallest distance [m] between corridors and convex shapes, of the pairs in `which`."""
+    sweeps, others = [sweep(intersection, it) for it in vehicles.types], boxed(shapes)
+    return min(least_gap(it.hulls, others, *np.nonzero(which[it.path[it.first]])) for it in sweeps)
+
+
+def _tail(intersection: Intersection, vehicles: Vehicles, arm: int) -> tuple[Floats, Bools]:
+    """Where bodies leave by an arm, as the corners of a strip, and which movements begin there."""
     movements, allowed = intersection.movements, intersection.allowed
     leaving = np.flatnonzero(allowed & (movements.exits == arm))
-    if not len(leaving):
-        return math.inf
-    path, far = intersection.paths[leaving[0]], 2.0 * max(it.length for it in vehicles.types)
-    lane = shapely.LineString([path.points[-1], path.points[-1] + far * path.heading_out])
-    strip = lane.buffer(max(it.width for it in vehicles.types) / 2.0, cap_style="flat")
-    own = corridors(intersection, vehicles)[allowed & (movements.origins == arm)]
-    return float(shapely.distance(own, strip).min())
+    path = intersection.paths[leaving[0] if len(leaving) else 0]
+    far, wide = (
+        2.0 * max(it.length for it in vehicles.types),
+        max(it.width for it in vehicles.types),
+    )
+    across = np.array([-path.heading_out[1], path.heading_out[0]]) * wide / 2.0
+    near, end = path.points[-1], path.points[-1] + far * path.heading_out
+    own = allowed & (movements.origins == arm) & bool(len(leaving))
+    return np.array([near + across, near - across, end - across, end + across]), own
 
 
 @lru_cache(maxsize=256)

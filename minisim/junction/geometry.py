@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import compress, pairwise
 from typing import Any, Literal
@@ -21,7 +21,7 @@ import numpy as np
 from minisim.errors import InputError, instance, items, number, numbers
 from minisim.fields import Takes
 from minisim.junction.movements import ARM_NAMES, Bools, Movement, Movements, movements_of
-from minisim.junction.paths import Path, Way
+from minisim.junction.paths import Bundle, Path, Way
 from minisim.junction.roads import Road
 from minisim.junction.tracing import MIN_PATH_RADIUS, build_path, smallest_radius
 from minisim.parameters import Reals, checked, declared, part, real, word
@@ -145,6 +145,10 @@ class Intersection:
             )
         self._check_ways()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What makes it: copies in other processes work out the rest themselves."""
+        return {it.name: getattr(self, it.name) for it in fields(self)}
+
     @property
     def arms(self) -> tuple[Arm, ...]:
         """The arms, clockwise from north."""
@@ -172,7 +176,7 @@ class Intersection:
         free = np.array([k not in forbidden for k in range(len(movements))])
         return _fixed(free & entered[movements.origins] & left[movements.exits])
 
-    @property
+    @cached_property
     def allowed_by_lane(self) -> Bools:
         """The same by lane and manoeuvre, shape (n, n−1)."""
         return self.allowed.reshape(self.n, self.n - 1)
@@ -217,7 +221,7 @@ class Intersection:
         """
         return max(self.lengths[arm] for arm in self.approaches) - self.junction_radius
 
-    @property
+    @cached_property
     def shortest_approach(self) -> float:
         """The same of the shortest approach lane [m]."""
         return min(self.lengths[arm] for arm in self.approaches) - self.junction_radius
@@ -247,6 +251,11 @@ class Intersection:
     def paths(self) -> tuple[Path, ...]:
         """One path per movement, in the order of `movements`."""
         return tuple(build_path(self, m) for m in self.movements)
+
+    @cached_property
+    def bundle(self) -> Bundle:
+        """The same paths, for places on many of them at once."""
+        return Bundle(self.paths)
 
     def turn_speed(self, movement: Movement, lateral: float) -> float:
         """Speed [m/s] at which the arc needs the lateral acceleration `lateral` [m/s²].

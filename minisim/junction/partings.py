@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -12,8 +12,13 @@ import shapely
 
 from minisim.fleet import Fleet, Vehicles
 from minisim.junction.geometry import Intersection
+from minisim.junction.movements import Ints
 from minisim.junction.paths import Floats, Path
+from minisim.junction.sweeps import ROUNDING, boxes_apart, stretch, swing
 from minisim.vehicle import VehicleType
+
+#: Rear bumpers are tried at this spacing, up to this far beyond the exit [m].
+BRANCH_STEP, BEYOND = 0.25, 60.0
 
 #: Extra lateral room needed before a vehicle turning off no longer obstructs the lane [m].
 BRANCH_ROOM = 0.5
@@ -27,18 +32,54 @@ def branch(intersection: Intersection, vehicles: Vehicles) -> Floats:
     It is infinite for the same path, and 0 between lanes.
     """
     room = max(it.width for it in vehicles.types) + BRANCH_ROOM
-    dragging = [it for it in vehicles.types if it.rear_axle is not None]
+    rears = [None, *(it for it in vehicles.types if it.rear_axle is not None)]
+    paths, apart = intersection.paths, intersection.movements.apart
+    lines = intersection.bundle.lines
+    pairs = np.argwhere(~apart & ~np.eye(len(apart), dtype=bool))
+    stops = [path.exit + BEYOND for path in paths]
+    places, counts = _places(intersection, stops, BRANCH_STEP)
+    drift = BRANCH_STEP * _pace(intersection, rears)
+    last, open_ = counts[pairs[:, 0]] - 1, np.arange(len(pairs))
+    while len(open_):
+        p, q = pairs[open_].T
+        s = places[last[open_]]
+        gaps = np.min([
+            shapely.distance(lines[q], shapely.points(_rears(intersection, p, s, it)))
+            for it in rears
+        ], axis=0)  # fmt: skip
+        open_, far = open_[gaps >= room], gaps[gaps >= room]
+        free = (far - room - ROUNDING) / drift[pairs[open_, 0]]
+        last[open_] -= np.maximum(free.astype(int), 1)
+    result = np.where(apart, 0.0, math.inf)
+    result[tuple(pairs.T)] = places[last] + BRANCH_STEP
+    result.setflags(write=False)
+    return result
 
-    def last_near(path: Path, other: Path) -> float:
-        s = np.arange(path.entry, path.exit + 60.0, 0.25)
-        rears = [path.position(s)]  # on the path, or beside it where the rear axle is dragged
-        for it in dragging:
-            centre, heading = path.pose(s + it.length, it)
-            rears.append(centre - heading * (it.length / 2.0))
-        gaps = shapely.distance(shapely.points(np.array(rears)), other.line).min(axis=0)
-        return float(s[np.flatnonzero(gaps < room)[-1]]) + 0.25
 
-    return _by_lane(intersection, 0.0, last_near)
+def _places(intersection: Intersection, stops: npt.ArrayLike, step: float) -> tuple[Floats, Ints]:
+    """Places from the entry up to the farthest of `stops` [m], and how many are before each."""
+    counts = np.ceil(np.subtract(stops, intersection.approach_length) / step).astype(int)
+    return np.arange(intersection.approach_length, np.max(stops), step), counts
+
+
+def _rears(
+    intersection: Intersection, which: Ints, s: Floats, dragging: VehicleType | None
+) -> Floats:
+    """Rear bumpers of bodies that have driven to `s` (…, 2) [m]: on the path, or dragged off it."""
+    if dragging is None:
+        return intersection.bundle.position(which, s)
+    centre, heading = intersection.bundle.pose(which, s + dragging.length, dragging)
+    return np.asarray(centre - heading * (dragging.length / 2.0))
+
+
+def _pace(intersection: Intersection, dragging: Sequence[VehicleType | None]) -> Floats:
+    """How far a rear bumper moves per metre of `s`, at most, shape (m,).
+
+    Where the front bumper moves at an angle φ to the body, the rear one moves by cos φ along it and
+    by (1 − length/axle)·sin φ across it, see `minisim.junction.paths.Trail`.
+    """
+    across = [1.0 - it.length / it.rear_axle for it in dragging if it and it.rear_axle]
+    return stretch(intersection) * max(1.0, *map(abs, across), 1.0)
 
 
 @lru_cache(maxsize=256)
@@ -51,34 +92,25 @@ def turning_room(intersection: Intersection, fleet: Fleet) -> float:
     """
     vehicle, reach = fleet.worst, branch(intersection, fleet)
     gaps = np.arange(0.0, 3.0, 0.1) * vehicle.width
-    paths, least = intersection.paths, 0.0
-    allowed = intersection.allowed
-    for p, q in np.argwhere((reach > 0.0) & allowed & allowed[:, None]).tolist():
-        path = paths[p]
-        rear = np.arange(path.entry, min(float(reach[p, q]), path.exit + vehicle.length), 0.3)
-        first = path.pose(rear + vehicle.length, vehicle)
-        second = paths[q].pose(np.subtract.outer(gaps, rear) * -1.0, vehicle)
-        touching = gaps[_overlap(first, second, vehicle).any(axis=-1)]
-        least = max(least, *touching) if len(touching) else least
-    return float(least) + 0.1 * vehicle.width
-
-
-def _overlap(
-    first: tuple[Floats, Floats], second: tuple[Floats, Floats], vehicle: VehicleType
-) -> npt.NDArray[np.bool_]:
-    """Whether bodies overlap, given by centres and headings (..., 2): separating-axis test."""
-    apart, (u, w) = first[0] - second[0], np.broadcast_arrays(first[1], second[1])
-    cos = np.abs((u * w).sum(axis=-1))
-    sin = np.abs(u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0])
-    long, wide = vehicle.length / 2.0, vehicle.width / 2.0
-    meet = np.ones(cos.shape, bool)
-    for axis in (u, w):
-        along = np.abs((apart * axis).sum(axis=-1))
-        across = np.abs(apart[..., 0] * axis[..., 1] - apart[..., 1] * axis[..., 0])
-        meet &= (along <= long + long * cos + wide * sin) & (
-            across <= wide + long * sin + wide * cos
-        )
-    return meet
+    allowed, bundle = intersection.allowed, intersection.bundle
+    p, q = np.nonzero((reach > 0.0) & allowed & allowed[:, None])
+    ends = np.array([path.exit for path in intersection.paths]) + vehicle.length
+    places, counts = _places(intersection, np.minimum(reach[p, q], ends[p]), 0.3)
+    pair = np.repeat(np.arange(len(p)), counts)
+    p, q = p[pair], q[pair]
+    rear = places[np.arange(len(pair)) - (counts.cumsum() - counts)[pair]]
+    centre, heading = bundle.pose(p, rear + vehicle.length, vehicle)
+    half = np.array([vehicle.length, vehicle.width]) / 2.0
+    pace = swing(intersection, vehicle) * gaps[1]
+    k, least = np.full(len(pair), len(gaps) - 1), 0
+    while len(k):  # from the largest gap down: bodies that are far apart stay apart for a while
+        other, its = bundle.pose(q, rear - gaps[k], vehicle)
+        room = boxes_apart(centre - other, heading, its, half, half)
+        least = max(least, int(k[room <= 0.0].max(initial=0)))
+        k = k - np.maximum(((room - ROUNDING) / pace[q]).astype(int), 1)
+        left = k > least
+        k, q, rear, centre, heading = (it[left] for it in (k, q, rear, centre, heading))
+    return float(gaps[least]) + 0.1 * vehicle.width
 
 
 @lru_cache(maxsize=64)

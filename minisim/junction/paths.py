@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from minisim.junction.movements import Movement
 from minisim.vehicle import VehicleType
 
 Floats = npt.NDArray[np.float64]
+Indices = int | npt.NDArray[np.int64]
 
 #: Segments of an arc's polyline; the chord error at radius 5.6 m is 4 mm.
 ARC_SEGMENTS = 32
@@ -78,56 +79,114 @@ class Path:
         (ax, ay), (bx, by) = self.heading_in.tolist(), self.heading_out.tolist()
         return math.atan2(ax * by - ay * bx, ax * bx + ay * by)
 
+    @cached_property
+    def _alone(self) -> Bundle:
+        return Bundle((self,))
+
     def position(self, s: npt.ArrayLike) -> Floats:
         """x, y [m] at `s`, shape (..., 2); straight on beyond both ends. See `locate` too."""
-        s = np.asarray(s, dtype=float)
-        step = self.crossing / ARC_SEGMENTS
-        t = np.clip((s - self.entry) / step, 0.0, ARC_SEGMENTS)
-        k = np.minimum(t.astype(int), ARC_SEGMENTS - 1)
-        w = (t - k)[..., None]
-        inside = self.points[k] * (1.0 - w) + self.points[k + 1] * w
-        before = np.minimum(s - self.entry, 0.0)[..., None] * self.heading_in
-        after = np.maximum(s - self.exit, 0.0)[..., None] * self.heading_out
-        return np.asarray(inside + before + after)
+        return self._alone.position(0, s)
 
     def pose(self, s: npt.ArrayLike, vehicle: VehicleType) -> tuple[Floats, Floats]:
+        """Centre and heading of a body whose front bumper is at `s`, see `Bundle.pose`."""
+        return self._alone.pose(0, s, vehicle)
+
+    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
+        """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
+        return self._alone.bodies(0, s, vehicle)
+
+    @property
+    def line(self) -> shapely.LineString:
+        """The centre line as a shapely polyline, from road entry to road end."""
+        line: shapely.LineString = self._alone.lines[0]
+        return line
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """Several paths side by side, for places on many of them at once.
+
+    Each method takes the paths by their index, which broadcasts with `s` [m].
+    """
+
+    paths: tuple[Path, ...]
+
+    @cached_property
+    def _table(self) -> tuple[Floats, ...]:
+        """Entry, exit, metres per segment, and headings (x in, y in, x out, y out), by path."""
+        rows = [
+            (it.entry, it.exit, it.crossing / ARC_SEGMENTS, *it.heading_in, *it.heading_out)
+            for it in self.paths
+        ]
+        return tuple(np.array(rows, float).T.copy())
+
+    @cached_property
+    def _points(self) -> tuple[Floats, Floats]:
+        """x and y of all points, path by path."""
+        x, y = np.concatenate([it.points for it in self.paths]).T.copy()
+        return x, y
+
+    @cached_property
+    def lines(self) -> npt.NDArray[np.object_]:
+        """`Path.line` of each."""
+        ends = np.array([[it.start, it.length] for it in self.paths])
+        begin, end = np.moveaxis(self.position(np.arange(len(ends))[:, None], ends), 1, 0)
+        inside = np.array([it.points for it in self.paths])
+        points = np.concatenate([begin[:, None], inside, end[:, None]], axis=1)
+        return np.asarray(shapely.linestrings(points))
+
+    def position(self, which: Indices, s: npt.ArrayLike) -> Floats:
+        """x, y [m] at `s`, shape (..., 2); straight on beyond both ends."""
+        entry, end, step, *headings = (column[which] for column in self._table)
+        s = np.asarray(s, dtype=float)
+        past = s - entry
+        t = np.clip(past / step, 0.0, ARC_SEGMENTS)
+        k = np.minimum(t.astype(int), ARC_SEGMENTS - 1)
+        w = t - k
+        k = k + np.multiply(which, ARC_SEGMENTS + 1)
+        before, after, rest = np.minimum(past, 0.0), np.maximum(s - end, 0.0), 1.0 - w
+        return np.stack([
+            points.take(k) * rest + points.take(k + 1) * w + before * enters + after * leaves
+            for points, enters, leaves in zip(
+                self._points, headings[:2], headings[2:], strict=True
+            )
+        ], axis=-1)  # fmt: skip
+
+    def pose(self, which: Indices, s: npt.ArrayLike, vehicle: VehicleType) -> tuple[Floats, Floats]:
         """Centre (..., 2) [m] and unit heading (..., 2) of a body whose front bumper is at `s`.
 
         The middle of the front bumper lies on the path. Without a `rear_axle`, that of the rear
         bumper does too, so the body is the chord between them; otherwise see `Trail`.
         """
-        front = self.position(s)
+        front = self.position(which, s)
         if vehicle.rear_axle is not None:
-            heading = self._dragged(s, vehicle.rear_axle)
+            heading = self._dragged(which, s, vehicle.rear_axle)
         else:
-            along = front - self.position(np.asarray(s, dtype=float) - vehicle.length)
+            along = front - self.position(which, np.asarray(s, dtype=float) - vehicle.length)
             heading = along / np.linalg.norm(along, axis=-1, keepdims=True)
         return front - heading * (vehicle.length / 2.0), heading
 
-    def _dragged(self, s: npt.ArrayLike, axle: float) -> Floats:
+    def _dragged(self, which: Indices, s: npt.ArrayLike, axle: float) -> Floats:
         """Unit heading (..., 2) of a body that drags a rear axle, with its front bumper at `s`."""
-        trail, s = trail_of(self, axle), np.asarray(s, dtype=float)
-        t = np.clip((s - self.entry) / self.crossing * ARC_SEGMENTS, 0.0, ARC_SEGMENTS)
+        trails, s = [trail_of(path, axle) for path in self.paths], np.asarray(s, dtype=float)
+        along, lengths, halves = map(np.concatenate, zip(*trails, strict=True))
+        entry, end = (column[which] for column in self._table[:2])
+        t = np.clip((s - entry) / (end - entry) * ARC_SEGMENTS, 0.0, ARC_SEGMENTS)
         k = t.astype(int)
-        driven = (t - k) * trail.lengths[k] + np.maximum(s - self.exit, 0.0)
-        half = trail.halves[k] * np.exp(-driven / axle)
-        (x, y), norm = np.moveaxis(trail.along[k], -1, 0), 1.0 + half * half
+        at = k + np.multiply(which, ARC_SEGMENTS + 1)
+        driven = (t - k) * lengths[at] + np.maximum(s - end, 0.0)
+        half = halves[at] * np.exp(-driven / axle)
+        (x, y), norm = np.moveaxis(along[at], -1, 0), 1.0 + half * half
         cos, sin = (1.0 - half * half) / norm, 2.0 * half / norm
         return np.stack([x * cos - y * sin, x * sin + y * cos], axis=-1)
 
-    def bodies(self, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
+    def bodies(self, which: Indices, s: npt.ArrayLike, vehicle: VehicleType) -> Floats:
         """Corners (..., 4, 2) [m] of the vehicle's oriented rectangle with its front at `s`."""
-        centre, heading = self.pose(s, vehicle)
+        centre, heading = self.pose(which, s, vehicle)
         along = heading * (vehicle.length / 2.0)
         across = np.stack([-heading[..., 1], heading[..., 0]], axis=-1) * (vehicle.width / 2.0)
         corners = [along + across, along - across, -along - across, -along + across]
         return np.stack([centre + corner for corner in corners], axis=-2)
-
-    @property
-    def line(self) -> shapely.LineString:
-        """The centre line as a shapely polyline, from road entry to road end."""
-        ends = self.position([self.start, self.length])
-        return shapely.LineString(np.vstack([ends[:1], self.points, ends[1:]]))
 
 
 class Trail(NamedTuple):

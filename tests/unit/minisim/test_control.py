@@ -7,7 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from minisim.control import COMMIT_MARGIN, Marking, Plan, Site, can_stop, stopping_distance
+from minisim.control import (
+    COMMIT_MARGIN,
+    Controller,
+    Counting,
+    Kinds,
+    Marking,
+    Plan,
+    Session,
+    Site,
+    Unregulated,
+    can_stop,
+    keeps,
+    stopping_distance,
+)
 from minisim.errors import InputError
 from minisim.junction.geometry import Intersection
 from minisim.junction.movements import Movement
@@ -75,3 +88,24 @@ def test_markings_are_checked() -> None:
             Plan(markings=markings)
     with pytest.raises(InputError, match=r"start of marking red .* above 30"):
         Marking("red", 8.0, 30.0)
+
+
+def test_keeps_agrees_with_isinstance() -> None:
+    """Members may be of the class or of the object; a method that is None is none."""
+
+    class Own:
+        def __init__(self, **members: Any) -> None:
+            vars(self).update(members)
+
+    def call(*_: Any) -> list[Any]:
+        return []
+
+    values = [
+        Unregulated(), Unregulated().start(SITE), Own(), Own(plan=None, decide=call), Unregulated,
+        Own(plan=Plan(), decide=None), Own(name=None, start=call), Own(start=call), None, 3,
+        Own(plan=Plan(), decide=call, counts={}), Own(plan=Plan(), decide=call, kind=call),
+    ]  # fmt: skip
+    for protocol in (Controller, Session, Counting, Kinds):
+        kept = [keeps(value, protocol) for value in values]
+        assert kept == [isinstance(value, protocol) for value in values]
+        assert 0 < sum(kept) < len(values)
