@@ -180,11 +180,13 @@ def test_no_vehicle_brakes_beyond_its_brakes(controller: Controller, model: str)
         assert hardest_braking(run) <= run.site.vehicle.max_deceleration + 1e-6
 
 
-def test_sessions_see_the_same() -> None:
+@pytest.mark.parametrize("rests", [False, True])
+def test_sessions_see_the_same(rests: bool) -> None:
     """Marks, clearing, order, ids and numbers of the views; SUMO rounds nothing."""
     plan = Plan(
-        marks=(100.0, 30.0, 0.0), wake_on_clear=True, sight=120, lanes_open=True, period=7.3
-    )
+        marks=(100.0, 30.0, 0.0), wake_on_clear=True, wake_when_empty=rests, sight=120,
+        lanes_open=True, period=7.3,
+    )  # fmt: skip
     scenario = replayed(
         FAIR_FOUR, (0.0, 0, 2), (2.0, 1, 2), (4.0, 2, 2), (6.0, 3, 2), (18.0, 3, 1), horizon=120.0
     )

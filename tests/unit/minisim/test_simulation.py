@@ -247,6 +247,19 @@ def test_wake_ups_come_on_the_tick(plan: Plan, answer: Any, step: float) -> None
     assert times == pytest.approx(np.arange(0.0, 7.01, step))
 
 
+def test_a_session_may_rest_while_the_junction_is_occupied() -> None:
+    demanded = (0.0, 0, 2), (2.5, 0, 2), (2.5, 2, 1), (9.0, 0, 2)
+    scenario = replayed(four_way(), *demanded, horizon=100.0)
+    views: dict[bool, list[View]] = {False: [], True: []}
+    for rests, seen in views.items():
+        plan = Plan(marks=(20.0,), wake_on_clear=True, wake_when_empty=rests, lanes_open=True)
+        noting = Scripted(lambda view, seen=seen: seen.append(view) or (), plan)  # type: ignore[misc]
+        minisim.simulate(scenario, noting)
+    empty = [it for it in views[False] if all(v.distance >= 0.0 for v in it.vehicles)]
+    assert views[True] == empty
+    assert 3 < len(empty) < len(views[False])
+
+
 def test_collision_stops_the_run_with_a_replayable_report() -> None:
     scenario = replayed(four_way(), (0.0, 0, 2), (0.0, 1, 2), horizon=100.0)
     with pytest.raises(CollisionError) as caught:

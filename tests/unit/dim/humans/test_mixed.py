@@ -112,11 +112,12 @@ def test_a_gap_in_a_stream_that_is_not_in_the_way_needs_no_waiting() -> None:
 
 
 def test_what_the_host_has_to_provide() -> None:
-    """DIM's plan, the entry as one more mark, and sight as far as the longest gap at the limit."""
+    """DIM without its rest, a mark at the entry, sight as far as the longest gap at the limit."""
     alone, plan = MIXED.dim.start(SITE).plan, MIXED.start(SITE).plan
     assert plan.marks == (*alone.marks, 0.0)
     assert plan.sight == pytest.approx(7.1 * SITE.speed_limit)
-    assert replace(plan, marks=alone.marks, sight=alone.sight) == alone
+    awake = replace(alone, wake_when_empty=False)
+    assert replace(plan, marks=alone.marks, sight=alone.sight) == awake != alone
     harmonious = Dim(gate="harmonious")
     assert Mixed(harmonious).start(SITE).plan.marks == harmonious.start(SITE).plan.marks
     differing = Mixed(humans=Humans(deviation=0.25)).start(SITE).plan

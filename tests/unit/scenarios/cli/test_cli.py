@@ -532,6 +532,7 @@ BAD = [
     (("reproduce", "--only", "text", "--only", "text"), "--only text is given twice"),
     (("crossval", "--seeds", "0"), "--seeds"),
     (("crossval", "--replay", "--seeds", "2"), "--seeds does not go with --replay"),
+    (("crossval", "--replay", "--lane-width", "3.5"), "--lane-width does not go with --replay"),
     (("crossval", "--replay", "6-way"), "unknown junction of a published run"),
     (("crossval", "--replay", "-d", "400"), "no dim run of 400 veh/h; it has 150, 200, 250, 300,"),
     (("crossval", "--replay", "--split", "1:1:1:1"), "unknown split of a published run"),
