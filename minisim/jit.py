@@ -12,8 +12,10 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import sys
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -104,7 +106,21 @@ def _cache_class() -> Any:
             # If the version differs, numba does not read the rest, whose classes may be gone.
             self._cache_file._version = self._cache_file._source_stamp = sources
 
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            """The code on disk; None if there is none, and it has to be compiled."""
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            if found is None:
+                _announce()
+            return found
+
     return SourcesCache
+
+
+@lru_cache
+def _announce() -> None:
+    """Say once, to somebody who is waiting at a terminal, what takes so long."""
+    if parent_process() is None and sys.stderr is not None and sys.stderr.isatty():
+        print("minisim: compiling, once after installation; this takes a while", file=sys.stderr)
 
 
 @lru_cache

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -106,3 +109,25 @@ def test_a_class_may_change_its_name(tmp_path: Path) -> None:
         )
         assert ask(tree, ask_with.format(name=name)) == "10.0 compiled"
         assert ask(tree, ask_with.format(name=name)) == "10.0 kept"
+
+
+def test_who_waits_at_a_terminal_is_told_why(tmp_path: Path) -> None:
+    folder = copied(tmp_path)
+    (folder / "outside" / "rule.py").write_text(
+        RULE.format(decorator="njit", factor=1.0, body="2.0 * x")
+    )
+    pty = pytest.importorskip("pty")
+    said = []
+    for _ in range(2):
+        reader, terminal = pty.openpty()
+        kept = {"PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(folder / "kept")}
+        subprocess.run(
+            [sys.executable, "-c", ASK], cwd=folder, env={**os.environ, **kept}, stderr=terminal,
+            stdout=subprocess.DEVNULL, check=True,
+        )  # fmt: skip
+        os.write(terminal, b"end")
+        said.append(os.read(reader, 1000).decode())
+        os.close(terminal)
+        os.close(reader)
+    assert said[0].count("minisim: compiling, once after installation") == 1
+    assert said[1] == "end"
