@@ -118,9 +118,9 @@ def _cache_class() -> Any:
 
 @lru_cache
 def _announce() -> None:
-    """Say once, to somebody who is waiting at a terminal, what takes so long."""
+    """Tell a user at a terminal, once, what takes so long."""
     if parent_process() is None and sys.stderr is not None and sys.stderr.isatty():
-        print("minisim: compiling, once after installation; this takes a while", file=sys.stderr)
+        sys.stderr.write("minisim: compiling, once after installation; this takes a while\n")
 
 
 @lru_cache
