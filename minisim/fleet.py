@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -271,6 +272,8 @@ def fleet_named(value: FleetLike, base: VehicleType) -> Fleet:
     if isinstance(value, VehicleType):
         return Fleet((value,))
     wanted = "shares of vehicle types such as car:0.8,bus:0.2"
+    if isinstance(value, str) and ":" not in value and not re.fullmatch(r"[\w-]+", value):
+        raise InputError(f"fleet must be a mix or type by name, or {wanted}, got {show(value)}")
     if isinstance(value, str) and ":" not in value:
         known = {**MIXES, **{name: {name: 1.0} for name in TYPES}}
         value = known[choice("fleet", value, known)]

@@ -78,6 +78,9 @@ def records_of(
     if not kinds and "class" not in columns:
         notes.append("no classes: all count as cars")
     days: set[str] = set()
+    empty: list[int] = []  # lines
+    seen: set[tuple[object, ...]] = set()
+    again: list[int] = []
     for line, cells in sheet.rows:
         where = f"{place}, line {line}"
         said = {key: cells[k] for key, k in columns.items()}
@@ -91,8 +94,17 @@ def records_of(
         else:
             counted = [(*way, name, cells[k]) for k, name in kinds.items()]
         for approach, turn, out, name, cell in counted or [(*way, kind, said["count"])]:
+            empty += [line] if not cell else []
+            again += [line] if (what := (start, approach, turn, out, name)) in seen else []
+            seen.add(what)
             vehicles = number_of(cell, where, sheet.decimal)
             yield Record(where, start, end, approach, turn, out, name, vehicles)
+    if empty:
+        notes.append(f"empty cells, taken as 0: {len(empty)}, the first in line {empty[0]}")
+    if again:
+        notes.append(
+            f"counts given twice, and added: {len(again)}, the first again in line {again[0]}"
+        )
 
 
 def class_of(name: str, given: Mapping[str, Any]) -> str | None:

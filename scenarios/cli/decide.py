@@ -58,6 +58,9 @@ def decide(
         site = what.site()
         known = {**TYPES, **{it.name: it for it in site.types}}
         body = None if corridor is None else known[choice("vehicle type", corridor, known)]
+        if body is not None and body not in site.types:
+            decided = ", ".join(it.name for it in site.types)
+            typer.echo(f"minisim: decided for {decided}; the corridors are of {corridor}", err=True)
         save(decision_figure(explanation, site, Dim().start(site).plan, body), plot)
     facts = {
         "scenario": what.name,

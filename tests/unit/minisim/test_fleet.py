@@ -51,6 +51,7 @@ def test_the_law_of_the_profile_drives_every_type() -> None:
         ("car:0.5,buss:0.5", "unknown vehicle type 'buss'.*did you mean 'bus'"),
         ("indai", "unknown fleet 'indai'.*did you mean 'india'"),
         ("car:half,bus:0.5", "fleet must be shares of vehicle types such as"),
+        ("car=0.5,bus=0.5", "fleet must be a mix or type by name, or shares .* such as car:0.8"),
         ({"car": 1.5, "bus": -0.5}, "share of a type must be"),
         ({}, "fleet must be shares"),
         ("car:1/0.5,bus:0/0.4", r"shares on lane b must sum to 1, got 0.9"),

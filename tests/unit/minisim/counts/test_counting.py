@@ -268,3 +268,12 @@ def test_what_is_drawn_is_what_was_counted(tmp_path: Path) -> None:
         it = count.demand.draw(4, count.demand.duration, seed)
         np.add.at(drawn, (it.lane, it.manoeuvre - 1), 1)
     assert ((drawn - sheet) ** 2 / sheet).sum() < 32.9  # 0.1 % of χ² with 12 degrees of freedom
+
+
+def test_empty_cells_and_counts_given_twice_are_named(tmp_path: Path) -> None:
+    text = "time,from,to,count\n" + "".join(
+        f"{time},{a},{b},9\n" for time in ("7:00", "7:15") for a in "123" for b in "123" if a != b
+    )
+    count = read(tmp_path, text.replace("7:15,1,2,9", "7:15,1,2,") + "7:00,1,2,9\n")
+    assert "empty cells, taken as 0: 1, the first in line 8" in count.notes
+    assert "counts given twice, and added: 1, the first again in line 14" in count.notes
