@@ -94,7 +94,7 @@ def sweep(
         integer("--seeds", seeds, low=1, high=100_000)
     if jobs is not None and scheduler is not None:
         raise InputError("--jobs is for this machine, --scheduler for a cluster; give one")
-    workers = 1 if scheduler is not None else options.processes(jobs)
+    workers = options.processes(jobs)
     if horizon is not None:
         number("--horizon [s]", horizon, above=0, high=MAX_TIME)
     check_apart({"FILE.toml": Path(what), "--out": out, "--export": export})

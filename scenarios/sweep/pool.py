@@ -21,7 +21,7 @@ from concurrent.futures import (
 from contextlib import closing, contextmanager
 from functools import partial
 from itertools import islice
-from multiprocessing import Pipe, forkserver, get_all_start_methods, get_context
+from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from multiprocessing.resource_tracker import ensure_running
 from queue import SimpleQueue
@@ -119,47 +119,26 @@ def _until_given_up(pool: Executor) -> Iterator[Executor]:
 
 def handed(executor: Executor, function: Callable[[Task], Answer], task: Task) -> Future[Answer]:
     """Hand one task over; Ctrl-C is delayed, and hidden from processes that start meanwhile."""
-    with _interrupts_blocked():
-        return executor.submit(partial(_ending, function), task)
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
+    whole = partial(_ending, function)
     if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
+        return executor.submit(whole, task)
     ensure_running()  # or the first process would, which ends the delay
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        return executor.submit(whole, task)
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def prepare() -> None:
-    """Begin to load what workers need; by the time that the first run is handed over, it is there.
-
-    Workers are forked from a server process, which loads it once. Forking this process could hang
-    beside the threads of a progress bar.
-    """
-    if _START != "forkserver":
-        return
-    get_context(_START).set_forkserver_preload(["scenarios.sweep.warm"])
-    with _interrupts_blocked():
-        forkserver.ensure_running()
-
-
-#: How workers start: elsewhere (on Windows) there is no server to fork from.
-_START = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-
-
 class _Processes(ProcessPoolExecutor):
-    """Processes that end when their parent dies or lets them go."""
+    """Processes that end when their parent dies or lets them go.
+
+    They are spawned, since forking beside the threads of a progress bar can hang.
+    """
 
     def __init__(self, jobs: int) -> None:
         leash, self._hand = Pipe(duplex=False)
-        prepare()
-        super().__init__(jobs, get_context(_START), initializer=_begin_worker, initargs=(leash,))
+        super().__init__(jobs, get_context("spawn"), initializer=_begin_worker, initargs=(leash,))
 
     def let_go(self) -> None:
         """End all processes and their runs at once."""

@@ -44,8 +44,8 @@ def sweep(
         recipes: what to run.
         executor: any `concurrent.futures.Executor`, such as
             `dask.distributed.Client.get_executor()`; it stays open. None means a pool of
-            processes for this call, so a script needs `if __name__ == "__main__":`. Only the
-            column `cpu_s` depends on the executor.
+            processes for this call, spawned, so a script needs `if __name__ == "__main__":`. Only
+            the column `cpu_s` depends on the executor.
         progress: called in this process with the numbers of finished runs and of all runs.
         jobs: processes of the pool, one per core by default; 1 runs in this process.
         store: keeps each row as it comes; rows that it has are not computed again.

@@ -91,13 +91,8 @@ def say_replaced(scenarios: Iterable[Scenario]) -> None:
 
 
 def processes(jobs: int | None) -> int:
-    """The number of processes that --jobs asks for, or one per core; several begin to load."""
-    from scenarios.sweep.pool import prepare
-
-    count = integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
-    if count > 1:
-        prepare()
-    return count
+    """The number of processes that --jobs asks for, or one per core."""
+    return integer("--jobs", (os.cpu_count() or 1) if jobs is None else jobs, low=1, high=1024)
 
 
 def check_distinct(given: Mapping[str, Sequence[Any] | None]) -> None:
