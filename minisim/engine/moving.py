@@ -132,10 +132,8 @@ def happenings(
 
 @njit
 def catch_up(vehicles: Records, lanes: Records) -> None:
-    """Note which rows of each lane are the first not yet arrived, and not yet clear."""
+    """Note which row of each lane is the first not yet arrived."""
     for lane in range(len(lanes)):
         here = lanes[lane]
         while here["first"] < here["next"] and vehicles[here["first"]]["status"] == ARRIVED:
             here["first"] += 1
-        while here["uncleared"] < here["next"] and vehicles[here["uncleared"]]["cleared"] != 0:
-            here["uncleared"] += 1

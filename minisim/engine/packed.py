@@ -20,23 +20,23 @@ from minisim.jit import njit, njit_inline
 from minisim.laws import STOP_MARGIN, Law
 
 #: Rows of the array of floats, as in `minisim.engine.state.VEHICLE` and `minisim.laws.Traits`.
-S, V, ACC, LENGTH, B_MAX, A, B, HEADWAY, MIN_GAP, DELTA, WAITED, LOST, BRAKE = range(13)
+S, V, ACC, LENGTH, B_MAX, A, B, HEADWAY, MIN_GAP, WAITED, LOST, BRAKE = range(12)
 #: 2√(ab) of the IDM; the limit where it is, times the driver's factor; v over that limit.
-ROOT, LIMIT, RATIO = 13, 14, 15
+ROOT, LIMIT, RATIO = 12, 13, 14
 #: The leader: the gap to its rear bumper, its speed, and the most that its brakes can do.
-GAP, LEAD_V, LEAD_B = 16, 17, 18
+GAP, LEAD_V, LEAD_B = 15, 16, 17
 #: What other leaders ask for: a lower bound on `closeness`, an upper one on `room_behind`.
-CLOSEST, NARROWEST = 19, 20
+CLOSEST, NARROWEST = 18, 19
 #: `closeness` and `room_behind` of all leaders together.
-CLOSENESS, ROOM = 21, 22
+CLOSENESS, ROOM = 20, 21
 #: The first `s` ahead that may call for braking, and how fast it is left behind in a step.
-CARE, REACH = 23, 24
+CARE, REACH = 22, 23
 #: The next `s` at which something happens, such as a wake-up mark, and where it matters no more
 #: whether its body touches another near the junction.
-EVENT, AWAY = 25, 26
+EVENT, AWAY = 24, 25
 #: 1 where a vehicle needs the full rules, or else 0; `s` of its exit from the junction.
-FLAG, LEAVE = 27, 28
-FLOATS = 29
+FLAG, LEAVE = 26, 27
+FLOATS = 28
 
 #: Rows of the array of integers. `AHEAD` is a slot, or -1 once that vehicle has arrived.
 ROW, LANE, PATH, TYPE, SECTION, MARK, AHEAD, CLEARED, RELEASED = range(9)
@@ -83,7 +83,7 @@ def admit(
     ints[AHEAD, at], ints[CLEARED, at] = -1, 0
     floats[S, at], floats[V, at], floats[ACC, at] = me["s"], me["v"], me["a"]
     floats[LENGTH, at], floats[B_MAX, at] = me["length"], me["b_max"]
-    floats[A, at], floats[B, at], floats[DELTA, at] = mine.a, mine.b, mine.delta
+    floats[A, at], floats[B, at] = mine.a, mine.b
     floats[HEADWAY, at], floats[MIN_GAP, at] = mine.headway, mine.min_gap
     floats[ROOT, at] = 2.0 * math.sqrt(mine.a * mine.b)
     floats[WAITED, at], floats[LOST, at] = 0.0, 0.0

@@ -70,7 +70,6 @@ LANE = np.dtype(
         ("first", np.int64),  # first row not yet arrived
         ("next", np.int64),  # next row to be inserted
         ("front", np.int64),  # first row whose front has not entered the junction
-        ("uncleared", np.int64),  # first row not yet clear of the junction
         ("open", np.int64),  # 0, 1 or `AMBER`
         ("last", np.int64),  # last row that entered the junction for the exit lane of this arm
         ("tail", np.int64),  # its slot (`minisim.engine.packed`), or -1 once it has arrived
@@ -233,7 +232,7 @@ def build_lanes(site: Site, vehicles: Records, lanes_open: bool) -> Records:
     starts = np.searchsorted(vehicles["lane"], np.arange(n + 1))
     lanes = np.zeros(n, LANE)
     lanes["end"] = starts[1:]
-    for name in ("first", "next", "front", "uncleared"):
+    for name in ("first", "next", "front"):
         lanes[name] = starts[:-1]
     lanes["open"] = lanes_open
     for name in ("last", "tail"):

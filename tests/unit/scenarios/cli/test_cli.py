@@ -335,7 +335,9 @@ def test_longer_bodies_only_remove_harmony(capsys: Captured) -> None:
 
 def test_a_decision_is_drawn_with_what_a_type_sweeps(capsys: Captured, tmp_path: Path) -> None:
     decide, file = ("decide", "four-way", "a1", "b2", "--corridor"), tmp_path / "corridor.svg"
-    ok(capsys, *decide, "bus-offtracking", "--plot", str(file))
+    assert main([*decide, "bus-offtracking", "--plot", str(file)]) == 0
+    told = "minisim: decided for car; the corridors are of bus-offtracking"
+    assert capsys.readouterr().err.strip() == told
     with_corridors = file.read_bytes()
     ok(capsys, *decide[:-1], "--plot", str(file))
     assert file.read_bytes() != with_corridors
