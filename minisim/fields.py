@@ -221,11 +221,14 @@ def checked(
 
 
 def _unchanged(test: Callable[[str, Any], object]) -> Check:
-    """A check that returns the value unchanged, such as an int for a float."""
+    """A check that returns an object or an int unchanged, where a float is allowed too.
+
+    Other numbers, such as fractions, become floats, and -0.0 becomes 0.0.
+    """
 
     def check(title: str, value: Any) -> Any:
-        test(title, value)
-        return value
+        fit = test(title, value)
+        return value if fit is None or isinstance(value, int) else fit
 
     return check
 
