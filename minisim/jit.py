@@ -108,7 +108,7 @@ def _cache_class() -> Any:
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             """The code on disk; None if there is none, and it has to be compiled."""
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]  # as above
             if found is None:
                 _announce()
             return found

@@ -62,7 +62,7 @@ class Watched(Executor):
 
     def __init__(self, executor: Executor, alive: Callable[[], bool], patience: float) -> None:
         self._executor, self._alive, self._patience = executor, alive, patience
-        self._futures: list[Future[Any]] = []
+        self._running: set[Future[Any]] = set()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
@@ -70,7 +70,8 @@ class Watched(Executor):
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         """As of the executor."""
         future = self._executor.submit(function, *args, **options)
-        self._futures.append(future)
+        self._running.add(future)
+        future.add_done_callback(self._running.discard)  # its result is the caller's to keep
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
@@ -85,7 +86,7 @@ class Watched(Executor):
             if self._over.wait(pause):
                 return
             lost = 0.0 if self._alive() else lost + pause
-        for future in [*self._futures]:
+        for future in list(self._running):
             future.cancel()
 
 
