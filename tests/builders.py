@@ -78,7 +78,10 @@ def queues(vehicle: VehicleType, limit: float = 14.0) -> Scenario:
 
 
 class Greens:
-    """A signal, and for each green the vehicles that stood in it and were left behind."""
+    """A signal, and for each green the vehicles that stood in its queue and were left behind.
+
+    A vehicle that stands in the first 50 m of its road has just entered there.
+    """
 
     name = "greens"
 
@@ -88,26 +91,30 @@ class Greens:
 
     def start(self, site: Site) -> Session:
         """Begin a run that is watched."""
-        return _Watched(self.signal.start(site), self.left)
+        longest = site.intersection.arm_length - 50.0
+        return _Watched(self.signal.start(site), self.left, longest)
 
 
 class _Watched:
-    def __init__(self, session: Session, left: list[set[int]]) -> None:
-        self.plan, self._session, self._left = session.plan, session, left
+    def __init__(self, session: Session, left: list[set[int]], longest: float) -> None:
+        self.plan, self._session, self._left, self._longest = session.plan, session, left, longest
         self._green = -1
         self._stood: set[int] = set()
 
     def decide(self, view: View) -> list[Command]:
         commands = list(self._session.decide(view))
         lane = [v for v in view.vehicles if v.lane == self._green and v.distance >= 0.0]
-        self._stood |= {v.id for v in lane if v.speed <= 0.1}
+        self._stood |= self._standing(lane)
         for command in commands:
             if isinstance(command, Close):
                 self._left.append(self._stood & {v.id for v in lane})
             if isinstance(command, Open):
-                here = (v for v in view.vehicles if v.lane == command.lane)
-                self._green, self._stood = command.lane, {v.id for v in here if v.speed <= 0.1}
+                here = [v for v in view.vehicles if v.lane == command.lane]
+                self._green, self._stood = command.lane, self._standing(here)
         return commands
+
+    def _standing(self, lane: list[Observed]) -> set[int]:
+        return {v.id for v in lane if v.speed <= 0.1 and v.distance < self._longest}
 
 
 def digest(run: Run) -> str:

@@ -179,6 +179,10 @@ def queueing_vehicles(draw: st.DrawFn) -> VehicleType:
 @pytest.mark.parametrize("name", SIGNALS)
 @share(0.2)
 @given(vehicle=queueing_vehicles(), limit=floats(3.0, 20.0), shortest=floats(0.5, 10.0))
+@example(  # one stands where it enters, not in the queue
+    vehicle=VehicleType(length=0.84375, headway=0.5, min_gap=0.5, model="iidm"),
+    limit=3.625, shortest=3.0,
+)  # fmt: skip
 def test_a_standing_queue_is_served_in_one_green(
     name: str, vehicle: VehicleType, limit: float, shortest: float
 ) -> None:
