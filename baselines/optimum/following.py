@@ -1,6 +1,6 @@
-"""How near a vehicle can come to the one ahead of it by the IDM, whatever that one does.
+"""What the IDM costs a vehicle behind another, whatever that one does.
 
-The IDM brakes where the gap is below s0 + vT. So there is a curve g(v) of gaps over speeds that a
+*Gaps.* The IDM brakes where the gap is below s0 + vT. So there is a curve g(v) of gaps over speeds that a
 vehicle never falls below, once it is above: on the curve, the gap shrinks no faster than the curve
 falls as the vehicle slows down (a control barrier; Ames et al. 2017, IEEE TAC 62:3861). With w the
 leader's speed, that is w − v ≥ g'(v)·v̇ for every w. The curve is built from this with a reserve for
@@ -9,6 +9,13 @@ moving (`ballistic`, `semi_implicit`), with a leader that brakes or accelerates 
 
 Vehicles are inserted with less behind a faster leader. Below the curve a gap recovers, by `RECOVERY`
 per metre driven at least, which the test shows too.
+
+*Losses.* On a road with a limit u, a leader that has passed a place is nowhere ahead of a point that
+leaves this place then and drives at u. Behind the leader the law asks for no more than behind that
+point, from which the distance z only grows. So v as a function of z is below the solution of
+dv/dz = v̇(z, v, u)/(u − v) (two solutions of an equation of first order do not cross), and z and the
+time lost are above. This holds for any braking of both. What a vehicle loses by waiting first,
+so that it follows further behind, is added.
 """
 
 from __future__ import annotations
@@ -41,6 +48,9 @@ STEEPEST = 4.0
 #: How fast a gap below the curve recovers at 1 m/s or more; slower vehicles, in proportion [m/s].
 RECOVERY = 0.5
 
+#: Losses are followed for so much longer than the stretch takes at the limit [s].
+LONGEST = 60.0
+
 #: How far around the curve its test goes [m].
 ABOVE, BELOW = 2.0, 30.0
 
@@ -50,6 +60,34 @@ class Gaps(NamedTuple):
 
     speed: Floats  #: ascending from 0 [m/s]
     gap: Floats  #: at least 0 [m]
+
+
+@lru_cache(maxsize=1024)
+def least_losses(
+    me: Traits, limit: float, dt: float, length: float, far: float, start: float, alone: float,
+    behind: tuple[float, float],
+) -> Floats:  # fmt: skip
+    """What a vehicle loses on a stretch of `far` metres at least, shape (times,) [s].
+
+    Against `alone` [s], if it begins at the speed `start` at most, behind a vehicle that began at
+    each of the times 0, step, … before it; `behind` is their step and number. At the beginning the
+    gap is the way of the point but for `length` [m]. The law sees a state that is up to a step old,
+    so the point counts as a step further ahead.
+    """
+    step, count = behind
+    times = step * np.arange(int(count))
+    ahead, v, done = limit * times - length, np.full(len(times), start), np.zeros(len(times))
+    s, took = np.zeros(len(times)), 0.0
+    while took < far / limit + LONGEST and (s < far).any():
+        acc = _accelerations(me, v, ahead + limit * dt, np.array(limit), limit, dt)
+        after = np.minimum(v + acc * dt, limit)
+        way = (v + after) / 2.0 * dt
+        part = np.clip((far - s) / np.maximum(way, 1e-9), 0.0, 1.0)
+        done += part * dt
+        s, ahead, v, took = s + way, ahead + limit * dt - way, after, took + dt
+    arrives = np.where(limit * times < length, math.inf, times + done)
+    soonest = np.minimum.accumulate(arrives[::-1])[::-1]
+    return np.asarray(np.maximum(soonest - times - alone, 0.0))
 
 
 @lru_cache(maxsize=256)

@@ -29,7 +29,8 @@ import numpy as np
 from scipy import ndimage
 
 from baselines.optimum.alone import Drive, drives
-from baselines.optimum.following import Gaps, least_gaps
+from baselines.optimum.following import Gaps, least_gaps, least_losses
+from baselines.optimum.sequencing import WAKE_STEP, Rules
 from baselines.prediction import Floats, law_of
 from minisim.control import Site
 from minisim.junction.geometry import Intersection
@@ -44,6 +45,12 @@ STEP, MARK_STEP = 0.1, 0.5
 
 #: How many speeds of a follower are tried.
 SPEEDS = 30
+
+#: How far past the junction vehicles are compared that follow each other on an exit lane [m].
+PAST = 50.0
+
+#: The longest times behind another vehicle that count, before the junction and behind it [s].
+APPROACH, WAKE = 60.0, 12.0
 
 #: What it costs to lose the order of two movements of a lane [s]: more than anything else.
 LOST = 1e6
@@ -86,16 +93,19 @@ def _poses(intersection: Intersection, k: int, it: VehicleType) -> tuple[Floats,
     return s, *path.pose(path.entry + s, it), np.array([it.length, it.width]) / 2.0
 
 
-class Separations(NamedTuple):
-    """What must lie between vehicles, by kind: the movements of each type in turn."""
+class Needs(NamedTuple):
+    """What every controller keeps whose vehicles do not collide; k kinds of vehicles."""
 
-    between: Floats  #: least time from the mark of the first to that of the second [s]; −inf: none
-    until: Floats  #: least time of a kind from insertion to its mark [s]
-    loss: Floats  #: what it loses at least on its whole way, against driving at the limits [s]
+    rules: Rules
+    until: Floats  #: least time from insertion to the mark [s], (k,)
+    #: What a vehicle loses on its approach lane at least, by its time behind the vehicle ahead: at
+    #: 0, `WAKE_STEP`, …, shape (k, times) [s].
+    approach: Floats
+    at_limit: Floats  #: what the whole way takes at the limits of its roads [s], (k,)
 
 
-def necessary(site: Site, depart_speed: float | None = None) -> Separations:
-    """The separations that every controller keeps whose vehicles do not collide."""
+def necessary(site: Site, depart_speed: float | None = None) -> Needs:
+    """The needs of a site's vehicles, by kind: the movements of each type in turn."""
     ways = drives(site, depart_speed)
     marks = _places(site)
     tables, same = _tables(site, ways, marks)
@@ -103,11 +113,50 @@ def necessary(site: Site, depart_speed: float | None = None) -> Separations:
     each = np.arange(len(ways))
     between = tables[each[:, None], each, chosen[:, None], chosen]
     # If there is none in one order, vehicles may take turns past their marks in the other, too.
-    until = [it.before + float(it.until(marks[k])) for it, k in zip(ways, chosen, strict=True)]
-    return Separations(
-        np.where((between > 0.0) & (between.T > 0.0), between, -math.inf),
-        np.array(until), np.array([it.loss for it in ways]),
+    between = np.where((between > 0.0) & (between.T > 0.0), between, -math.inf)
+    at_mark = np.array([float(it.until(marks[k])) for it, k in zip(ways, chosen, strict=True)])
+    exits = np.tile(site.intersection.movements.exits, len(site.types))
+    past, wake = zip(*(_wake(site, k, way) for k, way in enumerate(ways)), strict=True)
+    rules = Rules(
+        between, (between > -math.inf) & (exits[:, None] == exits), np.array(past) - at_mark,
+        np.array([it.time[-1] for it in ways]) - at_mark, np.array(wake), site.dt,
     )  # fmt: skip
+    return Needs(
+        rules, np.array([it.before for it in ways]) + at_mark,
+        np.array([_approach(site, k, way) for k, way in enumerate(ways)]),
+        np.array([it.at_limit for it in ways]),
+    )  # fmt: skip
+
+
+def _approach(site: Site, kind: int, way: Drive) -> Floats:
+    """What a vehicle loses behind another until it has to slow down for the junction [s]."""
+    junction, m = site.intersection, len(site.intersection.movements)
+    it, limit = site.types[kind // m], site.limit(int(junction.movements.origins[kind % m]))
+    free = np.flatnonzero((way.s <= 0.0) & (way.v >= limit * (1.0 - 1e-6)))
+    return _losses(site, it, limit, way, 0, int(free.max(initial=0)), it.length, APPROACH)
+
+
+def _wake(site: Site, kind: int, way: Drive) -> tuple[float, Floats]:
+    """Least time from the entry to where vehicles on the exit lane are compared; losses there."""
+    junction, m = site.intersection, len(site.intersection.movements)
+    path, it = junction.paths[kind % m], site.types[kind // m]
+    begin = int(way.s.searchsorted(path.crossing + min(PAST, (way.s[-1] - path.crossing) / 2.0)))
+    length = min(one.length for one in site.types)
+    lost = _losses(site, it, site.limit(path.exit_arm), way, begin, -1, length, WAKE)
+    return float(way.time[begin]), np.maximum(lost - lost[-1], 0.0)
+
+
+def _losses(
+    site: Site, it: VehicleType, limit: float, way: Drive, begin: int, end: int, length: float,
+    longest: float,
+) -> Floats:  # fmt: skip
+    count = round(longest / WAKE_STEP) + 1
+    if law_of(site).model != IDM:
+        return np.zeros(count)
+    far, alone = (float(it[end] - it[begin]) for it in (way.s, way.time))
+    return least_losses(
+        traits_of(it), limit, site.dt, length, far, float(way.v[begin]), alone, (WAKE_STEP, count)
+    )
 
 
 def _places(site: Site) -> Floats:

@@ -1,13 +1,14 @@
-"""In which order vehicles pass so that their times add up to the least: exact dynamic programming.
+"""In which order vehicles pass so that they arrive earliest in sum: exact dynamic programming.
 
 Each lane keeps its order, so a state is how many of each lane have passed, and how early each kind
 of vehicle may come next. States grow by one vehicle at a time. Of two states with the same numbers,
 one that is later in nothing and has cost no more makes the other superfluous (Yan, Dridi, El
-Moudni 2009, IFAC 42(15):252, have this for two lanes). Times before the next vehicle of a kind is
-there say nothing, so states become equal where a junction falls empty, and there are few of them.
+Moudni 2009, IFAC 42(15):252, have this for two lanes). Times before the next vehicle of a kind can
+be there say nothing, so states become equal where a junction falls empty, and there are few of
+them.
 
-If one vehicle can have passed before another could come, without any that is still to come being
-the later for it, it goes first: otherwise it could be moved there, and would be earlier.
+If one vehicle can have passed so long before another could come that nothing that is still to come
+is later for it, it goes first: otherwise it could be moved there, and would be earlier.
 """
 
 from __future__ import annotations
@@ -16,13 +17,35 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from baselines.prediction import Floats
 from minisim.jit import allocating, njit_inline
-from minisim.junction.movements import Ints
+from minisim.junction.movements import Bools, Ints
 
 #: Times that differ by less are equal [s].
 ROUNDING = 1e-9
+
+#: Of schedules with the same sum of arrivals, the one with the least sum of times is best; the sum
+#: of times counts so much less.
+TIE = 1e-6
+
+#: Spacing of the tables of `Rules.wake` [s].
+WAKE_STEP = 0.05
+
+
+class Rules(NamedTuple):
+    """What vehicles must keep, by kind; k kinds."""
+
+    between: Floats  #: least time from the mark of the first to that of the second, (k, k) [s]
+    #: Whether the second kind drives behind the first on its exit lane, if it comes after, (k, k).
+    joins: Bools
+    past: Floats  #: least time from the mark to where vehicles on the exit lane are compared [s]
+    rest: Floats  #: least time from the mark to arrival [s]
+    #: What a vehicle loses on its exit lane at least, by its time behind the vehicle ahead: falls
+    #: from `wake[:, 0]` at 0 by at most 1 s per second, to 0, shape (k, times) [s].
+    wake: Floats
+    tick: float = 0.0  #: vehicles arrive at multiples of this [s]; 0: at any time
 
 
 class Queue(NamedTuple):
@@ -34,38 +57,42 @@ class Queue(NamedTuple):
 
 
 class Schedule(NamedTuple):
-    """An order, and the times that follow from it."""
+    """The best order, and what follows from it."""
 
     order: Ints  #: indices of vehicles, the first to pass first, shape (k,)
     time: Floats  #: when each passes its mark, by vehicle [s], shape (k,)
-    late: float  #: sum of the times after `Queue.ready` [s]
-    bound: float  #: no order has less [s]
+    arrival: Floats  #: when each arrives, by vehicle [s], shape (k,)
+    bound: float  #: no order has a smaller sum of arrivals [s]
     widest: int  #: the most states at once
 
 
-def timed(queue: Queue, order: Ints, between: Floats) -> Floats:
-    """When each vehicle passes its mark in this order, at the earliest [s], shape (k,)."""
-    time, latest = np.zeros(len(order)), np.full(len(between), -math.inf)
+def timed(queue: Queue, rules: Rules, order: Ints) -> tuple[Floats, Floats]:
+    """When each vehicle passes its mark in this order and arrives, at the earliest [s]."""
+    time, arrival = np.zeros((2, len(order)))
+    free, ahead = np.full((2, len(rules.rest)), -math.inf)
     for i in order.tolist():
         kind = queue.kind[i]
-        time[i] = max(queue.ready[i], latest[kind])
-        latest = np.maximum(latest, time[i] + between[kind])
-    return time
+        time[i] = max(queue.ready[i], free[kind])
+        arrival[i] = _arrives(rules, kind, time[i], ahead[kind])
+        free = np.maximum(free, time[i] + rules.between[kind])
+        out = time[i] + rules.past[kind]
+        ahead = np.where(rules.joins[kind], np.maximum(ahead, out), ahead)
+    return time, arrival
 
 
-def scheduled(queue: Queue, between: Floats, width: int = 20_000) -> Schedule:
-    """The order with the least sum of times, by `Separations.between`."""
-    lanes, k = len(queue.begins) - 1, len(queue.kind)
-    due = _due(queue, len(between))
-    at, free, cost = queue.begins[None, :-1].copy(), due[queue.begins[:-1] + np.arange(lanes)].max(axis=0)[None], np.zeros(1)
+def scheduled(queue: Queue, rules: Rules) -> Schedule:
+    """The order in which vehicles arrive earliest in sum."""
+    k, starts = len(queue.kind), queue.begins[:-1]
+    due, lanes = _due(queue, len(rules.rest)), np.arange(len(starts))
+    at, cost = starts[None].copy(), np.zeros(1)
+    free = due[starts + lanes].max(axis=0, initial=-math.inf)[None]
+    ahead = np.full(free.shape, -math.inf)
     steps: list[tuple[Ints, Ints]] = []
     widest = 1
     for _ in range(k):
-        at, free, cost, parent, lane = _next(queue, between, due, at, free, cost)
-        kept = _undominated(at, free, cost)
-        if len(kept) > width:
-            raise RuntimeError(len(kept))
-        at, free, cost = at[kept], free[kept], cost[kept]
+        at, free, ahead, cost, parent, lane = _next(queue, rules, due, at, free, ahead, cost)
+        kept = _undominated(at, np.concatenate([free, ahead], axis=1), cost)
+        at, free, ahead, cost = at[kept], free[kept], ahead[kept], cost[kept]
         steps.append((parent[kept], lane[kept]))
         widest = max(widest, len(kept))
     order, row, passed = np.empty(k, np.int64), int(cost.argmin()), queue.begins[1:].copy()
@@ -73,9 +100,10 @@ def scheduled(queue: Queue, between: Floats, width: int = 20_000) -> Schedule:
         parents, lane = steps[i]
         passed[lane[row]] -= 1
         order[i], row = passed[lane[row]], int(parents[row])
-    time = timed(queue, order, between)
-    late = float((time - queue.ready).sum())
-    return Schedule(order, time, late, late, widest)
+    time, arrival = timed(queue, rules, order)
+    # Of all orders, this has the least sum with its ties, and no order saves more than their part.
+    late = float((arrival - queue.ready - rules.rest[queue.kind]).sum())
+    return Schedule(order, time, arrival, float(arrival.sum()) - TIE * late, widest)
 
 
 def _due(queue: Queue, kinds: int) -> Floats:
@@ -92,52 +120,82 @@ def _due(queue: Queue, kinds: int) -> Floats:
     return due
 
 
+@njit_inline
+def _arrives(rules: Rules, kind: int, time: float, ahead: float) -> float:
+    """When a vehicle arrives that passes its mark at `time`, behind one out at `ahead` [s]."""
+    arrival = time + rules.rest[kind] + _lost(rules, kind, time + rules.past[kind] - ahead)
+    if rules.tick > 0.0:
+        return math.ceil(arrival / rules.tick - 1e-6) * rules.tick
+    return arrival
+
+
+@njit_inline
+def _lost(rules: Rules, kind: int, behind: float) -> float:
+    """What a vehicle loses on its exit lane so long behind another [s]."""
+    place = max(behind, 0.0) / WAKE_STEP
+    if place >= rules.wake.shape[1] - 1:
+        return 0.0
+    k = int(place)
+    left = rules.wake[kind, k] + (place - k) * (rules.wake[kind, k + 1] - rules.wake[kind, k])
+    return left - min(behind, 0.0)
+
+
 @allocating
 def _next(
-    queue: Queue, between: Floats, due: Floats, at: Ints, free: Floats, cost: Floats
-) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-    """All states with one vehicle more: where each lane is, when kinds may come, cost, origin."""
+    queue: Queue, rules: Rules, due: Floats, at: Ints, free: Floats, ahead: Floats, cost: Floats
+) -> tuple[Ints, Floats, Floats, Floats, Ints, Ints]:
+    """All states with one vehicle more: their arrays, and from which and by which lane they come."""
     count, lanes = at.shape
-    kinds = len(between)
+    kinds = len(rules.rest)
     ats = np.empty((count * lanes, lanes), np.int64)
-    frees = np.empty((count * lanes, kinds))
+    frees, aheads = np.empty((count * lanes, kinds)), np.empty((count * lanes, kinds))
     costs = np.empty(count * lanes)
-    parents = np.empty(count * lanes, np.int64)
-    chosen = np.empty(count * lanes, np.int64)
+    parents, chosen = np.empty(count * lanes, np.int64), np.empty(count * lanes, np.int64)
     early, done = np.empty(lanes), np.empty(lanes)
+    memory = (rules.wake.shape[1] - 1) * WAKE_STEP
     new = 0
     for row in range(count):
         for lane in range(lanes):
-            i = at[row, lane]
             early[lane] = done[lane] = np.inf
+            i = at[row, lane]
             if i < queue.begins[lane + 1]:
                 kind = queue.kind[i]
                 early[lane] = free[row, kind]
                 last = 0.0
                 for other in range(kinds):
                     if free[row, other] > -np.inf and due[i + lane, other] == -np.inf:
-                        last = max(last, between[kind, other])
+                        last = max(last, rules.between[kind, other])
+                        if rules.joins[kind, other]:
+                            last = max(last, rules.past[kind] + memory - rules.past[other])
                 done[lane] = early[lane] + last
         for lane in range(lanes):
             if early[lane] == np.inf or _after(early, done, lane):
                 continue
             i = at[row, lane]
-            kind = queue.kind[i]
-            time = early[lane]
+            kind, time = queue.kind[i], early[lane]
+            arrival = _arrives(rules, kind, time, ahead[row, kind])
+            late = arrival - rules.rest[kind] - queue.ready[i]
+            costs[new] = cost[row] + late + TIE * (time - queue.ready[i])
             for other in range(lanes):
                 ats[new, other] = at[row, other]
             ats[new, lane] = i + 1
             for other in range(kinds):
+                frees[new, other] = aheads[new, other] = -np.inf
                 to_come = free[row, other] > -np.inf
                 if due[i + lane, other] > -np.inf:  # of this lane
                     to_come = due[i + 1 + lane, other] > -np.inf
-                least = max(free[row, other], due[i + 1 + lane, other])
-                later = max(least, time + between[kind, other])
-                frees[new, other] = later if to_come else -np.inf
-            costs[new] = cost[row] + (time - queue.ready[i])
+                if to_come:
+                    least = max(free[row, other], due[i + 1 + lane, other])
+                    frees[new, other] = max(least, time + rules.between[kind, other])
+                    out = ahead[row, other]
+                    if rules.joins[kind, other]:
+                        out = max(out, time + rules.past[kind])
+                    # What is further ahead no longer matters.
+                    first = frees[new, other] + rules.past[other] - memory
+                    aheads[new, other] = max(out, first)
             parents[new], chosen[new] = row, lane
             new += 1
-    return ats[:new], frees[:new], costs[:new], parents[:new], chosen[:new]
+    return ats[:new], frees[:new], aheads[:new], costs[:new], parents[:new], chosen[:new]
 
 
 @njit_inline
@@ -151,35 +209,35 @@ def _after(early: Floats, done: Floats, lane: int) -> bool:
     return False
 
 
-def _undominated(at: Ints, free: Floats, cost: Floats) -> Ints:
+def _undominated(at: Ints, times: Floats, cost: Floats) -> Ints:
     """The states that no other one with the same numbers makes superfluous, by index."""
     low = at.min(axis=0)
     spans = at.max(axis=0) - low + 1
     key = np.ravel_multi_index(tuple((at - low).T), tuple(spans))
-    order = np.lexsort((cost, key))
-    return order[_best(key[order], free[order], cost[order])]
+    order: npt.NDArray[np.int64] = np.lexsort((cost, key))
+    return order[_best(key[order], times[order], cost[order])]
 
 
 @allocating
-def _best(key: Ints, free: Floats, cost: Floats) -> Ints:
+def _best(key: Ints, times: Floats, cost: Floats) -> Ints:
     """The same for states sorted by their key, then by cost."""
     kept = np.empty(len(key), np.int64)
     count = begin = 0
     for row in range(len(key)):
         if row > 0 and key[row] != key[row - 1]:
             begin = count
-        if not _dominated(free, kept, begin, count, row):
+        if not _dominated(times, kept, begin, count, row):
             kept[count] = row
             count += 1
     return kept[:count]
 
 
 @njit_inline
-def _dominated(free: Floats, kept: Ints, begin: int, count: int, row: int) -> bool:
+def _dominated(times: Floats, kept: Ints, begin: int, count: int, row: int) -> bool:
     for k in range(begin, count):
         least = True
-        for kind in range(free.shape[1]):
-            if free[kept[k], kind] > free[row, kind] + ROUNDING:
+        for kind in range(times.shape[1]):
+            if times[kept[k], kind] > times[row, kind] + ROUNDING:
                 least = False
                 break
         if least:
