@@ -119,7 +119,7 @@ def necessary(site: Site, depart_speed: float | None = None) -> Needs:
     past, wake = zip(*(_wake(site, k, way) for k, way in enumerate(ways)), strict=True)
     rules = Rules(
         between, (between > -math.inf) & (exits[:, None] == exits), np.array(past) - at_mark,
-        np.array([it.time[-1] for it in ways]) - at_mark, np.array(wake), site.dt,
+        np.array([it.time[-1] for it in ways]) - at_mark, np.array(wake),
     )  # fmt: skip
     return Needs(
         rules, np.array([it.before for it in ways]) + at_mark,

@@ -7,8 +7,8 @@ Moudni 2009, IFAC 42(15):252, have this for two lanes). Times before the next ve
 be there say nothing, so states become equal where a junction falls empty, and there are few of
 them.
 
-If one vehicle can have passed so long before another could come that nothing that is still to come
-is later for it, it goes first: otherwise it could be moved there, and would be earlier.
+If one vehicle can have passed before another could come, it goes first, unless those behind it on
+its exit lane lose more than it gains: otherwise it could be moved there, to the good of all.
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ class Rules(NamedTuple):
     #: What a vehicle loses on its exit lane at least, by its time behind the vehicle ahead: falls
     #: from `wake[:, 0]` at 0 by at most 1 s per second, to 0, shape (k, times) [s].
     wake: Floats
-    tick: float = 0.0  #: vehicles arrive at multiples of this [s]; 0: at any time
 
 
 class Queue(NamedTuple):
@@ -91,7 +90,7 @@ def scheduled(queue: Queue, rules: Rules) -> Schedule:
     widest = 1
     for _ in range(k):
         at, free, ahead, cost, parent, lane = _next(queue, rules, due, at, free, ahead, cost)
-        kept = _undominated(at, np.concatenate([free, ahead], axis=1), cost)
+        kept = _undominated(rules, at, free, ahead, cost)
         at, free, ahead, cost = at[kept], free[kept], ahead[kept], cost[kept]
         steps.append((parent[kept], lane[kept]))
         widest = max(widest, len(kept))
@@ -123,10 +122,7 @@ def _due(queue: Queue, kinds: int) -> Floats:
 @njit_inline
 def _arrives(rules: Rules, kind: int, time: float, ahead: float) -> float:
     """When a vehicle arrives that passes its mark at `time`, behind one out at `ahead` [s]."""
-    arrival = time + rules.rest[kind] + _lost(rules, kind, time + rules.past[kind] - ahead)
-    if rules.tick > 0.0:
-        return math.ceil(arrival / rules.tick - 1e-6) * rules.tick
-    return arrival
+    return time + rules.rest[kind] + _lost(rules, kind, time + rules.past[kind] - ahead)
 
 
 @njit_inline
@@ -151,25 +147,16 @@ def _next(
     frees, aheads = np.empty((count * lanes, kinds)), np.empty((count * lanes, kinds))
     costs = np.empty(count * lanes)
     parents, chosen = np.empty(count * lanes, np.int64), np.empty(count * lanes, np.int64)
-    early, done = np.empty(lanes), np.empty(lanes)
+    early = np.empty(lanes)
     memory = (rules.wake.shape[1] - 1) * WAKE_STEP
     new = 0
     for row in range(count):
         for lane in range(lanes):
-            early[lane] = done[lane] = np.inf
             i = at[row, lane]
-            if i < queue.begins[lane + 1]:
-                kind = queue.kind[i]
-                early[lane] = free[row, kind]
-                last = 0.0
-                for other in range(kinds):
-                    if free[row, other] > -np.inf and due[i + lane, other] == -np.inf:
-                        last = max(last, rules.between[kind, other])
-                        if rules.joins[kind, other]:
-                            last = max(last, rules.past[kind] + memory - rules.past[other])
-                done[lane] = early[lane] + last
+            come = i < queue.begins[lane + 1]
+            early[lane] = free[row, queue.kind[i]] if come else np.inf
         for lane in range(lanes):
-            if early[lane] == np.inf or _after(early, done, lane):
+            if early[lane] == np.inf or _after(queue, rules, due, at, free, ahead, early, row, lane):
                 continue
             i = at[row, lane]
             kind, time = queue.kind[i], early[lane]
@@ -199,47 +186,81 @@ def _next(
 
 
 @njit_inline
-def _after(early: Floats, done: Floats, lane: int) -> bool:
-    """Whether the next vehicle of another lane has passed before this one could."""
+def _after(
+    queue: Queue, rules: Rules, due: Floats, at: Ints, free: Floats, ahead: Floats, early: Floats,
+    row: int, lane: int,
+) -> bool:  # fmt: skip
+    """Whether the next vehicle of another lane should go before this one.
+
+    Both in the other order, that one could be moved before this one: it delays none, and gains more
+    than it loses on its exit lane and costs the vehicles that are now behind it there.
+    """
     for other in range(len(early)):
-        if other != lane and (
-            done[other] < early[lane] or (done[other] == early[lane] and other < lane)
-        ):
+        time, gain = early[other], early[lane] - early[other]
+        if other == lane or not gain > 0.0:
+            continue
+        i = at[row, other]
+        kind = queue.kind[i]
+        out = time + rules.past[kind]
+        gain -= _lost(rules, kind, out - ahead[row, kind])
+        for k in range(len(rules.rest)):
+            if free[row, k] > -np.inf and due[i + other, k] == -np.inf:
+                if time + rules.between[kind, k] > early[lane]:
+                    gain = 0.0
+                if rules.joins[kind, k]:
+                    gain -= _lost(rules, k, early[lane] + rules.past[k] - out)
+        if gain > ROUNDING:
             return True
     return False
 
 
-def _undominated(at: Ints, times: Floats, cost: Floats) -> Ints:
+def _undominated(rules: Rules, at: Ints, free: Floats, ahead: Floats, cost: Floats) -> Ints:
     """The states that no other one with the same numbers makes superfluous, by index."""
     low = at.min(axis=0)
     spans = at.max(axis=0) - low + 1
     key = np.ravel_multi_index(tuple((at - low).T), tuple(spans))
     order: npt.NDArray[np.int64] = np.lexsort((cost, key))
-    return order[_best(key[order], times[order], cost[order])]
+    return order[_best(rules, key[order], free[order], ahead[order], cost[order])]
 
 
 @allocating
-def _best(key: Ints, times: Floats, cost: Floats) -> Ints:
+def _best(rules: Rules, key: Ints, free: Floats, ahead: Floats, cost: Floats) -> Ints:
     """The same for states sorted by their key, then by cost."""
     kept = np.empty(len(key), np.int64)
     count = begin = 0
     for row in range(len(key)):
         if row > 0 and key[row] != key[row - 1]:
             begin = count
-        if not _dominated(times, kept, begin, count, row):
+        superfluous = False
+        for k in range(begin, count):
+            if _better(rules, free, ahead, cost, kept[k], row):
+                superfluous = True
+                break
+        if not superfluous:
             kept[count] = row
             count += 1
     return kept[:count]
 
 
 @njit_inline
-def _dominated(times: Floats, kept: Ints, begin: int, count: int, row: int) -> bool:
-    for k in range(begin, count):
-        least = True
-        for kind in range(times.shape[1]):
-            if times[kept[k], kind] > times[row, kind] + ROUNDING:
-                least = False
-                break
-        if least:
-            return True
-    return False
+def _better(
+    rules: Rules, free: Floats, ahead: Floats, cost: Floats, one: int, other: int
+) -> bool:
+    """Whether no way on from a state ends better than the same way on from another one.
+
+    A vehicle further ahead on an exit lane costs only the next one of each kind, and most if that
+    one comes as early as it can.
+    """
+    kinds = free.shape[1]
+    for kind in range(kinds):
+        if free[one, kind] > free[other, kind] + ROUNDING:
+            return False
+    spare = cost[other] - cost[one] + ROUNDING
+    for kind in range(kinds):
+        if ahead[one, kind] > ahead[other, kind]:
+            out = free[one, kind] + rules.past[kind]
+            spare -= _lost(rules, kind, out - ahead[one, kind])
+            spare += _lost(rules, kind, out - ahead[other, kind])
+            if spare < 0.0:
+                return False
+    return spare >= 0.0
